@@ -9,7 +9,9 @@ from acquisition.files.contents.units import VOLTS, unit_of
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _PART_OF_FRF = re.compile(
-    r"((?:re|im|abs|arg|mag|phase|angle)\w*\s*[\[(]\s*(?:h|frf)\w*(?:\(\w+\))?\s*[\])])\s*(.*)", re.I
+    r"((?:re|real|im|imag|imaginary|abs|mag|magnitude|arg|angle|phase)\s*"
+    r"[\[(]\s*(?!hz)(?:h|frf)\w*(?:\(\w+\))?\s*[\])])\s*(.*)",
+    re.IGNORECASE,
 )
 """Such as Re(H), or imag(FRF) [m/N]."""
 ANGLES = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg", "rad": "rad", "radians": "rad"}

@@ -1,0 +1,32 @@
+"""A table of one FRF and one hit, written in the ways that its tests need, and what is asked about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Description, Frf, look
+
+F = np.arange(1.0, 60.0)
+H = 1e-6 / (1 + 0.1j * F)
+TIME = np.arange(400) / 4000
+FORCE = np.where(np.abs(TIME - 0.005) < 2e-3, 100 * np.cos(np.pi * (TIME - 0.005) / 4e-3) ** 2, 0.0)
+RESPONSE = np.where(TIME > 0.005, np.exp(-200 * (TIME - 0.005)) * np.sin(2000 * TIME), 0.0)
+
+
+def rows(*columns: np.ndarray, form: str = "%.12g", separator: str = "\t", end: str = "\n") -> str:
+    return "".join(separator.join(form % value for value in row) + end for row in zip(*columns, strict=True))
+
+
+def put(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="latin-1", newline="")
+    return path
+
+
+def complaint(path: Path, **said: object) -> str:
+    return look(path, Description(**said)).complaint  # type: ignore[arg-type]
+
+
+def is_h(frf: Frf) -> bool:
+    return np.allclose(frf.receptance, H, rtol=1e-6, atol=0) and np.allclose(frf.frequency, F)

@@ -29,8 +29,6 @@ def history(
       lobewatch history mill-3 --csv
       lobewatch history mill-3 --hdf5 history.h5
     """
-    from lobes import write_history
-    from lobewatch.history.history_columns import to_columns
     from lobewatch.logbook import Logbook
     from lobewatch.show.history.describe_history import history_csv, history_json, history_lines
 
@@ -38,6 +36,9 @@ def history(
         raise ValueError("--csv and --json: give one of them")
     logbook = Logbook.open(machine)
     if hdf5 is not None:
+        from lobes import write_history
+        from lobewatch.history.history_columns import to_columns
+
         write_history(hdf5, to_columns(logbook.history, logbook.machine))
     if as_csv:
         results.out(history_csv(logbook), end="", highlight=False)

@@ -1,18 +1,5 @@
 """Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
 
-from modal.fitting.band_fit import BandFit
-from modal.fitting.fit_band import fit_band, values_nearby, with_real_constants
-from modal.fitting.projected_band import beyond_terms, gain_of_a_pair, gain_of_a_term
-from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS
+import lazy_loader
 
-__all__ = [
-    "LEAST_TERMS",
-    "MOST_TERMS",
-    "BandFit",
-    "beyond_terms",
-    "fit_band",
-    "gain_of_a_pair",
-    "gain_of_a_term",
-    "values_nearby",
-    "with_real_constants",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,6 +1,5 @@
 """LSCF poles of every order, and which of them are modes."""
 
-from modal.poles.physical_poles import PhysicalPoles, physical_poles
-from modal.poles.stabilise import StabilisationChart, stabilise
+import lazy_loader
 
-__all__ = ["PhysicalPoles", "StabilisationChart", "physical_poles", "stabilise"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -60,7 +60,10 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
     ("code", "left_out"),
     [
         ("from acquisition import *", {"scipy.signal", "scipy.stats"}),
-        ("import modal, lobes, lobewatch.logbook.logbook, lobewatch.decay.standing", NUMERICAL),
+        (
+            "from modal import *\nfrom lobes import *\nimport lobewatch.logbook.logbook, lobewatch.decay.standing",
+            NUMERICAL,
+        ),
         ("import dsm", NUMERICAL - {"scipy.linalg"}),
         ("import acquisition.ports, acquisition.atomic, acquisition.errors, acquisition.remark", HEAVY),
         ("import lobewatch, lobewatch.machine.new_folder", HEAVY),

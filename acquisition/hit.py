@@ -138,6 +138,8 @@ class Hit:
     """Raw ADC codes, a row a channel, force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
+    beside: Hit | None = None
+    """The same blow as a second sensor felt it, across to the first; None where there is none."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""
@@ -165,17 +167,24 @@ class Hit:
         pre_trigger: int = 0,
         lost_scans: int = 0,
         overload: int = 0,
+        beside: Hit | None = None,
     ) -> Hit:
         """A hit from ADC codes, a row a channel, force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
-        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload)
+        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, beside)
 
     @property
     def has_force(self) -> bool:
         """Whether the force was measured."""
         return bool(self.force.size)
+
+    @property
+    def sensors(self) -> tuple[Channel, ...]:
+        """Channels of all that felt the blow, that of the response last; empty where it came from no DAQ."""
+        channels = self.channels or ()
+        return channels if self.beside is None else (*channels[:1], *self.beside.sensors[-1:], *channels[-1:])
 
     @property
     def signals(self) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ error stands between the truth and the samples. What the modes leave out is a st
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -90,7 +91,10 @@ class Hammering:
 
 @dataclass(eq=False)
 class HammeredStructure:
-    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n); call it in order."""
+    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n); call it in order.
+
+    With more sensors there are as many more rows of acceleration.
+    """
 
     structure: Structure
     """Structure that is hit."""
@@ -100,6 +104,8 @@ class HammeredStructure:
     """Source of every random number."""
     hammering: Hammering = field(default_factory=Hammering)
     """Way in which it is hit."""
+    beside: Sequence[Structure] = ()
+    """What further sensors feel of the same blows: modes from the hammer to each of them."""
     _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
     _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)
@@ -113,8 +119,9 @@ class HammeredStructure:
         while self._next_hit < first_scan + n_scans:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
             self._waves.append(self._hit(self._next_hit))
-        noise = [[self.hammering.force_noise], [self.hammering.response_noise]]
-        signals = self._noise.normal(scale=noise, size=(2, n_scans))
+        sensors = 1 + len(self.beside)
+        noise = [[self.hammering.force_noise], *[[self.hammering.response_noise]] * sensors]
+        signals = self._noise.normal(scale=noise, size=(1 + sensors, n_scans))
         self._waves = [(start, wave) for start, wave in self._waves if start + wave.shape[1] > first_scan]
         for start, wave in self._waves:
             low, high = max(start, first_scan), min(start + wave.shape[1], first_scan + n_scans)
@@ -138,9 +145,10 @@ class HammeredStructure:
 
     def _length(self, width: float) -> int:
         """Samples until the slowest mode has fallen to a millionth."""
-        slowest = np.min(2 * np.pi * self.structure.frequency * self.structure.damping_ratio)
+        felt = (self.structure, *self.beside)
+        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in felt)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
     def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
-        return np.stack([force, self.structure.response(time, width)])
+        return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.beside))])

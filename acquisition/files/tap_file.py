@@ -100,12 +100,15 @@ def read_tap(path: Path | str) -> TapTest:
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
-    """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns, else OSError."""
+    """One hit of a test in progress, as each sensor felt it, and the verdict on it, sealed; on the disk when this
+    returns, else OSError."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=_version([hit]), file=Path(path).name)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
+        if hit.beside is not None:
+            _write_raw(file.create_group("beside"), [hit.beside], [flags])
     atomic_write(Path(path), sealed(memory.getvalue()))
 
 
@@ -113,6 +116,9 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
     """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then; DataError as read_tap."""
     with _open(Path(path)) as file:
         hits, flags = _read_raw(file)
+        if "beside" in file:
+            pairs = zip(hits, _read_raw(file["beside"])[0], strict=True)
+            hits = tuple(replace(hit, beside=beside) for hit, beside in pairs)
         return hits, _read_circumstances(file), flags
 
 
@@ -172,7 +178,7 @@ def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any
     group.create_dataset(name, data=data, **options).attrs["units"] = units
 
 
-def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
+def _write_raw(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
     if not hits:
         return
     raw = file.create_group("raw")
@@ -202,7 +208,7 @@ def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
     raw["verdict"] = [flag.words for flag in flags]
 
 
-def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
+def _read_raw(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
     if "raw" not in file:
         return (), ()
     raw = file["raw"]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, ChannelQuantity
-from acquisition.errors import DataError
 from acquisition.hit import Hit
 from acquisition.hits.rest import Rest
+from acquisition.hits.tap_inputs import TapInputs
 from acquisition.source import Source
 
 PATIENCE = 2.0
@@ -69,29 +69,6 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
         yield from search.feed(block)
 
 
-def input_channels(
-    channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
-) -> tuple[int, ...]:
-    """Index of the force and of the acceleration channel; of the latter alone where that triggers.
-
-    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction
-    (of a tap across, "xy", that of y). DataError unless there is one of each that is needed.
-    """
-    forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
-    responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
-    several, seen = len(responses) > 1, direction[-1:] or "x"
-    if several:
-        responses = [i for i in responses if direction and channels[i].direction == seen]
-    if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
-        return (*forces, *responses) if quantity == "force" else (*responses,)
-    listed = ", ".join(channel.name for channel in channels) or "nothing"
-    needed = "one force and one acceleration channel are needed"
-    if quantity == "acceleration":
-        needed = "one acceleration channel is needed to tap without a force sensor"
-    which = f', of several that with direction = "{seen}"' if several else ""
-    raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
-
-
 class HitSearch:
     """The scans not yet done with, and where in them the search stands (positions count scans received)."""
 
@@ -99,12 +76,12 @@ class HitSearch:
         self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger, direction: str = ""
     ) -> None:
         """Search a stream of these channels from its next scan on; direction: as for `input_channels`."""
-        self._inputs = input_channels(channels, trigger.quantity, direction)
-        self._used = tuple(channels[i] for i in self._inputs)
+        self._inputs = TapInputs.of(channels, trigger.quantity, direction)
+        self._used = self._inputs.channels
         self._rate, self._trigger = sample_rate, trigger
         self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
         self._gap = 1 if trigger.quantity == "force" else trigger.pre_trigger
-        self._codes: NDArray[np.int32] = np.empty((len(self._inputs), 0), np.int32)
+        self._codes: NDArray[np.int32] = np.empty((len(self._used), 0), np.int32)
         self._added: list[NDArray[np.int32]] = []
         self._size = 0
         self._from = 0
@@ -137,16 +114,15 @@ class HitSearch:
         self._add(block)
         while (record := self._next_record()) is not None:
             codes, lost, overload = record
-            yield Hit.from_codes(codes, self._used, self._rate, self._trigger.pre_trigger, lost, overload)
+            yield self._inputs.hit(codes, self._rate, self._trigger.pre_trigger, lost, overload)
 
     def _add(self, block: Block) -> None:
-        flags = [block.overload >> i & 1 for i in self._inputs]
-        overload = flags[-1] << 1 | (flags[0] if len(flags) > 1 else 0)
+        overload = sum((block.overload >> row & 1) << i for i, row in enumerate(self._inputs.rows))
         end = self._size + block.codes.shape[1]
         if overload:
             self._overloads.append((self._size, end, overload))
-        is_all = self._inputs == tuple(range(len(block.codes)))
-        self._added.append(block.codes if is_all else block.codes[list(self._inputs)])
+        is_all = self._inputs.rows == tuple(range(len(block.codes)))
+        self._added.append(block.codes if is_all else block.codes[list(self._inputs.rows)])
         self._size = end
 
     def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:

@@ -24,8 +24,8 @@ def tap(
     direction: Annotated[
         str,
         typer.Option(
-            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y); without it x, then y at "
-            "a terminal."
+            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y; a sensor with two axes does "
+            "it with x); without it x, then y at a terminal."
         ),
     ] = "",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",

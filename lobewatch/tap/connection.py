@@ -114,7 +114,7 @@ class Connector:
         try:
             self._check_rate(device)
             connection = Connection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
-            tap.accept_device(device.sample_rate, connection.signal.channels, description(device))
+            tap.accept_device(device.sample_rate, connection.signal.inputs.channels, description(device))
             connection.start()
         except BaseException:
             device.close()

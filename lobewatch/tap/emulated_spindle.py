@@ -7,11 +7,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import (
+    ACROSS,
     Bench,
     Block,
     Channel,
@@ -41,6 +43,8 @@ CHANNELS = (
 """A 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
 HIGHER = 0.05
 """Relative distance of the frequencies along the second axis of a spindle whose modes lie askew."""
+RIGID = 1e30
+"""Modal stiffness of what does not move (N/m)."""
 AHEAD = 25
 """Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
 PATIENCE = 0.2
@@ -160,12 +164,12 @@ def emulate_machine(
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
-    structure, random = _structure(folder, spindle), np.random.default_rng(seed)
-    if askew is not None or direction == "xy":
-        structure = askew_structure(structure, askew or 0.0, direction)
+    built, random = _structure(folder, spindle), np.random.default_rng(seed)
+    structure = _met(built, askew, direction)
     inputs = emulated_inputs(folder, driver)
+    beside = [_met_beside(built, askew, direction)] if any(_is_across(sensor, direction) for sensor in inputs) else []
     bench = Bench(
-        lambda rate: felt_by(inputs, HammeredStructure(structure, rate, random, Hammering())),
+        lambda rate: felt_by(inputs, HammeredStructure(structure, rate, random, Hammering(), beside), direction),
         inputs,
         SAMPLE_RATE,
         realtime,
@@ -184,10 +188,33 @@ def _structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
     )
 
 
-def felt_by(inputs: Sequence[SensorInput], signal: Signal) -> Signal:
-    """A signal of force and acceleration as these sensors feel it, a row each."""
-    rows = [("force", "acceleration").index(sensor.channel.quantity) for sensor in inputs]
+def _met(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
+    """What hammer and sensor meet in a direction."""
+    return built if askew is None and direction != ACROSS else askew_structure(built, askew or 0.0, direction)
+
+
+def _met_beside(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
+    """What a second sensor, square to the first, feels of the same blows: nothing where no mode lies askew."""
+    if direction == ACROSS:
+        return _met(built, askew, "x")
+    if askew is None or not 0 < askew < 90:
+        return replace(built, stiffness=np.full(built.stiffness.shape, RIGID), residual=0.0)
+    return _met(built, askew, ACROSS)
+
+
+def felt_by(inputs: Sequence[SensorInput], signal: Signal, direction: TapDirection | Literal[""] = "") -> Signal:
+    """A signal of force and acceleration as these sensors feel it, a row each.
+
+    direction: that of a tap whose signal has, as a third row, what is felt square to it.
+    """
+    kinds = ("force", "acceleration")
+    rows = [kinds.index(sensor.channel.quantity) + _is_across(sensor, direction) for sensor in inputs]
     return lambda first_scan, n_scans: signal(first_scan, n_scans)[rows]
+
+
+def _is_across(sensor: SensorInput, direction: str) -> bool:
+    """Whether a sensor lies square to the one that a tap in a direction is seen by."""
+    return bool(direction and sensor.channel.direction and sensor.channel.direction != direction[-1])
 
 
 def emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:

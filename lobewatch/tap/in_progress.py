@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -80,7 +81,7 @@ class TapInProgress:
     def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
         """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
         earlier = self.hits[-1] if self.hits else self.baseline
-        if earlier is not None and (earlier.sample_rate, earlier.channels) != (sample_rate, channels):
+        if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
             raise self.other_setup()
         if not self.hits:
             self.circumstances = replace(self.circumstances, device=description)
@@ -112,9 +113,7 @@ class TapInProgress:
 
     def finish(self) -> TapTest:
         """The averaged tap test; ValueError where no hit is good."""
-        good = [hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags]
-        frf = estimate_frf(good) if good[0].has_force else None
-        return TapTest(self.id, self.circumstances, frf, tuple(self.hits), tuple(self.flags))
+        return averaged(self.id, self.circumstances, self.hits, self.flags)
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
         self.numbers.append(number)
@@ -136,6 +135,13 @@ class TapInProgress:
         if not self.hits and self.trigger is not None:
             write_set_up(self.folder, self.trigger)
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+
+
+def averaged(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
+    """The tap test of hits with the verdict on each, each as one sensor felt it; ValueError where none is good."""
+    good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
+    frf = estimate_frf(good) if good[0].has_force else None
+    return TapTest(tap_id, about, frf, tuple(replace(hit, beside=None) for hit in hits), tuple(flags))
 
 
 def peak_text(hit: Hit) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Device, Hit, Source
 from acquisition.channel import ChannelQuantity
-from acquisition.hits.capture_hits import input_channels
+from acquisition.hits import TapInputs
 
 LEVEL_TIME = 0.05
 """Length of the live levels (s)."""
@@ -28,9 +28,8 @@ class LiveSignal:
 
     def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
         """quantity: by which hits are seen; direction: the one that is tapped; DataError as `input_channels`."""
-        self._rows = list(input_channels(source.channels, quantity, direction))
-        self.channels = tuple(source.channels[row] for row in self._rows)
-        """Force and acceleration channel, or the latter alone."""
+        self.inputs = TapInputs.of(source.channels, quantity, direction)
+        """Inputs of the tap test: force and acceleration, or the latter alone; between them that across to it."""
         self._rate = source.sample_rate
         self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
 
@@ -40,11 +39,11 @@ class LiveSignal:
         wanted = round(LEVEL_TIME * self._rate)
         newest: list[NDArray[np.int32]] = []
         for codes in reversed(self._recent):
-            newest.insert(0, codes[self._rows])
+            newest.insert(0, codes[list(self.inputs.rows)])
             if sum(part.shape[1] for part in newest) >= wanted:
                 break
         steps = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
-        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.channels, strict=True)]
+        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
         return rms[0] if len(rms) > 1 else None, rms[-1]
 
     def add(self, block: Block) -> None:
@@ -55,11 +54,11 @@ class LiveSignal:
         """The next blocks that make up a duration (s), as one record."""
         codes, lost = [], 0
         for block in blocks:
-            codes.append(block.codes[self._rows])
+            codes.append(block.codes[list(self.inputs.rows)])
             lost += block.lost_before
             if sum(part.shape[1] for part in codes) >= duration * self._rate:
                 break
-        return Hit.from_codes(np.concatenate(codes, axis=1), self.channels, self._rate, 0, lost)
+        return self.inputs.hit(np.concatenate(codes, axis=1), self._rate, lost_scans=lost)
 
 
 def resting_rms(baseline: Hit, width: int) -> float:

@@ -58,7 +58,7 @@ class Phases:
         self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
         self._tap.baseline = quiet_stretch(connection.signal.record(self._loop.blocks(connection), BASELINE_TIME))
         free = shutil.disk_usage(self._folder.path).free
-        calibration = calibration_check(connection.signal.channels, machine.daq.calibration_interval_months)
+        calibration = calibration_check(connection.signal.inputs.channels, machine.daq.calibration_interval_months)
         checks = (
             *self._publisher.state.checks,
             *_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),

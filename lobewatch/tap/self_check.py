@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, date, datetime
 
 import numpy as np
@@ -62,7 +62,7 @@ def self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Che
         raise ValueError("the self-check needs a record with converter codes and channels")
     return (
         _samples(baseline),
-        *(_sensor(codes, channel) for codes, channel in zip(baseline.codes, baseline.channels, strict=True)),
+        *(_sensor(codes, channel) for codes, channel in _sensors(baseline)),
         *([_force_noise(float(np.std(baseline.force)), level)] if baseline.has_force else []),
         _response_noise(float(np.std(baseline.acceleration)), baseline.channels[-1]),
         _hum(baseline),
@@ -94,8 +94,16 @@ def _samples(baseline: Hit) -> Check:
     return Check("samples", not lost, text or f"come at {baseline.sample_rate:g} Hz, none lost")
 
 
+def _sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
+    """Codes and channel of all that felt it, that across last."""
+    if baseline.codes is not None and baseline.channels is not None:
+        yield from zip(baseline.codes, baseline.channels, strict=True)
+    if baseline.beside is not None:
+        yield from list(_sensors(baseline.beside))[1:]
+
+
 def _sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
-    name, low, high = f"{channel.quantity} sensor", *channel.rails_in(codes)
+    name, low, high = f"{channel.name} sensor", *channel.rails_in(codes)
     stuck = np.mean((codes <= low) | (codes >= high))
     if stuck > 0.5:
         return Check(name, False, "stands at the end of its range: cable open or sensor not powered")
@@ -180,5 +188,5 @@ def _disk(free: int) -> Check:
 def _part(record: Hit, start: int, end: int) -> Hit:
     if record.codes is None or record.channels is None:
         return Hit(record.force[start:end], record.acceleration[start:end], record.sample_rate)
-    part = record.codes[:, start:end]
-    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans)
+    part, beside = record.codes[:, start:end], None if record.beside is None else _part(record.beside, start, end)
+    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, beside=beside)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 
 from acquisition import (
     ACROSS,
@@ -29,6 +30,7 @@ from lobewatch.machine.reserve import Reserve
 from lobewatch.measuring import Measurement
 from lobewatch.measuring.questions import check_codes, open_questions
 from lobewatch.tap.connection import Connector
+from lobewatch.tap.felt_across import FeltAcross, felt_across
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
@@ -66,6 +68,10 @@ class TapSession:
         self._measurement: Measurement | None = None
         self.unasked: Sequence[str] = ()
         """Codes of `accept` that the finished test does not ask."""
+        self.saved: Sequence[str] = ()
+        """Identities of what the finished test has saved: its own, then that of the tap across."""
+        self.across: FeltAcross | None = None
+        """Tap across that the same hits tell; None where no second sensor felt them."""
 
     @property
     def state(self) -> TapState:
@@ -140,11 +146,14 @@ class TapSession:
         self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
-        logbook.commit(tap, datetime.now(UTC) if self._guided else None)
+        now = datetime.now(UTC) if self._guided else None
+        logbook.commit(tap, now)
+        self.across = felt_across(hits.tap, partial(logbook.commit, now=now))
+        self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]
         try:
-            self.unasked = logbook.accept([tap.id], self._accept)
+            self.unasked = logbook.accept(self.saved, self._accept)
             self._measurement = logbook.measurement(tap.id)
-            outcome = outcome_of(logbook, self._measurement) if self._guided else None
+            outcome = outcome_of(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
             why = _why(error, [remark for remark in logbook.remarks if tap.id in remark.about])
             raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
@@ -171,14 +180,18 @@ def _failure(error: Exception) -> Exception:
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")
 
 
-def outcome_of(logbook: Logbook, measurement: Measurement) -> Outcome:
-    """The standing of the machine after a test, what was measured, and the next step, for the one who tapped."""
+def outcome_of(logbook: Logbook, measurement: Measurement, across: FeltAcross | None = None) -> Outcome:
+    """The standing of the machine after a test, what was measured, and the next step, for the one who tapped.
+
+    across: what became of the tap across that its hits tell.
+    """
     standing = logbook.standing(measurement.time)
     series = standing.series_of(measurement.tool, measurement.direction)
     questions = open_questions(measurement.remarks)
     remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
     remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
-    texts = [*_values(measurement, series), *(f"{remark.finding}." for remark in remarks)]
+    texts = [*_values(measurement, series), *([across.text] if across else [])]
+    texts += [f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
         ProgramWord(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.word.value)

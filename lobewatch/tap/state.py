@@ -172,10 +172,14 @@ class TapState:
     """Result; None before the end."""
     choices: tuple[Choice, ...] = ()
     """What can be chosen now; empty while a test runs."""
+    sensor_stays: bool = False
+    """Whether the hammer alone is to be moved: the sensor feels x and y."""
 
     @property
     def shown_word(self) -> str:
-        """Word as a screen shows it: the verdict in place of REFUSED."""
+        """Word as a screen shows it: the verdict in place of REFUSED, and what is to be moved."""
+        if self.word is TapStep.MOVE and self.sensor_stays:
+            return "MOVE HAMMER"
         if self.word is not TapStep.REFUSED or not self.verdict:
             return self.word.value
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()

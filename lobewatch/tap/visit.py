@@ -97,13 +97,15 @@ class TapVisit:
 
     def _wait(self, tapped: set[TapDirection]) -> tuple[str, str]:
         """Show the result, or that the sensor is to be moved first, and wait for what is chosen."""
-        state = self._session.state
+        state, felt = self._session.state, self._session.across
         missing = [direction for direction in TAPS if direction not in tapped]
         if missing:
             tap = TAPS[missing[0]]
-            reason = f"{self._direction} is saved. Turn hammer and accelerometer to {missing[0]}, then: {tap.text}."
+            turn = "Turn hammer and accelerometer to" if felt is None else f"{felt.text} The sensor stays: hit in"
+            reason = f"{self._direction} is saved. {turn} {missing[0]}, then: {tap.text}."
             choices: Sequence[Choice] = (tap, DONE)
-            state = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)
+            moved = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)
+            state = replace(moved, sensor_stays=felt is not None)
         else:
             across = (TAP_ACROSS,) if state.outcome is not None and state.outcome.asks_across else ()
             choices = (TAP_X, TAP_Y, *across, NEXT_TOOL, DONE)

@@ -19,12 +19,14 @@ def emit_visit(logbook: Logbook, finished: Sequence[TapSession], as_json: bool, 
     """Print what was stored and what it says; as JSON the last test. details: modes, model and doubt, too."""
     for session in finished:
         measurement = session.measurement
-        notes.print(f"saved {measurement.tap_id}")
+        notes.print(*(f"saved {tap_id}\n" for tap_id in session.saved), sep="", end="")
         notes.print(*(f"accepted: {code}\n" for code in accepted_codes(measurement.remarks)), sep="", end="")
         if session.unasked:
-            notes.print(unasked_text(session.unasked, [measurement.tap_id], logbook.questions), markup=False)
-    last = finished[-1].measurement
-    payload = measurement_json(last, logbook) | {"programs": programs_json(logbook.verdicts())}
+            notes.print(unasked_text(session.unasked, session.saved, logbook.questions), markup=False)
+    last = finished[-1]
+    payload = measurement_json(last.measurement, logbook) | {"programs": programs_json(logbook.verdicts())}
+    if last.across is not None:
+        payload["across"] = {"tap_id": last.across.tap_id}
     emit(payload, as_json, *_texts(logbook, finished, details))
 
 
@@ -33,6 +35,7 @@ def _texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> l
     for session in finished:
         outcome = session.state.outcome
         texts += measurement_texts(session.measurement, logbook) if details else []
+        texts += [session.across.text] if details and session.across is not None else []
         texts += [] if outcome is None or details else [f"{session.state.title}:", *outcome.texts]
     if details:
         texts += program_texts(logbook)

@@ -106,6 +106,32 @@ def test_x_then_y_then_the_next_tool(visit: Callable[..., Visit], folder: Machin
     assert person.visit.state.outcome is not None
 
 
+def test_a_sensor_that_feels_both_axes_is_not_moved(
+    folder: MachineFolder, simulated: Any, tapper: Callable[..., HammeredStructure], channels: Any
+) -> None:
+    folder.toml.write_text(folder.toml.read_text("utf-8").replace("hits = 10 ", "hits = 3 "), "utf-8")
+    sensors = [channels[0], *(replace(channels[1], direction=direction) for direction in "xy")]
+
+    def felt() -> HammeredStructure:
+        return replace(tapper(), beside=[tapper().structure])
+
+    person = Visit(MachineFolder(folder.path), simulated, felt, tuple(sensors))
+    moved = person.wait(lambda state: state.choices)
+    assert (moved.word, moved.shown_word) == (TapStep.MOVE, "MOVE HAMMER")
+    across = "xy is saved too, from the same 3 hits."
+    assert moved.reason == f"x is saved. {across} The sensor stays: hit in y, then: tap y."
+    person.visit.choose("y")
+    end = person.wait(lambda state: state.choices and state.word is TapStep.DONE)
+    assert end.shown_word == "DONE"
+    assert sorted(check.name for check in moved.checks if check.name.startswith("acceleration")) == [
+        "acceleration x sensor",
+        "acceleration y sensor",
+    ]
+    person.visit.choose("done")
+    person.end()
+    assert [tap.direction for tap in Logbook(folder).taps] == ["x", "xy", "y"]
+
+
 def test_a_tap_across_is_offered_where_it_would_settle_something(
     visit: Callable[..., Visit], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,10 @@ Side = Literal["right", "left", "above", "below"]
 SIDES: dict[Side, tuple[float, float]] = {"right": (1, 0), "left": (-1, 0), "above": (0, 1), "below": (0, -1)}
 SIZE = 8.5
 """Size of the letters (points)."""
+PHONE = 11.5
+"""The same of a small picture on a phone, where letters are larger than the picture is (report.css)."""
+HIDDEN = 0.15
+"""Share of its area, at most, that words may cover or lie outside before they are left out."""
 WIDE, HIGH = 0.62, 1.35
 """A letter and a line, at most, over the size."""
 AWAY = 9.0
@@ -27,6 +31,11 @@ class _Box(NamedTuple):
     right: float
     high: float
 
+    @property
+    def area(self) -> float:
+        """Area (points squared)."""
+        return (self.right - self.left) * (self.high - self.low)
+
     def overlap(self, box: _Box) -> float:
         """Area in common."""
         wide = min(self.right, box.right) - max(self.left, box.left)
@@ -37,9 +46,12 @@ class _Box(NamedTuple):
 class PictureLabels:
     """Words in one picture, whose limits are set already."""
 
-    def __init__(self, axes: Axes) -> None:
-        """None yet."""
+    def __init__(self, axes: Axes, room: float = SIZE, *, may_lack: bool = False) -> None:
+        """None yet. room: size of letters (points) to leave room for; may_lack: words without room are left out."""
         self._axes = axes
+        self._room = room
+        self._above = AWAY / 2 * room / SIZE
+        self._may_lack = may_lack
         self._taken: list[_Box] = []
 
     def add(
@@ -48,12 +60,14 @@ class PictureLabels:
         """Put words to that side of a place where they cover least of what is there, the first of several."""
         boxes = {side: self._box(text, place, side) for side in sides}
         best = min(boxes, key=lambda side: self._covered(boxes[side]))
+        if self._may_lack and self._covered(boxes[best]) > HIDDEN * boxes[best].area:
+            return
         self._taken.append(boxes[best])
         right, up = SIDES[best]
         self._axes.annotate(
             text,
             place,
-            xytext=(AWAY * right, AWAY / 2 * up),
+            xytext=(AWAY * right, self._above * up),
             textcoords="offset points",
             fontsize=SIZE,
             color=colour,
@@ -73,16 +87,15 @@ class PictureLabels:
 
     def _box(self, text: str, place: tuple[float, float], side: Side) -> _Box:
         lines, (right, up) = text.split("\n"), SIDES[side]
-        wide, high = WIDE * SIZE * max(map(len, lines)), HIGH * SIZE * len(lines)
+        wide, high = WIDE * self._room * max(map(len, lines)), HIGH * self._room * len(lines)
         x, y = self._points(place)
-        middle = x + right * (AWAY + wide / 2), y + up * (AWAY / 2 + high / 2)
+        middle = x + right * (AWAY + wide / 2), y + up * (self._above + high / 2)
         return _Box(middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
 
     def _covered(self, box: _Box) -> float:
         """Area of other words, and area outside of the axes."""
         inside = box.overlap(_Box(0, 0, *self._size))
-        outside = (box.right - box.left) * (box.high - box.low) - inside
-        return outside + sum(box.overlap(taken) for taken in self._taken)
+        return box.area - inside + sum(box.overlap(taken) for taken in self._taken)
 
     def _points(self, place: tuple[float, float]) -> tuple[float, float]:
         shares = (

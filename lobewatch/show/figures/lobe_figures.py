@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lobes import Cut, RadialLobes
 from lobewatch.cuts.learning.at_speed import LobesAtSpeed
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
-from lobewatch.show.figures.labels import PictureLabels
+from lobewatch.show.figures.labels import PHONE, PictureLabels
 from lobewatch.show.figures.style import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 from lobewatch.verdicts import Setting, Verdict, Word
 from lobewatch.verdicts.limit_band import LimitBand
@@ -39,8 +39,8 @@ MARKS = {
 """Colour and mark of a program by the verdict on it."""
 SAFE = "#00664A"
 LEARNT = "#8A3D78"
-LARGE = (8.0, 4.6)
-"""Size of a diagram that stands alone (inches)."""
+LARGE, SMALL = (8.0, 4.6), (5.6, 2.3)
+"""Size of a diagram that stands alone, and of one beside words (inches)."""
 LEVELS = 12
 """Steps of colour in a map."""
 BAR = "limiting depth (mm); brightest: this or more"
@@ -48,8 +48,10 @@ SHORT = 10.0
 """Days below which dates are told with their time."""
 HEARD_MARKS = {False: ("heard stable", GOOD, "o"), True: ("heard to chatter", ALARM, "x")}
 """Name, colour and mark of cuts by whether they chatter; wide and hollow, so that a program's own shows through."""
-HEARD_SIZE = 11.0
-"""Size of these marks (points)."""
+HEARD_SIZE, MARK_SIZE = 11.0, 9.0
+"""Size of these marks, and of those of programs (points)."""
+FEW = 6
+"""Number of speeds, at most, that are named along a small picture."""
 
 
 def lobes_figure(
@@ -62,15 +64,14 @@ def lobes_figure(
     heard: Sequence[HeardCut] = (),
     learnt: LobesAtSpeed | None = None,
     *,
-    size: tuple[float, float] = LARGE,
-    has_legend: bool = True,
+    is_small: bool = False,
 ) -> Figure:
     """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
 
     band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it;
-    learnt: what these have taught; size: of the picture (inches).
+    learnt: what these have taught; is_small: beside words that say the rest, with the names of programs alone.
     """
-    figure, (axes,) = new_axes(1, size)
+    figure, (axes,) = new_axes(1, SMALL if is_small else LARGE)
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
     wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
@@ -87,14 +88,12 @@ def lobes_figure(
     if learnt is not None:
         _draw_learnt(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    labels = PictureLabels(axes)
-    draw_heard(axes, heard, labels)
-    for i, pocket in enumerate(pockets):
-        _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
-    for program in programs:
-        _draw_program(axes, program, labels)
-    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
-    if has_legend:
+    axes.set(xlabel="spindle speed (rpm)", ylabel="" if is_small else "limiting depth (mm)")
+    if is_small:
+        axes.xaxis.set_major_locator(MaxNLocator(FEW))
+        figure.draw_without_rendering()  # its room is known from now on
+    _draw_marks(axes, programs, pockets, heard, is_small)
+    if not is_small:
         figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
 
@@ -159,21 +158,41 @@ def _draw_learnt(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=label)
 
 
+def _draw_marks(
+    axes: Axes, programs: Sequence[Verdict], pockets: Sequence[Setting], heard: Sequence[HeardCut], is_small: bool
+) -> None:
+    """What stands on the lobes; the words of a small picture are names of programs, as far as there is room."""
+    labels = PictureLabels(axes, PHONE, may_lack=True) if is_small else PictureLabels(axes)
+    draw_heard(axes, heard, labels)
+    for i, pocket in enumerate(pockets):
+        _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
+        if not is_small:
+            text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
+            labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
+    for program in programs:
+        _draw_program(axes, program, labels)
+    for program in programs:
+        name, place = program.program.name, _place(program)
+        labels.add(name if is_small else f"{name}\n{program.word}", place)
+
+
 def _draw_pocket(axes: Axes, pocket: Setting, labels: PictureLabels, label: str) -> None:
-    """A box as wide as the window and as high as the depth, with the numbers to set."""
+    """A box as wide as the window and as high as the depth."""
     low, high = pocket.window_rpm
     box = Rectangle((low, 0), high - low, pocket.depth_mm, fc="white", ec=SAFE, lw=1.2, hatch="////", label=label)
     axes.add_patch(box)
     labels.keep_free((low, 0.0), (high, pocket.depth_mm))
-    text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
-    labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
 
 
 def _draw_program(axes: Axes, verdict: Verdict, labels: PictureLabels) -> None:
     colour, mark = MARKS[verdict.word]
-    place = (verdict.program.speed_rpm, verdict.program.depth_mm)
-    axes.plot(*place, mark, color=colour, ms=9, mec="white")
-    labels.add(f"{verdict.program.name}\n{verdict.word}", place)
+    axes.plot(*_place(verdict), mark, color=colour, ms=MARK_SIZE, mec="white")
+    labels.keep_clear(_place(verdict), MARK_SIZE)
+
+
+def _place(verdict: Verdict) -> tuple[float, float]:
+    """Speed (rpm) and depth (mm) of a program."""
+    return verdict.program.speed_rpm, verdict.program.depth_mm
 
 
 def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[HeardCut]:

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from matplotlib.figure import Figure
-
+from lobewatch.show.figures.lobe_figures import SMALL
 from lobewatch.show.figures.style import svg
 from lobewatch.show.figures.trend_figures import frf_figure
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.value_over_time import FREQUENCY, value_over_time
-
-SMALL = (5.6, 2.3)
-"""Size of a picture (inches)."""
 
 
 class FirstPicture(NamedTuple):
@@ -31,17 +27,13 @@ def first_pictures(material: ReportMaterial) -> Iterator[FirstPicture]:
     if points is not None:
         ahead = ", and where it goes" if points.course is not None else ""
         caption = f"Natural frequency in {material.last.direction} (Hz){ahead}"
-        yield FirstPicture(caption, _with_its_caption(points.figure(SMALL)))
+        figure = points.figure(SMALL)
+        figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
+        yield FirstPicture(caption, svg(figure))
     elif (frf := material.newest.frf) is not None:
         figure = frf_figure(None, frf, material.response_band(frf), SMALL)
         yield FirstPicture("Receptance at the tool tip", svg(figure))
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""
         caption = f"Depth (mm), {diagram.cut}: chatter above the line{then}"
-        yield FirstPicture(caption, _with_its_caption(diagram.figure(SMALL, has_legend=False)))
-
-
-def _with_its_caption(figure: Figure) -> str:
-    """The <svg> element; the ordinate has its name in the caption, for letters on a phone are large."""
-    figure.axes[0].set_ylabel("")
-    return svg(figure)
+        yield FirstPicture(caption, svg(diagram.figure(is_small=True)))

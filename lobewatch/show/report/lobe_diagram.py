@@ -13,7 +13,7 @@ from lobes import StabilityLobes
 from lobewatch.cuts.learning.at_speed import LobesAtSpeed, lobes_at_speed
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.show.figures.lobe_figures import LARGE, heard_of, lobes_figure
+from lobewatch.show.figures.lobe_figures import heard_of, lobes_figure
 from lobewatch.show.programs.describe_advice import ProgramAdvice
 from lobewatch.tool import Assembly, lobes_of
 from lobewatch.verdicts import Setting, Verdict
@@ -42,8 +42,8 @@ class LobeDiagram(NamedTuple):
     learnt: LobesAtSpeed | None
     """What test cuts have taught of the turning spindle."""
 
-    def figure(self, size: tuple[float, float] = LARGE, *, has_legend: bool = True) -> Figure:
-        """The picture, of this size (inches)."""
+    def figure(self, *, is_small: bool = False) -> Figure:
+        """The picture; a small one stands beside words."""
         return lobes_figure(
             self.now.speed_rpm,
             self.depths,
@@ -53,8 +53,7 @@ class LobeDiagram(NamedTuple):
             self.advice,
             self.heard,
             self.learnt,
-            size=size,
-            has_legend=has_legend,
+            is_small=is_small,
         )
 
     @property

@@ -21,6 +21,8 @@ from lobewatch.tool import Assembly
 
 BELOW, ABOVE = 0.6, 1.4
 """Ends of the frequencies shown over those of the usable band; chosen."""
+BELOW_MODES = 0.3
+"""Least of them over the lowest mode: further down a response drowns its modes, for acceleration is divided by w^2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,8 @@ class ReportMaterial:
         """Frequencies that are shown of a response (Hz)."""
         ends = float(frf.frequency[0]), float(frf.frequency[-1])
         low, high = self.machine.mode.band_hz or frf.usable_band or ends
-        return max(BELOW * low, ends[0]), min(ABOVE * high, ends[1])
+        lowest = min((frequency for frequency, *_ in self.last.modes), default=0.0)
+        return max(BELOW * low, BELOW_MODES * lowest, ends[0]), min(ABOVE * high, ends[1])
 
     @cached_property
     def lobe_course(self) -> LobeCourse | None:

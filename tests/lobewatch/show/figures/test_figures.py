@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from itertools import combinations
 
+import msgspec
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
@@ -11,10 +13,11 @@ from matplotlib.dates import date2num
 
 from acquisition import Frf
 from lobewatch.machine import Limits, ProgramTable
+from lobewatch.show.figures.labels import PHONE
 from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
 from lobewatch.show.figures.style import new_axes, svg
 from lobewatch.show.figures.trend_figures import Marks, frf_figure, trend_figure
-from lobewatch.verdicts import Verdict, Word
+from lobewatch.verdicts import Setting, Verdict, Word
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
 
@@ -48,6 +51,34 @@ def chattering(name: str) -> Verdict:
     cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
     program = ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
     return Verdict(program, Word.NOT_STABLE)
+
+
+def drawn(name: str, speed_rpm: float, depth_mm: float) -> Verdict:
+    program = msgspec.structs.replace(chattering(name).program, speed_rpm=speed_rpm, depth_mm=depth_mm)
+    return Verdict(program, Word.NOT_STABLE)
+
+
+def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a_phone() -> None:
+    """report.css enlarges them; programs without room for their name keep their mark."""
+    speed = np.linspace(3000.0, 24000.0, 50)
+    names = ["A: slot at 12 600 rpm", "B: slot at 6 200 rpm", "C: slot at 16 000 rpm"]
+    places = [(12600.0, 2.5), (6200.0, 0.8), (16000.0, 0.5)]
+    crowd = [drawn(f"one of many programs {i}", 12000.0 + 300 * i, 1.5) for i in range(8)]
+    programs = [*(drawn(name, *place) for name, place in zip(names, places, strict=True)), *crowd]
+    pockets = [Setting(11440.0, 2.5, (11330.0, 11670.0), 0.5, 0.02)]
+    figure = lobes_figure(speed, {"now": np.full(50, 7e-4)}, programs, pockets=pockets, is_small=True)
+    (axes,) = figure.axes
+    shown = [text for text in axes.texts if text.get_text()]
+    for text in shown:
+        text.set_fontsize(PHONE)
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in shown]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    words = [text.get_text() for text in shown]
+    assert words[:3] == names
+    assert len(words) < len(programs) == sum(line.get_marker() == "X" for line in axes.lines)
+    assert axes.get_ylabel() == ""
+    assert not figure.legends
 
 
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:

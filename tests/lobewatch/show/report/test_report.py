@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from acquisition import Frf
 from lobewatch.cli import app
 from lobewatch.plant.plant import Plant
 from lobewatch.show.report.fleet import render_fleet, spark
 from lobewatch.show.report.gauge import WIDE, gauge
+from lobewatch.show.report.material import report_material
 from lobewatch.show.report.page import page
 from lobewatch.show.report.report import render_report
 
@@ -137,6 +139,17 @@ def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
     assert "<h2>What was measured</h2>" in html
     assert "from 8 points on" in html
     assert "lobes-plot" not in html.replace("#lobes-plot", "").replace('"lobes-plot"', "")
+
+
+def test_a_response_is_shown_from_below_its_lowest_mode_on(shop: Shop) -> None:
+    """Lower down what an accelerometer says is divided by next to nothing, and a picture of it has no modes."""
+    shop.edit("band_hz = [1200, 2200]", "")
+    shop.tap(0, 1713.0)
+    material = shop.logbook.ask(report_material, "reference", "x", None)
+    low, high = material.response_band(Frf(np.arange(1.0, 6001.0), np.zeros(6000, complex)))
+    lowest = min(frequency for frequency, *_ in material.last.modes)
+    assert (low, high) == (pytest.approx(0.3 * lowest), 6000.0)
+    assert lowest == pytest.approx(1713.0, rel=0.01)
 
 
 def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> None:

@@ -15,9 +15,11 @@ from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap
 
-EFFORTS = ((10, 6), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
-"""Power steps and Arnoldi vectors of each attempt; what is left in doubt goes on to the next, with the vectors that it
-has where that takes no power steps."""
+STEPS, LEAST, MOST = 10, 6, 16
+"""Power steps of the first attempt, and least and most Arnoldi vectors: two for each mode between."""
+EFFORTS = ((0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
+"""Those of the attempts after it; what is left in doubt goes on to the next, with the vectors that it has where that
+takes no power steps."""
 TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 HUGE = 1e6
@@ -72,10 +74,11 @@ def _multipliers(
     rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float, kind: type[np.floating[Any]]
 ) -> Complexes:
     """Multipliers (r, d) of rows whose tooth periods are divided alike."""
-    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, EFFORTS[0][0]).grown(EFFORTS[0][1])
+    first = min(max(2 * rows.direction.size, LEAST), MOST)
+    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, STEPS).grown(first)
     value, doubt = _largest(space.matrix)
     place = np.indices(depth.shape)
-    for steps, vectors in EFFORTS[1:]:
+    for steps, vectors in (effort for effort in EFFORTS if effort[1] > first):
         size, error = np.abs(value[*place]), doubt[*place]
         left = np.nonzero((error > tolerance) & ((size < HUGE) | (error > 0.5)))
         if not left[0].size:

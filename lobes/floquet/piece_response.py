@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lobes.floquet.inverses import inverses
 from lobes.floquet.milling_rows import MillingRows
 from lobes.floquet.stages import gauss_stages
 
@@ -121,7 +122,7 @@ class PieceResponse:
         for direction in range(p):
             pushes = self.pushes[:, np.newaxis, np.newaxis, :, direction, np.newaxis]
             push.reshape(*cases, states, p, s)[...] += pushes * forces[..., np.newaxis, direction, :, :]
-        return np.linalg.inv(loop), push
+        return inverses(loop), push
 
     def _given(self) -> Floats:
         """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""

@@ -50,24 +50,44 @@ class Judgement(NamedTuple):
         return self.middle.stable and not np.any(self.chatters)
 
 
-def weigh(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
-) -> Judgement:
-    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing.
+class DrawnProgram(NamedTuple):
+    """A program on all the spindles that it may be run on, before these are looked at."""
 
-    either: milled up and down, the worse counts.
-    """
+    depth: float
+    """Its depth (m)."""
+    middle: ProgramLimit
+    """Limit in the middle of the doubt."""
+    draws: ProgramDraws
+    """Spindles from all of the doubt."""
+    across: float
+    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
+
+
+def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed) -> Judgement:
+    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
+    return weighed(drawn_program(table, assembly, machine, at_speed))
+
+
+def drawn_program(
+    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
+) -> DrawnProgram:
+    """A program with the coefficients that were learnt; either: milled up and down, the worse counts."""
     program, spindle = as_program(table, machine), at_speed.moved(assembly)
     cuts = ways(table, machine, spindle, either)
     middle, axes, across = worst_limit(program, spindle, cuts)
     doubt = at_speed.doubt or doubt_of(assembly, table, machine)
-    draws = draw(program, middle, cuts, spindle, doubt, axes)
-    limits = drawn_limits(draws, program.depth)[1:]
+    return DrawnProgram(program.depth, middle, draw(program, middle, cuts, spindle, doubt, axes), across)
+
+
+def weighed(program: DrawnProgram) -> Judgement:
+    """What is seen of a program on all spindles that it may be run on."""
+    depth, middle, draws, across = program
+    limits = drawn_limits(draws, depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
-    below = SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
-    around = draws.around(SURELY * program.depth) >= 0
+    below = SURELY * depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
+    around = draws.around(SURELY * depth) >= 0
     near = (draws.limits <= below) | around
-    chatters = _chatters(draws, near, around, limits, program.depth)
+    chatters = _chatters(draws, near, around, limits, depth)
     return Judgement(middle, float(low), float(high), draws, chatters, across)
 
 

@@ -26,7 +26,7 @@ from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws
 from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
-from lobewatch.verdicts.judgement import SURELY, Judgement, weigh
+from lobewatch.verdicts.judgement import SURELY, Judgement, drawn_program, weighed
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
 from lobewatch.verdicts.room import APART, DEEPER, LEAST_FALL, all_around, frequency_left, window_rpm
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
@@ -172,15 +172,21 @@ class SettingSearch:
 
     def _first_at(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
         """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
-        if self.best is None:
-            return None
-        middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
-        for speed in map(_rounded, [*sorted(middles, key=rank)[:MOST_PLACES], self.best.speed_rpm]):
+        for speed in self._windows(depth_mm, rank):
             if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
                 setting = self.verified(speed, depth_mm)
                 if isinstance(setting, Setting):
                     return setting
         return None
+
+    def _windows(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
+        """Speeds (rpm) to look for a depth (mm) at; that of most chips, which takes a search, is the last."""
+        if self.reach.is_empty:
+            return
+        middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
+        yield from map(_rounded, sorted(middles, key=rank)[:MOST_PLACES])
+        if self.best is not None:
+            yield self.best.speed_rpm
 
     def _settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
         """The deepest at speeds of the grid, the most chips first as far as few draws tell.
@@ -269,29 +275,28 @@ class SettingSearch:
             setting = self.verified(speed, depth_mm)
             if isinstance(setting, Setting):
                 return setting
-            depth_mm = setting
+            depth_mm = min(setting, self._calm(speed))
         return None
 
     def verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
-        deep, ends = DEEPER * depth, self._hard(speed).draws
-        if np.any((grown := ends.growth_that_counts(deep)) >= 0):
-            return self._less(ends, grown, depth_mm)
-        judgement = weigh(table, self.assembly, self.machine, self.at_speed, self.either)
-        limit = judgement.middle.limit
+        deep = DEEPER * depth
+        program = drawn_program(table, self.assembly, self.machine, self.at_speed, self.either)
+        limit = program.middle.limit
         if limit < depth * (1 + SPARE):
             return 1e3 * limit / (1 + SPARE)
-        near = judgement.draws.fed_where(judgement.draws.around(SURELY * deep, self.fall, APART) >= 0)
+        near = program.draws.fed_where(program.draws.around(SURELY * deep, self.fall, APART) >= 0)
+        around = all_around(near, self.fall, self.stiffness_at)
+        grown = around.growth_that_counts(deep)
+        if np.any(grown >= 0):
+            return self._less(around, grown, depth_mm)
+        judgement = weighed(program)
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
             self.chattered.update(places[:REMEMBERED].tolist())
             calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.low)
             return min(calm, LESS * depth_mm, depth_mm - MM)
-        around = all_around(near, self.fall, self.stiffness_at)
-        grown = around.growth_that_counts(deep)
-        if np.any(grown >= 0):
-            return self._less(around, grown, depth_mm)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
         window = window_rpm(near, hardest, speed, depth, self.reach)
         left = frequency_left(hardest, depth, self.stiffness_at)

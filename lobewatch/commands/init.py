@@ -71,7 +71,8 @@ def init(
         draft = _set_up(text, answers, edit, asks)
         text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
     else:
-        next_step = f"fill it in, then tap with: {next_step} --port PORT"
+        change = "change what is not as in your shop" if example else "fill it in"
+        next_step = f"{change}, then tap with: {next_step} --port PORT"
     write_machine(machine, text)
     emit(
         {"machine": str(machine), "machine_toml": str(toml)},

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from acquisition import DataError, Hit
-from dsm import natural_frequencies
+from dsm import natural_frequencies, rounded
 from lobewatch.machine import Machine
 from lobewatch.measuring.decays import HIGHEST
 from lobewatch.tap.state import Check
@@ -29,7 +29,7 @@ def hearing_check(baseline: Hit, machine: Machine, tool: str) -> Check:
     """
     rate, band = baseline.sample_rate, machine.tap.sensor_band_hz or math.inf
     highest, noise = min(HIGHEST * rate, band), float(np.std(baseline.acceleration))
-    heard = f"modes up to {highest:.0f} Hz are heard, noise {noise:.2g} m/s^2 rms"
+    heard = f"modes up to {highest:.0f} Hz are heard, noise {rounded(noise, digits=2)} m/s^2 rms"
     frequency, where = _expected(machine, tool)
     if frequency is None:
         return Check("band", True, f"{heard}; whether the mode of this machine lies there nobody says", tells=True)
@@ -37,7 +37,7 @@ def hearing_check(baseline: Hit, machine: Machine, tool: str) -> Check:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
         return Check("band", False, f"{heard}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
     least = least_ringing(frequency, _damping(machine), noise / math.sqrt(min(rate / 2, band)))
-    error = f"{HITS} hits that ring at {least:.2g} m/s^2 tell it to {100 * GOOD_ERROR:g} %"
+    error = f"{HITS} hits that ring at {rounded(least, digits=2)} m/s^2 tell it to {100 * GOOD_ERROR:g} %"
     return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}", tells=True)
 
 

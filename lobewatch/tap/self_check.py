@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel, Hit, Remark, calibration_doubt, channel_doubts
+from dsm import rounded
 from lobewatch.machine.reserve import RESERVE_BYTES
 from lobewatch.tap.state import Check
 
@@ -115,14 +116,14 @@ def _sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
 def _force_noise(rms: float, level: float | None) -> Check:
     if level is None or level >= LEVEL_NOISE_RATIO * rms:
         against = "" if level is None else f", trigger at {level:g} N"
-        return Check("force noise", True, f"{rms:.2g} N rms{against}")
-    cure = f"set trigger_n above {2 * LEVEL_NOISE_RATIO * rms:.2g}, or find the source of the noise"
-    return Check("force noise", False, f"{rms:.2g} N rms is too near the trigger at {level:g} N: {cure}")
+        return Check("force noise", True, f"{rounded(rms, digits=2)} N rms{against}")
+    cure = f"set trigger_n above {rounded(2 * LEVEL_NOISE_RATIO * rms, digits=2)}, or find the source of the noise"
+    return Check("force noise", False, f"{rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}")
 
 
 def _response_noise(rms: float, channel: Channel) -> Check:
     scale = channel.full_scale / abs(channel.sensitivity)
-    text = f"{rms:.2g} m/s^2 rms"
+    text = f"{rounded(rms, digits=2)} m/s^2 rms"
     if rms < NOISE_SHARE * scale:
         return Check("response noise", True, text)
     cure = "is the machine at rest, the sensor fixed?"
@@ -167,7 +168,7 @@ def _spindle(baseline: Hit) -> Check:
     line = float(frequency[int(np.argmax(off_mains))])
     rms = float(np.sqrt(np.sum(off_mains[_near(frequency, line)])))
     if rms**2 > TURNING_SHARE * np.sum(power) and rms > FEWEST_CODES * abs(channel.scale):
-        vibration = f"{rms:.2g} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
+        vibration = f"{rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
         return Check("spindle", False, f"a steady vibration of {vibration}: stop the spindle and what runs beside it")
     return Check("spindle", True, "no steady vibration")
 

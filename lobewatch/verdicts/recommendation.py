@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ SLOWER = ("a smaller diameter", "tool_material and cutting_speed_m_min in its [[
 """What makes a tool one that the spindle is slow enough for ..."""
 FASTER = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """... where max_speed_rpm holds it down."""
+OTHER_SPEED = ("a speed within that", SLOWER[1])
+"""... or where a program is set to run at a speed that it does not bear."""
 THIN = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
 ITS_OWN = ("speed_rpm", "depth_mm")
@@ -86,13 +89,17 @@ def recommend(
     present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
     """
     if isinstance(tool, DataError):
-        return Recommendation(table, either, reason=str(tool), cures=("tap it",))
+        tap = f"tap it: lobewatch tap MACHINE --tool {shlex.quote(table.tool)}"
+        return Recommendation(table, either, reason=str(tool), cures=(tap,))
     if gap := _gap(table, tool, machine):
         return Recommendation(table, either, reason=gap[0], cures=gap[1:])
     if too_fast := _too_fast(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=too_fast[0], cures=too_fast[1:])
     search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
     if is_set and present_rpm is not None:
+        if not search.reach.low_rpm <= present_rpm <= search.reach.high_rpm:
+            reason = f"{present_rpm:g} rpm is outside {search.reach.words}"
+            return Recommendation(table, either, reason=reason, cures=OTHER_SPEED)
         setting = search.here(present_rpm, search.reach.deepest_mm)
     else:
         setting = search.best if depth_mm is None else search.fastest(depth_mm)

@@ -7,19 +7,23 @@ from collections.abc import Iterator
 
 from acquisition import Remark
 from lobewatch.machine import Machine, ProgramTable, ToolLimits, Unknown, tool_limits
+from lobewatch.machine.settings.cut_range import CutRange
 
 TO_SAY = {
     Unknown.TOOL_MATERIAL: "tool_material in its [[tool]]",
     Unknown.MATERIAL: "material in the program (Kt and Kr alone are of no group of ISO 513)",
 }
 """What is asked for beside the cutting speed, where that is not known."""
+OWN_KEYS = (Unknown.CUTTING_SPEED, Unknown.FEED_PER_TOOTH)
+"""Keys of [[tool]] that stand for what its maker says."""
 
 
 def outside_tool(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
     """Speed and feed per tooth of a program that its tool does not bear, with what it does and the source."""
     limits = tool_limits(machine, table)
     if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
-        cure = "choose another tool" if limits.is_empty else f"turn at {_range(limits.low_rpm, limits.high_rpm)} rpm"
+        reach = CutRange(machine, table, limits)
+        cure = "choose another tool" if limits.is_empty else f"turn at {reach.low_rpm:g} to {reach.high_rpm:g} rpm"
         is_over = table.speed_rpm > limits.tool.max_speed_rpm
         own = "correct max_speed_rpm" if is_over else "enter what its maker says as cutting_speed_m_min"
         yield _remark(table, _speed(table, limits), f"{cure}, or {own}")
@@ -35,7 +39,8 @@ def not_described(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
     if limits.is_guessed:
         whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
         asked = " and ".join(text for unknown, text in TO_SAY.items() if unknown in limits.unknown)
-        cure = "; or ".join(filter(None, [asked, "cutting_speed_m_min in its [[tool]]"]))
+        own = [key for key in OWN_KEYS if key is Unknown.CUTTING_SPEED or key in limits.unknown]
+        cure = "; or ".join(filter(None, [asked, f"{' and '.join(own)} in its [[tool]]"]))
         text = f"what the tool bears is not known: speeds {whose} are advised"
         yield Remark("tool-not-described", table.tool, text, f"write {cure}")
 
@@ -56,7 +61,7 @@ def _speed(table: ProgramTable, limits: ToolLimits) -> str:
 
 def _bears(table: ProgramTable, limits: ToolLimits) -> str:
     """Who bears that, in words."""
-    tool = limits.tool.tool_material or ("the tool" if not limits.is_guessed else "the fastest tool")
+    tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
     where = "in a slot" if limits.cut == "slot" else "at the side"
     return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
         f" of {table.material}" if table.material else ""

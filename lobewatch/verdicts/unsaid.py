@@ -57,8 +57,8 @@ def _one_engagement(table: ProgramTable, machine: Machine, judgement: Judgement)
     return Remark(
         "one-engagement",
         table.name,
-        f"judged at a/D {table.immersion:.2g} all the way: in a corner of {radius:g} mm radius it becomes "
-        f"{inside:.2g}, and the limit about {1e3 * limit:.2g} mm{share}",
+        f"judged at {radial:g} mm radial depth all the way: a corner of {radius:g} mm radius takes as much as "
+        f"{inside * table.tool_diameter_mm:.2g} mm, and the limit is about {1e3 * limit:.2g} mm there{share}",
         f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; [{radial:g}, {radial:g}] where the path is "
         "straight",
     )

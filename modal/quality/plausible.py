@@ -67,6 +67,6 @@ def _doubt(mode: Mode) -> Remark | None:
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
         reasons.append("its peak is cut by the edge of the lines")
     if reasons:
-        text = f"not followed and not used for lobes, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
+        text = f"not followed and not used for lobes, damping {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, CURE)
     return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, stiffness.cure)

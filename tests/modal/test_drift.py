@@ -57,7 +57,7 @@ def test_a_drift_against_the_phase_of_a_mode_does_not_hide_it() -> None:
 @pytest.mark.parametrize(
     ("mode", "code", "words"),
     [
-        (Mode(1.09, 0.74, 3e6), "mode-not-believed", "zeta 74 %: drift has no peak either"),
+        (Mode(1.09, 0.74, 3e6), "mode-not-believed", "damping 74 %: drift has no peak either"),
         (Mode(1.09, 0.02, 19.7), "stiffness-not-believed", "K = 20 N/m is outside 0.1 to 10000 N/um"),
         (Mode(9e2, 0.02, -2e10), "stiffness-not-believed", "K = -20000 N/um is outside"),
         (Mode(3990.0, 0.03, 3e7, remarks=(Remark("cut-by-edge", "", "x"),)), "mode-not-believed", "cut by the edge"),

@@ -123,7 +123,8 @@ def _why_missing(machine: Machine, tool: str | None) -> str:
     named = {machine.tap.tool, *(table.name for table in machine.tool), *(program.tool for program in machine.listed)}
     if tool not in named:
         near = difflib.get_close_matches(tool, named, n=1)
-        return f"machine.toml knows no tool {tool!r}" + (f" (is {near[0]!r} meant?)" if near else "")
+        others = f"is {near[0]!r} meant?" if near else f"it knows {', '.join(map(repr, sorted(named)))}"
+        return f"machine.toml knows no tool {tool!r} ({others})"
     if any(program.tool == tool for program in machine.listed):
         return f"the programs of tool {tool!r} do not agree on them"
     return f"no program runs with tool {tool!r}"

@@ -18,7 +18,7 @@ class Unknown(StrEnum):
     """What must be known of a tool and is not: a key of [[tool]], or of the cut."""
 
     TOOL_MATERIAL = "tool_material"
-    """Material of its edges: the speeds are those of the fastest tool there is."""
+    """Material of its edges."""
     MATERIAL = "material"
     """Group of ISO 513 of what is cut: Kt and Kr alone do not say it, nor does a [[material]] without iso_group."""
     CUTTING_SPEED = "cutting_speed_m_min"
@@ -31,7 +31,7 @@ class Borne(NamedTuple):
     """Range that a tool bears."""
 
     low: float
-    """Least value, 0 where there is none."""
+    """Least value; 0 where there is none, as of what is only known not to be borne by any tool."""
     high: float
     """Greatest value."""
     source: str
@@ -73,15 +73,15 @@ class ToolLimits:
     def is_guessed(self) -> bool:
         """Whether its speeds are no more than those of the spindle, or of the fastest tool there is."""
         speed = self.cutting_speed_m_min
-        return speed is None or (self.tool.tool_material is None and speed.source != OWN)
+        return speed is None or (speed.low == 0 and speed.source != OWN)
 
 
 def tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     """What the tool of a cut bears in its material; the cut's own speed, depth and feed per tooth do not count.
 
     Slot or side by the radial depth on the straight. Speeds: [[tool]] cutting_speed_m_min, else what is published for
-    its material and that of the tool; where the tool's is not known, up to the fastest of all tools. Source of the
-    published ranges: docs/tools.md.
+    its material and that of the tool; where the tool's is not known, or nothing is published of it, up to the fastest
+    of all tools. Source of the published ranges: docs/tools.md.
 
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
@@ -116,9 +116,8 @@ def _speed(machine: Machine, table: CutTable, tool: KnownTool, cut: CutKind) -> 
     if tool.cutting_speed_m_min is not None:
         return Borne(*tool.cutting_speed_m_min, OWN)
     material = machine.coefficients(table)
-    if tool.tool_material is None:
-        return _published(fastest_of_all(material, cut), 60.0)
-    return _published(cutting_speed(material, tool.tool_material, cut), 60.0)
+    own = None if tool.tool_material is None else cutting_speed(material, tool.tool_material, cut)
+    return _published(own or fastest_of_all(material, cut), 60.0)
 
 
 def _feed(machine: Machine, table: CutTable, tool: KnownTool, cut: CutKind) -> Borne | None:
@@ -155,5 +154,5 @@ def _unknown(
     if not machine.coefficients(table).iso_group:
         yield Unknown.MATERIAL
     elif tool.tool_material is not None:
-        yield from [Unknown.CUTTING_SPEED] if speed is None else []
+        yield from [Unknown.CUTTING_SPEED] if lacks_speed and (speed is None or speed.low == 0) else []
         yield from [Unknown.FEED_PER_TOOTH] if feed is None else []

@@ -115,9 +115,13 @@ def _place(setting: Setting, answer: Recommendation) -> str:
 def _chips(setting: Setting, answer: Recommendation) -> str:
     if answer.feed_mm is None:
         return f"{chips(setting, answer.program, UNIT_FEED):.3g} cm3/min for each {UNIT_FEED:g} mm of feed a tooth"
-    texts = [(f"{chips(setting, answer.program, feed):.3g}", f"{feed:.3g}") for feed in dict.fromkeys(answer.feed_mm)]
-    volumes, feeds = (" to ".join(part) for part in zip(*texts, strict=True))
-    return f"{volumes} cm3/min at {feeds} mm a tooth"
+    teeth_per_min = answer.program.teeth * setting.speed_rpm
+    texts = [
+        (f"{chips(setting, answer.program, feed):.3g}", f"{feed:.3g}", rpm(feed * teeth_per_min))
+        for feed in dict.fromkeys(answer.feed_mm)
+    ]
+    volumes, feeds, speeds = (" to ".join(part) for part in zip(*texts, strict=True))
+    return f"{volumes} cm3/min at {feeds} mm a tooth ({speeds} mm/min)"
 
 
 def _notes(answer: Recommendation) -> list[Remark]:

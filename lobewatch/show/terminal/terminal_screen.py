@@ -17,6 +17,7 @@ from rich.live import Live
 from rich.panel import Panel
 from rich.text import Text
 
+from dsm import rounded
 from lobewatch.show.terminal.keys import Keys
 from lobewatch.show.terminal.output import Terminal
 from lobewatch.show.terminal.printer import RunningTest, verdict_markup
@@ -185,7 +186,11 @@ def _banner(state: TapState) -> RenderableType:
 
 
 def _levels(force: float, response: float) -> str:
-    return f"force {force:.2g} N rms, response {response:.2g} m/s^2 rms"
+    return f"force {rounded(force, digits=2)} N rms, {_response(response)}"
+
+
+def _response(response: float) -> str:
+    return f"response {rounded(response, digits=2)} m/s^2 rms"
 
 
 def _numbers(state: TapState) -> str:
@@ -193,7 +198,7 @@ def _numbers(state: TapState) -> str:
     texts = []
     if state.levels is not None:
         force, response = state.levels
-        texts.append(f"response {response:.2g} m/s^2 rms" if force is None else _levels(force, response))
+        texts.append(_response(response) if force is None else _levels(force, response))
     if state.mean_change is not None:
         moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
         texts.append(f"{moves}; it has settled" if state.settled else moves)

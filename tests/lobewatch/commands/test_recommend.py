@@ -141,13 +141,24 @@ def test_a_tool_that_bears_no_speed_of_the_spindle_has_none(shop: Shop, run: Any
     assert "max_speed_rpm in its [[tool]]" in cures
 
 
+def test_a_program_that_runs_at_a_speed_its_tool_does_not_bear_is_not_sent_to_tap_again(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    shop.run(("A", 12000, 0.5))
+    shop.edit("depth_mm = 0.5\n", "")
+    shop.edit("# The spindle of", '[[tool]]\nname = "reference"\nmax_speed_rpm = 9000\n\n# The spindle of')
+    code, out, _ = run("check")
+    reason, cures = out.splitlines()
+    assert (code, reason) == (1, "A: none; 12000 rpm is outside 3000..9000 rpm, which the tool bears")
+    assert cures.startswith("what would change it: a speed within that; ")
+
+
 def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:
     shop.tap_both()
     of = ("--material", "AA 6061", "--teeth", "2", "--diameter", "18")
     assert "predicted: doubtful until the tool is tapped" in run("recommend", "--tool", "long end mill", *of)[1]
     code, out, _ = run("recommend", "--tool", "new", *of)
     assert (code, "none; no tap test with tool 'new', and no prediction" in out) == (1, True)
-    assert "what would change it: tap it" in out
+    assert "what would change it: tap it: lobewatch tap MACHINE --tool new" in out
 
 
 @pytest.mark.parametrize(
@@ -159,7 +170,10 @@ def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop:
         (["--radial", "-4"], "--radial -4: is not above 0"),
         (["--radial", "30"], "radial_depth_mm=30 is larger than tool_diameter_mm=20"),
         (["--speed", "50000"], "--speed 50000: is outside [speed] 3000..24000 rpm"),
-        (["--tool", "new"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool 'new'; give"),
+        (
+            ["--tool", "new"],
+            "--material, --teeth, --diameter: missing, and machine.toml knows no tool 'new' (it knows ",
+        ),
         (["--tool", "long end mil"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool"),
     ],
 )

@@ -68,6 +68,14 @@ def test_what_is_entered_comes_before_the_table() -> None:
     assert limits(program(), tool("cutting_speed_m_min = 120")).low_rpm == 1000
 
 
+def test_a_tool_of_which_nothing_is_published_is_no_faster_than_the_fastest_that_is() -> None:
+    """Else it would be enough to say what a tool is made of to be sent anywhere: diamond in steel."""
+    nobody_knows = limits(program(), tool('tool_material = "PCD"'))
+    assert nobody_knows.is_guessed
+    assert nobody_knows.high_rpm == limits(program()).high_rpm == pytest.approx(rpm(300))
+    assert not limits(program(), tool('tool_material = "PCD"\ncutting_speed_m_min = 900')).is_guessed
+
+
 def test_a_slot_bears_less_than_a_cut_at_the_side() -> None:
     assert limits(program(radial=18.0), tool(CARBIDE)).high_rpm == pytest.approx(rpm(82.5, 18.0), rel=0.01)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.hits.free_decay import HIT_ENDS, free_decay, resting_noise
 from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
-from acquisition.verdicts.distance_from_mean import distance_from_mean
+from acquisition.verdicts.by_spectrum import by_spectrum
 from acquisition.verdicts.find_overload import Overload, find_overload
 from acquisition.verdicts.mains_hum import mains_hum, sounds_like_hum
 from acquisition.verdicts.second_input import second_input
@@ -25,10 +24,6 @@ SOFT_NOISE_RATIO = 20.0
 """A pulse below this many times the baseline's rms is too soft."""
 DECAYED_SHARE = 0.02
 """rms of the last tenth of the response against that of the loudest: above this and twice the noise it was cut off."""
-FAR = 0.3
-"""Distance from the mean that makes a hit inconsistent: it would move a mean of ten by 3 % ..."""
-FAR_NOISE_RATIO = 4.0
-"""... and at least this many times what the scatter of the hits in the mean would give."""
 
 
 def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> HitVerdict:
@@ -63,7 +58,7 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
     findings |= _strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
     findings |= _second(hit, pulse) | _cut_off(hit)
     if band is not None or (mean is not None and not findings):
-        findings |= _in_frequency(hit, mean if not findings else None, band)
+        findings |= by_spectrum(hit, mean if not findings else None, band)
     return HitVerdict.of(findings)
 
 
@@ -153,21 +148,3 @@ def _left(response: NDArray[np.float64], before: int) -> float:
     quiet = response[:before]
     noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
     return 0.0 if levels[-1] <= max(DECAYED_SHARE * max(levels), 2 * noise) else levels[-1] / max(levels)
-
-
-def _in_frequency(hit: Hit, mean: Frf | None, band: tuple[float, float] | None) -> dict[HitFlags, str]:
-    frf = estimate_frf([hit])
-    start, reach = frf.usable_band or (0.0, np.inf)
-    if reach <= start:
-        return {HitFlags.TOO_SOFT: f"The force at {start:.3g} Hz is 20 dB below its largest value: no line can be used"}
-    findings = {}
-    if band is not None and reach < band[1]:
-        findings[HitFlags.NARROW_BAND] = f"The force reaches to {reach:.0f} Hz (-20 dB) of the {band[1]:g} Hz wanted"
-    if mean is not None and mean.random_error is not None:
-        distance, noise = distance_from_mean(frf, mean)
-        limit = max(FAR, FAR_NOISE_RATIO * noise)
-        if distance > limit:
-            findings[HitFlags.INCONSISTENT] = (
-                f"FRF {distance:.0%} away from the mean of {mean.n_averages} hits (limit {limit:.0%})"
-            )
-    return findings

@@ -58,11 +58,13 @@ def find_second_touch(pulse: Pulse) -> SecondTouch | None:
         outside, rise = np.concatenate((heights[:, : max(near[0], 0)], heights[:, near[1] :]), axis=1)
         if outside.size < BINS:
             continue
+        standing = np.where(rise > RISE * outside, outside, 0.0)
+        at = int(np.argmax(standing))
+        share = float(standing[at]) / pulse.peak
+        if share <= max(best.share, SHARE / (1 + CERTAINTY / limit)):
+            continue  # whatever the noise is
         noise = 1.4826 * float(np.median(np.abs(outside - np.median(outside))))
-        outside = np.where(rise > RISE * outside, outside, 0.0)
-        at = int(np.argmax(outside))
-        share = float(outside[at]) / pulse.peak
-        if outside[at] > limit * noise and share > max(SHARE - CERTAINTY * noise / pulse.peak, best.share):
+        if standing[at] > limit * noise and share > SHARE - CERTAINTY * noise / pulse.peak:
             bin_ = at if at < near[0] else at - max(near[0], 0) + near[1]
             best = SecondTouch((bin_ + 0.5) * step - pulse.top, share)
     return best if best.share else None
@@ -82,12 +84,17 @@ def _without_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
 def _bump_heights(force: NDArray[np.float64], foot: float) -> NDArray[np.float64]:
     """Least-squares height of a raised cosine of this foot width (samples) around every sample, and how far its middle
     stands above the higher of both sides, shape (2, n)."""
-    half = int(np.ceil(1.5 * foot))
-    place = np.arange(-half, half + 1)
-    bump = np.where(np.abs(place) < foot / 2, 0.5 * (1 + np.cos(2 * np.pi * place / foot)), 0.0)
-    side = (place >= foot / 2) / np.count_nonzero(place >= foot / 2)
-    least_squares = bump - bump.mean()
+    half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
+    place = np.arange(-wing, wing + 1)
+    bump = 0.5 * (1 + np.cos(2 * np.pi * place / foot))
+    length, side = 2 * half + 1, half - wing
+    mean = bump.sum() / length
     padded = np.pad(force, half, mode="reflect")
-    middle, left, right = (np.convolve(padded, part, "valid") for part in (bump / bump.sum(), side, side[::-1]))
-    height = np.convolve(padded, least_squares / np.sum(least_squares**2), "valid")
-    return np.stack([height, middle - np.maximum(left, right)])
+    sums = np.concatenate(([0.0], np.cumsum(padded)))
+    weighed = np.convolve(padded[side : padded.size - side], bump, "valid")
+    left, right, whole = (
+        sums[stop:][: force.size] - sums[start:][: force.size]
+        for start, stop in ((0, side), (length - side, length), (0, length))
+    )
+    height = (weighed - mean * whole) / (np.sum(bump**2) - length * mean**2)
+    return np.stack([height, weighed / bump.sum() - np.maximum(left, right) / side])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from acquisition import Hit, HitFlags, HitVerdict, RunningMean, judge_hit
+from acquisition.verdicts.by_spectrum import by_spectrum
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.tap.guarded_verdict import guarded_verdict
 from lobewatch.tap.in_progress import TapInProgress
@@ -79,8 +80,8 @@ class JudgedHits:
         return verdict
 
     def _compare(self, hit: Hit) -> HitVerdict:
-        """Verdict on a hit of the mean against the others."""
-        return judge_hit(hit, self.mean.without(hit))
+        """Verdict on a hit of the mean against the others; all else about it was judged when it came."""
+        return HitVerdict.of(by_spectrum(hit, self.mean.without(hit)))
 
     def _take_out(self, number: int, verdict: HitVerdict) -> None:
         self.tap.take_out(number, verdict.flags, verdict.text)

@@ -169,7 +169,9 @@ def test_a_first_hit_that_cannot_be_compared_with_the_others_counts_no_more(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    monkeypatch.setattr("lobewatch.tap.judged_hits.judge_hit", failing_at({6}, judge_hit))  # the 2nd, looked back at
+    monkeypatch.setattr(
+        "lobewatch.tap.judged_hits.by_spectrum", failing_at({2}, by_spectrum)
+    )  # the 2nd, looked back at
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
     assert tap.flags == (HitFlags.OK, HitFlags.NOT_JUDGED, *[HitFlags.OK] * 9)
 

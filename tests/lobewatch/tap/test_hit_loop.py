@@ -28,6 +28,7 @@ from acquisition import (
     write_hit,
 )
 from acquisition.estimation.estimate_frf import frf_of_spectra
+from acquisition.verdicts.by_spectrum import by_spectrum
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.session import TapSession

@@ -153,13 +153,14 @@ def _slope(c: _Curves, linear: Array) -> Array:
     steps = c.zeta * c.curve**2
     by_damping = -2j * c.r * steps
     by_frequency = -c.zeta * by_damping - 2 * c.r**2 * steps
-    slope = np.tile(linear[:, :m], (2, 1)) * split(np.concatenate([by_frequency, by_damping]))
+    both = linear[:, np.newaxis]
+    slope = both[:, :, :m] * split(np.stack([by_frequency, by_damping]))
     if linear.shape[1] > m:
         off = c.zeta / c.root * c.curve
         by_frequency = by_frequency * c.turn - 1j * c.r * off
         by_damping = by_damping * c.turn + (1 + c.turn * c.zeta / c.root) * off
-        slope += np.tile(linear[:, m:], (2, 1)) * split(np.concatenate([by_frequency, by_damping]))
-    return slope
+        slope += both[:, :, m:] * split(np.stack([by_frequency, by_damping]))
+    return slope.reshape(len(linear), 2 * m, -1)
 
 
 def _without(bases: Array, values: Array) -> Array:

@@ -75,7 +75,7 @@ def _force_contents(path: Path, skip: int | None) -> Contents:
 
 
 def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
-    """The hits in a recorded file of any known format; DataError where there are none.
+    """The hits in a recorded file of any known format, bad ones too (see `check_hit`); DataError where there are none.
 
     >>> from tempfile import TemporaryDirectory
     >>> time = np.arange(-100, 4000) / 10240.0

@@ -52,10 +52,11 @@ class Answers:
     """CPU time of each recommendation."""
 
 
-def answers(count: int, seed: int, most_modes: int = 12, dense: bool = True) -> Answers:
-    """Of `count` random machines, those without any limit left out."""
-    counts = Answers()
-    for number, rng in enumerate(np.random.default_rng(seed).spawn(count)):
+def answers(numbers: range, seed: int, most_modes: int = 12, dense: bool = True) -> Answers:
+    """Of random machines by their numbers, those without any limit left out: a part may be run alone."""
+    counts, rngs = Answers(), np.random.default_rng(seed).spawn(numbers.stop)
+    for number in numbers:
+        rng = rngs[number]
         milling = random_case(rng)
         limit = limit_mm(milling) if len(milling.x + milling.y) <= most_modes else math.inf
         if not math.isfinite(limit):
@@ -171,4 +172,5 @@ def summary(counts: Answers) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(summary(answers(int(sys.argv[2]), int(sys.argv[1]))) + "\n")
+    seed, begin, end, most = map(int, sys.argv[1:])
+    sys.stdout.write(summary(answers(range(begin, end), seed, most)) + "\n")

@@ -15,7 +15,7 @@ from lobewatch.machine.settings.cut_range import CutRange
 
 @pytest.mark.parametrize("seed", [31, 32])
 def test_advice_pockets_and_recommendation_are_one_answer_that_holds_when_it_is_entered(seed: int) -> None:
-    counts = answers(count=16, seed=seed, most_modes=3, dense=False)
+    counts = answers(range(16), seed=seed, most_modes=3, dense=False)
     assert counts.cuts == 2
     assert counts.contradictions == []
     assert counts.refused == []
@@ -25,7 +25,7 @@ def test_advice_pockets_and_recommendation_are_one_answer_that_holds_when_it_is_
 @pytest.mark.long
 @pytest.mark.timeout(14400)
 def test_of_1000_random_cuts_no_two_answers_contradict_each_other_and_none_is_refused() -> None:
-    counts = answers(count=1000, seed=6, dense=False)
+    counts = answers(range(1000), seed=6, dense=False)
     sys.stdout.write(summary(counts))
     assert counts.cuts >= 600
     assert counts.contradictions == []
@@ -35,7 +35,7 @@ def test_of_1000_random_cuts_no_two_answers_contradict_each_other_and_none_is_re
 @pytest.mark.long
 @pytest.mark.timeout(14400)
 def test_what_is_recommended_is_nearly_the_best_of_a_dense_grid() -> None:
-    counts = answers(count=60, seed=7)
+    counts = answers(range(60), seed=7)
     sys.stdout.write(summary(counts))
     assert np.mean(np.array(counts.shares) >= 0.95) >= 0.9
 

@@ -118,7 +118,8 @@ def sentence(series: SeriesStanding) -> str:
     if trend.forecast is None:
         known = trend.readings.known.alone
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
-        return f"{text}; an alarm can ring from {least}"
+        fits = "; ± of the fits alone, remounting is not in it" if n > 1 else ""
+        return f"{text}{fits}; an alarm can ring from {least}"
     return f"{text}; {course_text(trend)}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
 
 

@@ -7,18 +7,21 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.atomic import atomic_write
 from acquisition.channel import Channel
 from acquisition.errors import DataError
+from acquisition.files.readers.hdf5_in import HDF5, hdf5_in
 from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_sealed, sealed
 from acquisition.regular_file import read_regular
+
+if TYPE_CHECKING:
+    import h5py
 
 FORMAT = "lobewatch-cut"
 VERSION = 1
@@ -90,13 +93,13 @@ def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def is_cut_file(path: Path) -> bool:
     """Whether it is a recording of ours, be it a damaged one."""
     content = read_regular(path)
-    return content.startswith(b"\x89HDF\r\n\x1a\n") and FORMAT.encode() in content
+    return content.startswith(HDF5) and FORMAT.encode() in content
 
 
 def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:
     """Write it with what is known of the cut (JSON); the bytes of the file, on the disk when this returns."""
     memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
+    with hdf5_in(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION, sample_rate_hz=signal.sample_rate)
         file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
@@ -120,7 +123,7 @@ def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
     if not is_sealed(content):  # HDF5 could hang on it
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        with h5py.File(io.BytesIO(content), "r") as file:
+        with hdf5_in(io.BytesIO(content), "r") as file:
             if file.attrs.get("format") != FORMAT or int(file.attrs["version"]) > VERSION:
                 raise DataError(f"{path}: no recording of a cut that this lobewatch reads")
             check_unpacked(file, len(content), path)

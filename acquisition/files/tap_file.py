@@ -14,21 +14,24 @@ from dataclasses import fields, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.atomic import atomic_write
 from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
+from acquisition.files.readers.hdf5_in import hdf5_in
 from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
+
+if TYPE_CHECKING:
+    import h5py
 
 FORMAT = "lobewatch-tap"
 VERSION, WITHOUT_FORCE = 1, 2
@@ -59,7 +62,7 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
 def tap_content(tap: TapTest) -> bytes:
     """The bytes of the file of a tap test."""
     memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
+    with hdf5_in(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=_version(tap.hits), software=_software(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
         _write_raw(file, tap.hits, tap.flags)
@@ -103,7 +106,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     """One hit of a test in progress, as each sensor felt it, and the verdict on it, sealed; on the disk when this
     returns, else OSError."""
     memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
+    with hdf5_in(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=_version([hit]), file=Path(path).name)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
@@ -133,7 +136,7 @@ def _open(path: Path) -> h5py.File:
     if is_broken(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        file = h5py.File(io.BytesIO(content), "r")
+        file = hdf5_in(io.BytesIO(content), "r")
     except OSError as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
     try:

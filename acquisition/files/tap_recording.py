@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition.files.readers.format import Format
-from acquisition.files.readers.mat_variables import HDF5
+from acquisition.files.readers.hdf5_in import HDF5
 from acquisition.files.tap_file import read_tap, read_tap_hits
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags

@@ -73,3 +73,10 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
 def test_imports_leave_out_what_they_do_not_need(code: str, left_out: set[str], tmp_path: Path) -> None:
     modules = imported(f"import sys\n{code}\nprint(*sys.modules, file=sys.stderr)", cwd=tmp_path)
     assert not left_out & modules
+
+
+def test_a_history_waits_neither_for_hdf5_nor_for_what_fits_modes(tmp_path: Path) -> None:
+    imported(COMMAND_LINE, "init", "mill", "--example", cwd=tmp_path)
+    modules = imported(COMMAND_LINE, "history", "mill", cwd=tmp_path)
+    assert "lobewatch.history.history" in modules
+    assert not ({"h5py", "matplotlib"} | NUMERICAL) & modules

@@ -19,6 +19,7 @@ import numpy as np
 
 from acquisition.apart import limit_this_program, run_apart
 from acquisition.errors import DataError
+from acquisition.files.readers.hdf5_in import HDF5
 from acquisition.files.readers.unpacked import HARMLESS, RATIO, check_unpacked
 
 SECONDS, SECONDS_PER_BYTE = 2.0, 0.2e-6
@@ -28,9 +29,7 @@ STARVED = 30.0
 COPIES = 6
 """Memory that reading may take, over the size of what is read at most."""
 V73 = b"MATLAB 7.3 MAT-file"
-"""First bytes of a file that is HDF5."""
-HDF5 = b"\x89HDF\r\n\x1a\n"
-"""First bytes of one that MATLAB has not written."""
+"""First bytes of a file that is HDF5, as MATLAB writes it."""
 ARRAY = 1
 """Number of the MessagePack extension that holds an array."""
 

@@ -13,8 +13,9 @@ from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents
 from acquisition.files.readers.array_columns import columns_of
 from acquisition.files.readers.format import Format
+from acquisition.files.readers.hdf5_in import HDF5
 from acquisition.files.readers.mat_layouts import recognised
-from acquisition.files.readers.mat_variables import HDF5, mat_variables
+from acquisition.files.readers.mat_variables import mat_variables
 from acquisition.files.readers.unpacked import HARMLESS, RATIO
 
 NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-
-import h5py
+from typing import TYPE_CHECKING
 
 from acquisition.errors import DataError
+
+if TYPE_CHECKING:
+    import h5py
 
 HARMLESS = 100_000_000
 """Bytes that may be unpacked from any file."""
@@ -17,6 +19,8 @@ RATIO = 20
 
 def check_unpacked(file: h5py.File, packed: int, path: Path) -> None:
     """DataError for a file of `packed` bytes whose data sets are out of proportion; none of them is read."""
+    import h5py  # here already: the file is open
+
     sizes: list[int] = []
     try:
         file.visititems(lambda _, node: sizes.append(_size(node)) if isinstance(node, h5py.Dataset) else None)

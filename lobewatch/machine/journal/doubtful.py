@@ -14,7 +14,7 @@ from typing import Any
 
 from acquisition import read_tap, read_tap_hits
 from acquisition.apart import run_apart
-from acquisition.files.readers.mat_variables import HDF5
+from acquisition.files.readers.hdf5_in import HDF5
 from acquisition.files.seal import is_broken, is_sealed
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry

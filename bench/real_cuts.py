@@ -28,7 +28,6 @@ from acquisition.files.read_sound import read_sound
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.judge_cut import HeardSound
 from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
-from lobewatch.cuts.listening.spectrum import Spectrum, spectrum_of
 
 Floats = NDArray[np.float64]
 
@@ -40,10 +39,10 @@ WINDOW = 2.0
 """Length of a window of air, and of the middle of a cut that was not found (s)."""
 AROUND, HARMONICS = 0.05, 16
 """Relative distance up to which the comb is looked for, and its highest multiple."""
-SCATTER, SIGMAS = 0.56, 5.0
-"""Standard deviation of log10 of the power of noise in one bin, and how many of its mean a clear comb is above it."""
-NEIGHBOURS = 129
-"""Bins from which the local median of the power is taken."""
+CLEAR = 3.0
+"""A comb is clear from so many times the median over all frequencies that are tried."""
+PADDED, NEIGHBOURS = 2, 129
+"""How many times its length a part is transformed; bins from which the local median of its power is taken."""
 SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
@@ -109,17 +108,16 @@ class Axis:
 
 @dataclass(frozen=True)
 class Comb:
-    """A plain comb: mean of log10 of power over its local median at the multiples of a frequency."""
+    """A plain comb: mean of log(1 + power over its local median) at the multiples of a frequency."""
 
     frequency: float
     score: float
-    limit: float
-    """Score that noise does not reach."""
+    """The mean, over its median at all frequencies that are tried."""
 
     @property
     def is_clear(self) -> bool:
         """Whether the speed is known by it."""
-        return self.score > self.limit
+        return self.score > CLEAR
 
 
 @dataclass
@@ -138,7 +136,7 @@ class Tally:
         """One more recording."""
         heard = longest(cuts)
         self.cuts += 1
-        self.found += len(cuts) == 1 and heard.reason not in NOT_FOUND
+        self.found += len(cuts) == 1 and heard.parts.reason not in NOT_FOUND
         self.words[heard.word if heard.word != "cannot tell" else heard.reason] += 1
         self.speeds[_speed_word(heard, comb)] += 1
         self.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
@@ -197,25 +195,24 @@ def loud_part(signal: Floats, rate: float) -> tuple[int, int]:
 
 def comb_of(file: list[Axis], part: slice) -> list[Comb]:
     """The comb of a part of a file: the frequency is that of all axes, how clear it is is told of each."""
-    first = file[0]
-    above = [_above_noise(spectrum_of(axis.signal[part], axis.rate)) for axis in file]
-    turn, frequency, bin_ = first.rpm / 60, above[0][0], first.rate / (part.stop - part.start)
-    highest = int(min(HARMONICS, first.rate / 2 / turn / (1 + AROUND)))
-    grid = np.arange(1 - AROUND, 1 + AROUND, bin_ / (4 * HARMONICS * turn)) * turn
-    scores = [
-        np.mean([np.interp(k * grid, frequency, axis) for k in range(1, highest + 1)], axis=0) for _, axis in above
-    ]
-    best = int(np.argmax(np.mean(scores, axis=0)))
-    is_same = np.abs(grid / grid[best] - 1) < SAME_SPEED
-    is_inside = 0 < best < grid.size - 1
-    limit = float(SIGMAS * SCATTER / np.sqrt(highest))
-    return [Comb(float(grid[best]), float(np.max(score[is_same])) if is_inside else 0.0, limit) for score in scores]
+    scores = [_comb_scores(axis, part) for axis in file]
+    tried, together = scores[0][0], np.mean([score for _, score in scores], axis=0)
+    best = int(np.argmax(together))
+    is_same, is_inside = np.abs(tried / tried[best] - 1) < SAME_SPEED, 0 < best < tried.size - 1
+    return [Comb(float(tried[best]), float(np.max(score[is_same])) if is_inside else 0.0) for _, score in scores]
 
 
-def _above_noise(spectrum: Spectrum) -> tuple[Floats, Floats]:
-    """Frequencies (Hz), and log10 of the power over its local median."""
-    power = np.log10(spectrum.power + np.finfo(np.float64).tiny)
-    return spectrum.frequency, power - median_filter(power, NEIGHBOURS)
+def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
+    """Frequencies that are tried (Hz), and the score of each; by code that the judge has nothing of."""
+    signal, turn = axis.signal[part], axis.rpm / 60
+    power = np.abs(np.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size), PADDED * signal.size)) ** 2
+    above = np.log1p(power / (median_filter(power, NEIGHBOURS) + np.finfo(np.float64).tiny))
+    bins = PADDED * signal.size / axis.rate
+    highest = int(min(HARMONICS, axis.rate / 2 / turn / (1 + AROUND)))
+    tried = turn * np.arange(1 - AROUND, 1 + AROUND, PADDED / bins / (4 * HARMONICS * turn))
+    multiples = [np.interp(k * tried * bins, np.arange(above.size), above) for k in range(1, highest + 1)]
+    score = np.mean(multiples, axis=0)
+    return tried, np.asarray(score / np.median(score))
 
 
 def steady_part(file: list[Axis], heard: HeardSound) -> slice:

@@ -20,6 +20,11 @@ STEP = 0.25
 """Step of the frequencies that are tried, over what moves the highest multiple by a bin; chosen."""
 LEVELS = 100
 """Levels into which a multiple's part of the sum is divided."""
+CLEAR = 1 / 3
+"""Mean over the multiples below which a comb must be far rarer by chance, which takes each for itself: side bands of a
+line that is no multiple come together; chosen ..."""
+RARE = 1e-8
+"""... as this; chosen."""
 ALIKE = 0.05
 """How often chance may make the multiples that are left without those of one order; chosen."""
 OWN = 4.0
@@ -35,6 +40,7 @@ def harmonic_sum(
     teeth: int,
     frequency: float,
     around: float,
+    usual: float = 1.0,
 ) -> SpindleSpeed | None:
     """The comb near a frequency (Hz), up to `around` from it, relative, that is loudest over noise; None without one.
 
@@ -42,7 +48,7 @@ def harmonic_sum(
     axes; where they are many, they settle it, and there is one on a multiple of anything. The mean over all axes of
     log10 of power over noise is summed over the multiples (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It is a
     comb where as many frequencies that are no multiples would have that sum less often than once in ten thousand, over
-    all that are tried.
+    all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
     """
     if len(lines) >= LOUDEST * len(spectra):
         return None
@@ -57,7 +63,9 @@ def harmonic_sum(
         return None
     inside = (first.frequency > lowest) & (first.frequency < highest * most)
     beside = inside & (fold_frequency(first.frequency, float(tried[best])) > OWN * first.bin)
-    if STEP * tried.size * _chance(heard, above[beside]) > CHANCE or _is_part(heard, above[beside], teeth):
+    rarest = CHANCE if np.mean(heard) >= CLEAR else RARE
+    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / around, 1.0)
+    if STEP * tried.size * likely * _chance(heard, above[beside]) > rarest or _is_part(heard, above[beside], teeth):
         return None
     weak = joined_lines([lines_of(spectrum, WEAK) for spectrum in spectra])
     return refine_comb(float(tried[best]), weak[weak.frequency < (highest + 0.5) * tried[best]], first.bin)

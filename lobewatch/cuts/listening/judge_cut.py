@@ -13,9 +13,10 @@ import numpy as np
 
 from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines, has_side_bands
 from lobewatch.cuts.listening.find_cut import UNPLACED, CutParts
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.measured_speed import measured_speed
-from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS, SortedLines, is_slow, sort_lines
+from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS, WIDE, SortedLines, is_slow, lines_of_cut, sort_lines
 from lobewatch.cuts.listening.spectrum import (
     Floats,
     SpectralLines,
@@ -98,12 +99,14 @@ def judge_cut(
 ) -> HeardSound:
     """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
-    air: the same spindle turning without a cut; immersion: radial depth over diameter; commanded_rpm as it was set;
-    measured_rpm by a tachometer, which the lines must not contradict ("tacho-contradicts"); None without one. All
-    axes have one speed, and the word is that of the loudest evidence: of the axis with the loudest chatter, else of
-    that with the loudest cut. Reasons why it cannot be told: "speed-not-found", "on-spindle-lines" (period two of an
-    even number of teeth, or chatter locked to the spindle), "faint", "unexplained-tone" (a line without side
-    bands), "slow-sampling" (fewer than three multiples of tooth passing are heard, folded ones too).
+    air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
+    commanded_rpm as it was set; measured_rpm by a tachometer, which the lines must not contradict
+    ("tacho-contradicts"); None without one. All axes have one speed, and the word is that of the loudest evidence: of
+    the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
+    "speed-not-found", "no-air" (also where only lines that are there in air make a speed, which is named),
+    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
+    "unexplained-tone" (a line without side bands), "slow-sampling" (fewer than three multiples of tooth passing are
+    heard, folded ones too).
 
     Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
 
@@ -114,7 +117,10 @@ def judge_cut(
     >>> heard.word, round(heard.speed_rpm)
     ('stable', 6000)
     """
-    spectra, quiet = spectra_of(cut, sample_rate), spectra_of(air, sample_rate)
+    spectra = spectra_of(cut, sample_rate)
+    if not air.shape[-1]:
+        return replace(_without_air(spectra, teeth, commanded_rpm / 60), reason="no-air")
+    quiet = spectra_of(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
     turning = _speed_or_reason(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(turning, HeardSound):
@@ -141,11 +147,28 @@ def _speed_or_reason(
     """The speed of the spindle, or the sound of a cut in which it is not known; commanded in Hz."""
     if measured_rpm is None:
         turning = speed_of_spectra(spectra, quiet, teeth, commanded)
-        return turning or _not_found(spectra[0], 60 * speed_elsewhere(spectra, quiet, teeth, commanded, None))
+        if turning is not None:
+            return turning
+        elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded, None)
+        return _not_found(spectra[0], elsewhere) if np.isfinite(elsewhere) else _without_air(spectra, teeth, commanded)
     turning, other = measured_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
     if np.isfinite(other):
         return HeardSound("cannot tell", "tacho-contradicts", spectrum=spectra[0], elsewhere_rpm=60 * other)
     return turning or _not_found(spectra[0], np.nan)
+
+
+def _without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> HeardSound:
+    """What is told where nothing is known of air, or where it sounds as the cut does: the speed, and no word."""
+    silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
+    turning = speed_of_spectra(spectra, silence, teeth, commanded)
+    if turning is None:
+        return _not_found(spectra[0], np.nan)
+    lines = lines_of_cut(spectra, silence)
+    beside = lines[fold_frequency(lines.frequency, turning.frequency) > WIDE * spectra[0].bin]
+    elsewhere = 60 * speed_elsewhere(spectra, silence, teeth, commanded, turning, beside) if len(beside) else np.nan
+    if np.isfinite(elsewhere):
+        return _not_found(spectra[0], elsewhere)
+    return HeardSound("cannot tell", "no-air", turning=turning, spectrum=spectra[0])
 
 
 def _not_found(spectrum: Spectrum, elsewhere: float) -> HeardSound:

@@ -47,13 +47,13 @@ def listen_to(recording: CutRecording) -> list[HeardSound]:
 
 def _heard(recording: CutRecording, parts: CutParts) -> HeardSound:
     reason = _fault(recording, parts)
-    if reason:
+    if reason and reason != "no-air":
         return HeardSound("cannot tell", reason, parts)
     measured = None if recording.measured_rpm is None else _mean(recording.measured_rpm[parts.cut])
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     sound = judge_cut(
         axes[:, parts.cut],
-        axes[:, parts.air],
+        axes[:, parts.air if not reason else slice(0, 0)],
         recording.sample_rate,
         recording.teeth,
         recording.immersion,

@@ -24,6 +24,8 @@ from lobewatch.cuts.listening.spectrum import (
 
 COMB_AROUND = 0.05
 """Relative distance from the speed that was set up to which a plain comb is looked for ..."""
+USUAL = 0.002
+"""... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
 SAME = 1e-3
 """... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
 many lines: it has one unknown, they have one more for each family of side bands."""
@@ -77,7 +79,7 @@ def speed_of_spectra(
 ) -> SpindleSpeed | None:
     """`find_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
     lines, voted = lines_of_cut(spectra, air), _speed_of_lines(spectra, air, teeth, commanded)
-    summed = harmonic_sum(spectra, air, lines, teeth, commanded, COMB_AROUND)
+    summed = harmonic_sum(spectra, air, lines, teeth, commanded, COMB_AROUND, USUAL)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME:
         return voted or summed
     rival = refine_speed(summed.frequency, lines, spectra[0].bin)

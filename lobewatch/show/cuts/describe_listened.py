@@ -13,7 +13,8 @@ from lobewatch.logbook.cut_comparison import CutComparison
 WHY: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
     "no-cut": "nothing in it gets louder: record from the spindle turning in air into the cut",
-    "no-air": "no 0.15 s of the spindle turning in air beside the cut, to know what is there without it",
+    "no-air": "no 0.15 s of the spindle turning in air beside the cut, or its lines are there as well, so that it is "
+    "not known what is there without a cut; record the spindle in air, then the cut",
     "knock": "a knock in the cut, as of a hammer; cut again without it",
     "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
     "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",

@@ -83,6 +83,23 @@ def test_a_part_of_another_comb_is_none() -> None:
     assert np.isnan(sum_of(noise(3) + heard, air_of(4), TURN * 4 / 3))
 
 
+def test_weak_side_bands_of_a_line_beside_a_multiple_are_no_comb() -> None:
+    """All 1 Hz above multiples, four turns apart: another speed fits them nearly, and none exactly."""
+    time = np.arange(SIZE) / RATE
+    bands = np.sum([WEAK * np.sin(2 * np.pi * (k * TURN + 1.0) * time + k) for k in (6, 10, 14)], axis=0)
+    assert np.all(np.isnan([sum_of(noise(seed) + bands, air_of(seed)) for seed in range(20)]))
+
+
+def test_of_weak_multiples_more_are_believed_near_the_speed_that_was_set() -> None:
+    weak, believed = comb([3, 4, 8], 0.13), []
+    for off in (1.0, 1.03):
+        speeds = [find_speed(noise(seed) + weak, air_of(seed), RATE, TEETH, 60 * TURN * off) for seed in range(20)]
+        heard = [speed.frequency for speed in speeds if speed is not None]
+        assert heard == pytest.approx([TURN] * len(heard), rel=1e-3)
+        believed.append(len(heard))
+    assert believed[0] > believed[1] > 0
+
+
 def test_two_lines_are_no_comb() -> None:
     assert np.isnan(sum_of(noise(3) + comb([4, 5], 1.0), air_of(4)))
 
@@ -93,3 +110,18 @@ def test_a_speed_that_is_set_25_percent_too_low_is_named_and_no_word_stands_on_i
     heard = judge_cut(cut, air_of(8), RATE, TEETH, 0.5, 60 * TURN * 0.75)
     assert (heard.word, heard.reason) == ("cannot tell", "speed-not-found")
     assert heard.elsewhere_rpm == pytest.approx(60 * TURN, rel=1e-3)
+
+
+def test_of_a_cut_that_sounds_as_air_does_the_speed_is_named_and_no_word() -> None:
+    heard = comb(list(range(1, 17)), 0.2)
+    for air in (air_of(2) + heard, np.empty(0)):
+        told = judge_cut(noise(1) + heard, air, RATE, TEETH, 0.5, 60 * TURN * 1.01)
+        assert (told.word, told.reason) == ("cannot tell", "no-air")
+        assert told.speed_rpm == pytest.approx(60 * TURN, rel=2e-4)
+
+
+def test_of_a_cut_that_sounds_as_air_does_a_speed_far_from_the_one_that_was_set_is_named_elsewhere() -> None:
+    heard = comb([4, 8, 12, 16], 1.0) + comb([1, 2, 3, 5, 6, 7, 9, 10, 11], 0.2)
+    told = judge_cut(noise(1) + heard, air_of(2) + heard, RATE, TEETH, 0.5, 60 * TURN * 0.75)
+    assert (told.word, told.reason) == ("cannot tell", "speed-not-found")
+    assert told.elsewhere_rpm == pytest.approx(60 * TURN, rel=1e-3)

@@ -166,11 +166,11 @@ def _draw_marks(
     draw_heard(axes, heard, labels)
     for i, pocket in enumerate(pockets):
         _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
-        if not is_small:
-            text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
-            labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
     for program in programs:
         _draw_program(axes, program, labels)
+    for pocket in () if is_small else pockets:
+        text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
+        labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above", "right", "left"))
     for program in programs:
         name, place = program.program.name, _place(program)
         labels.add(name if is_small else f"{name}\n{program.word}", place)

@@ -13,6 +13,7 @@ from lobes.floquet.milling_rows import MillingRows
 from lobes.floquet.stages import gauss_stages
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 def ringing(rows: MillingRows, time: Floats) -> Floats:
@@ -48,30 +49,41 @@ class PieceResponse:
 
     @classmethod
     def of(cls, rows: MillingRows, time: Floats) -> PieceResponse:
-        """For pieces of a length (r,) in s."""
-        node, weight, integral = gauss_stages()
-        theta, zeta = (
-            a[..., np.newaxis, np.newaxis] for a in (rows.frequency * time[:, np.newaxis], rows.damping_ratio)
-        )
-        solved = np.linalg.inv(np.eye(node.size) + 2 * zeta * theta * integral + theta**2 * (integral @ integral))
-        velocity = np.concatenate((-theta * (solved @ node)[..., np.newaxis], solved.sum(-1, keepdims=True)), axis=-1)
-        forced = solved @ integral * (theta / rows.stiffness[..., np.newaxis, np.newaxis])
-        place = theta * (integral @ velocity) + [1.0, 0.0]
-        yields = theta * (integral @ forced)
-        q = theta * (weight @ velocity)[..., np.newaxis, :] + [[1.0, 0.0]]
-        drive = -theta * (weight @ (place + 2 * zeta * velocity))[..., np.newaxis, :] + [[0.0, 1.0]]
-        q_push = theta[..., 0] * (weight @ forced)
-        v_push = theta[..., 0] * (weight / rows.stiffness[..., np.newaxis] - weight @ (yields + 2 * zeta * forced))
-        shown, shown_forced = place, yields
+        """For pieces of a length (r,) in s.
+
+        With x = D at the roots of A (`period_map`, `Stages.root`) and t = theta root, all of it is sums of x, t x and
+        t^2 x: velocity = D 1 - theta D c, displacement = 1 + theta A velocity, from forces theta/K D A and
+        (theta/K) theta A D A.
+        """
+        stages = gauss_stages()
+        theta, twice = rows.frequency * time[:, np.newaxis], 2 * rows.damping_ratio
+        t = theta[..., np.newaxis] * stages.root
+        x = 1 / (1 + twice[..., np.newaxis] * t + t**2)
+        tx, both = t * x, t * x + twice[..., np.newaxis] * x
+        begin, ones, weights = stages.share @ stages.node, stages.share.sum(axis=-1), stages.weight @ stages.share
+        per_theta, give = theta[..., np.newaxis], theta / rows.stiffness
+        place = np.stack((1 - per_theta * _sums(tx, begin), _sums(tx, ones)), axis=-1)
+        forced = t * tx
         if np.any(rows.phase):
-            of_place, of_velocity = (share[..., np.newaxis, np.newaxis] for share in rows.seen)
-            shown = of_place * place + of_velocity * velocity
-            shown_forced = of_place * yields + of_velocity * forced
+            of_place, of_velocity = (share[..., np.newaxis] for share in rows.seen)
+            velocity = np.stack((-per_theta * _sums(x, begin), _sums(x, ones)), axis=-1)
+            place = of_place[..., np.newaxis] * place + of_velocity[..., np.newaxis] * velocity
+            forced = of_place * forced + of_velocity * tx
+        pushes = (give[..., np.newaxis] * _sums(of, weights) for of in (tx, x))
+        at_begin, at_ones = begin @ stages.weight, ones @ stages.weight
         return cls(
-            ends=_blocks(q[..., 0, 0], q[..., 0, 1], drive[..., 0, 0], drive[..., 0, 1]),
-            shows=_by_direction(rows, shown),
-            gives=np.einsum("rnij,rnp,rnq->rpqij", shown_forced, rows.vector, rows.vector),
-            pushes=np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in (q_push, v_push)], axis=1),
+            ends=_blocks(
+                1 - theta**2 * _sums(x, at_begin),
+                theta * _sums(x, at_ones),
+                theta**2 * _sums(both, at_begin) - theta,
+                1 - theta * _sums(both, at_ones),
+            ),
+            shows=_by_direction(rows, place),
+            gives=_sums(
+                np.einsum("rnk,rnp,rnq->rpqk", forced / rows.stiffness[..., np.newaxis], rows.vector, rows.vector),
+                stages.share,
+            ),
+            pushes=np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1),
         )
 
     def rounded(self, kind: type[np.floating[Any]]) -> PieceResponse:
@@ -128,6 +140,12 @@ class PieceResponse:
         """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
         r, p, _, s, _ = self.gives.shape
         return np.moveaxis(self.gives, 2, 3).reshape(r, p * s, p * s)
+
+
+def _sums(values: Complexes, shares: Complexes) -> Floats:
+    """Twice the real parts of the sums of values (..., k) at the roots times shares (k, ...)."""
+    flat = values.reshape(-1, values.shape[-1]) @ shares.reshape(len(shares), -1)
+    return np.asarray(2 * flat.real.reshape(*values.shape[:-1], *shares.shape[1:]))
 
 
 def _by_direction(rows: MillingRows, place: Floats) -> Floats:

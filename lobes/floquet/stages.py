@@ -22,6 +22,10 @@ class Stages(NamedTuple):
     """Integral over the whole piece, shape (s,)."""
     integral: NDArray[np.float64]
     """Integrals from the begin to each node, shape (s, s)."""
+    root: NDArray[np.complex128]
+    """Eigenvalues of the integrals, those above the real axis of each pair, shape (s/2,)."""
+    share: NDArray[np.complex128]
+    """What each adds: f(integral) is twice the real part of the sum of f(root) times these, shape (s/2, s, s)."""
 
 
 def polynomial_at(place: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -36,7 +40,7 @@ def polynomial_at(place: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @cache
 def gauss_stages(count: int = STAGES) -> Stages:
-    """Nodes and integrals of the polynomial through them.
+    """Nodes and integrals of the polynomial through them, of an even number of nodes.
 
     Source: Hairer & Wanner, Solving Ordinary Differential Equations II, Springer 1996, ch. IV.5.
     """
@@ -44,4 +48,7 @@ def gauss_stages(count: int = STAGES) -> Stages:
     high = legvander(x, count)
     order = np.arange(1, count)
     integral = np.column_stack((x + 1, (high[:, 2:] - high[:, :-2]) / (2 * order + 1)))
-    return Stages((x + 1) / 2, weight / 2, integral @ np.linalg.inv(high[:, :-1]) / 2)
+    integral = integral @ np.linalg.inv(high[:, :-1]) / 2
+    root, vectors = np.linalg.eig(integral)
+    share = vectors.T[:, :, np.newaxis] * np.linalg.inv(vectors)[:, np.newaxis]
+    return Stages((x + 1) / 2, weight / 2, integral, root[root.imag > 0], share[root.imag > 0])

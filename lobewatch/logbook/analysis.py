@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -109,18 +109,22 @@ class Analysis:
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
+        for tap in self._taps_before(now):
+            then = self.assembly(tap.tool, tap.id)
+            if then.directions == now.directions:
+                return then
+        return None
+
+    def _taps_before(self, now: Assembly) -> Iterator[TapEntry]:
+        """Tap tests of the same tool, without questions, from which on all its directions may have been known."""
         directions, questions = set[str](), self.history.questions
         for tap in self.files.since(now.tap_id):
             if tap.id == now.tap_id:
-                return None
-            if tap.tool != now.tool or tap.id in questions:
-                continue
-            directions.add(tap.direction)
-            if directions >= set(now.directions):
-                then = self.assembly(tap.tool, tap.id)
-                if then.directions == now.directions:
-                    return then
-        return None
+                return
+            if tap.tool == now.tool and tap.id not in questions:
+                directions.add(tap.direction)
+                if directions >= set(now.directions):
+                    yield tap
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
@@ -170,8 +174,16 @@ class Analysis:
         """
         if now.program.name not in self.machine.cut_names:
             return None
-        then = None if now.assembly is None else self.first_assembly(now.assembly)
-        return None if then is None else self.rulings(then.tap_id)[now.program.name]
+        tap_id = None if now.assembly is None else self._first_tap(now.assembly)
+        return None if tap_id is None else self.rulings(tap_id)[now.program.name]
+
+    def _first_tap(self, now: Assembly) -> str | None:
+        """The tap test of `first_assembly`: without reading a file where its row holds both directions."""
+        if len(now.directions) < 2:
+            then = self.first_assembly(now)
+            return None if then is None else then.tap_id
+        rows = ((tap.id, self.history.rows[self.files.place(tap.id).number]) for tap in self._taps_before(now))
+        return next((tap_id for tap_id, row in rows if row.x and row.y and row.x != row.y), None)
 
     def advice(self, verdict: Verdict) -> Advice:
         """What goes beyond a verdict; it takes longer than the verdict itself."""

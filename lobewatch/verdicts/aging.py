@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ STEPS = 101
 """Number of looks between no fall and the largest of them ..."""
 PARTS = 8
 """... in so many parts, up to the one with the first chatter."""
+KEPT = 8
+"""Number of calibrated models whose answers are kept, those asked for last."""
 
 StiffnessAt = Callable[[float], float]
 
@@ -43,6 +46,7 @@ def softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     return stiffness_at, Remark("decay-assumption", assembly.tool, text)
 
 
+@lru_cache(maxsize=KEPT)
 def _stiffness_ratios(calibration: Calibration) -> NDArray[np.float64]:
     """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
     stiffness: list[float] = []

@@ -65,8 +65,11 @@ class HardDraws:
         return calm / DEEPER
 
     def growth_beside(self, speeds: Floats, depths: Floats) -> Floats:
-        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,)."""
-        few = self.few
+        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,).
+
+        In the worst direction of feed: it says where to look, no more.
+        """
+        few = self.few.fed(0.0)
         wanted = np.repeat(DEEPER * depths, len(few.rows))[:, np.newaxis]
         return np.asarray(np.max(few.swept(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
 

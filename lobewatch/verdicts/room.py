@@ -15,8 +15,8 @@ from lobewatch.machine.settings.cut_range import RPM, CutRange
 from lobewatch.verdicts.aging import StiffnessAt
 from lobewatch.verdicts.draws import ProgramDraws
 
-EDGE, WIDEST = 0.005, 10
-"""Relative step of a window of speeds, and most steps on each side."""
+EDGE, WIDEST, PARTS = 0.005, 10, 2
+"""Relative step of a window of speeds, most steps on each side, and parts in which they are looked at."""
 APART = (1 + EDGE) ** 2
 """Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
 DEEPER = 1.05
@@ -61,8 +61,13 @@ def frequency_left(hardest: ProgramDraws, depth: float, stiffness_at: StiffnessA
 
 
 def _last_calm(near: ProgramDraws, hardest: ProgramDraws, ratio: Floats, depth: float) -> float:
-    """The last of these speeds, over the present one, up to which all draws are stable."""
-    last = _calm_from_the_first(hardest.swept(ratio).growth_that_counts(depth).reshape(ratio.size, -1))
+    """The last of these speeds, over the present one, which is the first, up to which all draws are stable."""
+    last = 0
+    for steps in np.array_split(np.arange(1, ratio.size), PARTS):
+        grown = hardest.swept(ratio[steps]).growth_that_counts(depth).reshape(steps.size, -1)
+        last += _calm_from_the_first(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
+        if last < steps[-1]:
+            break
     while last > 0 and np.any(near.at(speed=float(ratio[last])).growth_that_counts(depth) >= 0):
         last //= 2
     return float(ratio[last])

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+PIECE = 512
+"""Scans whose noise is drawn at once: blocks of any multiple of so many have the same noise."""
 _HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
 """sin^4(pi t/T) = 3/8 - 1/2 cos(2 pi t/T) + 1/8 cos(4 pi t/T)."""
 
@@ -119,15 +121,20 @@ class HammeredStructure:
         while self._next_hit < first_scan + n_scans:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
             self._waves.append(self._hit(self._next_hit))
-        sensors = 1 + len(self.beside)
-        noise = [[self.hammering.force_noise], *[[self.hammering.response_noise]] * sensors]
-        signals = self._noise.normal(scale=noise, size=(1 + sensors, n_scans))
+        signals = self._noise_of(n_scans)
         self._waves = [(start, wave) for start, wave in self._waves if start + wave.shape[1] > first_scan]
         for start, wave in self._waves:
             low, high = max(start, first_scan), min(start + wave.shape[1], first_scan + n_scans)
             if low < high:
                 signals[:, low - first_scan : high - first_scan] += wave[:, low - start : high - start]
         return signals
+
+    def _noise_of(self, n_scans: int) -> NDArray[np.float64]:
+        rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.beside))]
+        pieces, rest = divmod(n_scans, PIECE)
+        whole = self._noise.standard_normal((pieces, len(rms), PIECE))
+        drawn = np.concatenate([*whole, self._noise.standard_normal((len(rms), rest))], axis=1)
+        return np.asarray(np.array(rms)[:, np.newaxis] * drawn)
 
     def _hit(self, scan: float) -> tuple[int, NDArray[np.float64]]:
         peak = self.random.uniform(*self.hammering.force_range)

@@ -46,6 +46,7 @@ class TapsSource:
 
     loss_detection = "scan numbers"
     """How lost scans are found."""
+    _frame_time = FRAME_TIME
 
     def __init__(self, port: str, sample_rate: float | None = None) -> None:
         """Open a port: a device name or socket://host:port. sample_rate None takes the device's highest (Hz).
@@ -177,7 +178,7 @@ class TapsSource:
             "fs": rate,
             "channels": channels,
             "format": form,
-            "samples_per_frame": min(max(SCANS_PER_FRAME, round(FRAME_TIME * rate)), fit),
+            "samples_per_frame": min(max(SCANS_PER_FRAME, round(self._frame_time * rate)), fit),
         }
         self._command(MessageType.CONFIG, json.dumps(wish).encode())
         return float(rate)

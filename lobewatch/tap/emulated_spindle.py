@@ -45,7 +45,7 @@ HIGHER = 0.05
 """Relative distance of the frequencies along the second axis of a spindle whose modes lie askew."""
 RIGID = 1e30
 """Modal stiffness of what does not move (N/m)."""
-AHEAD = 25
+AHEAD = 8
 """Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
 PATIENCE = 0.2
 """Time that it waits for a host that asks for no more (s); then it sends a block all the same."""
@@ -129,7 +129,9 @@ def device_in_step(
 
 
 class _SourceInStep(TapsSource):
-    """Makes room for another block whenever one is asked for."""
+    """Makes room for another block whenever one is asked for; they are longer than where somebody watches."""
+
+    _frame_time = 0.06
 
     def __init__(self, port: str, room: threading.Semaphore) -> None:
         super().__init__(port)

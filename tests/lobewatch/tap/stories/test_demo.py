@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from itertools import islice, pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 import pytest
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from acquisition import Structure, TapsSource
 from dsm import natural_frequencies
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.emulated_spindle import AHEAD, device_in_step, emulator, with_bearing_stiffness
+from lobewatch.tap.emulated_spindle import device_in_step, emulator, with_bearing_stiffness
 from lobewatch.tap.stories.demo import PlannedTap, plan_taps
 
 MONTHS = 24
 NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)
+SCANS = 50_000
+"""Far more than a device in step sends by itself."""
 
 
 def plan(folder: MachineFolder, scatter: float, seed: int = 1) -> list[PlannedTap]:
@@ -87,9 +89,9 @@ def test_a_device_in_step_gives_the_samples_of_one_that_runs_free(structure: Str
 
 
 def codes(source: TapsSource) -> NDArray[np.int32]:
-    """What comes first: far more than a device in step sends by itself."""
+    """What comes first."""
     with source:
         source.start()
-        blocks = list(islice(source.blocks(), 4 * AHEAD))
+        blocks = list(takewhile(lambda block: block.first_scan < SCANS, source.blocks()))
     assert not any(block.lost_before for block in blocks)
-    return np.concatenate([block.codes for block in blocks], axis=1)
+    return np.concatenate([block.codes for block in blocks], axis=1)[:, :SCANS]

@@ -97,16 +97,14 @@ def recommend(
         return Recommendation(table, either, reason=too_fast[0], cures=too_fast[1:])
     search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
     if is_set and present_rpm is not None:
-        if not search.reach.low_rpm <= present_rpm <= search.reach.high_rpm:
-            reason = f"{present_rpm:g} rpm is outside {search.reach.words}"
-            return Recommendation(table, either, reason=reason, cures=OTHER_SPEED)
         setting = search.here(present_rpm, search.reach.deepest_mm)
     else:
         setting = search.best if depth_mm is None else search.fastest(depth_mm)
     others = tuple(_alternatives(search, setting, present_rpm))
     if setting is None:
-        reason = _no_safe(search, depth_mm, present_rpm if is_set else None)
-        return Recommendation(table, either, reason=reason, cures=_cures(search, depth_mm), alternatives=others)
+        reason, cures = _no_safe(search, depth_mm, present_rpm if is_set else None)
+        feed = _feed(search, table)
+        return Recommendation(table, either, reason=reason, cures=cures, alternatives=others, feed_mm=feed)
     return _entered(search, table, setting, others)
 
 
@@ -142,10 +140,14 @@ def _entered(
     if verdict.word is not Word.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
         return Recommendation(table, search.either, reason=reason, alternatives=others)
-    own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
-    feed = (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
     remarks = (*verdict.remarks, *not_described(table, search.reach.limits))
-    return Recommendation(program, search.either, setting, verdict, "", (), others, feed, remarks)
+    return Recommendation(program, search.either, setting, verdict, "", (), others, _feed(search, table), remarks)
+
+
+def _feed(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
+    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
+    return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
 def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:
@@ -159,12 +161,14 @@ def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: f
             yield Alternative(what, other)
 
 
-def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> str:
-    """What there is not."""
+def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
+    """What there is not, and what would change that."""
+    if set_rpm is not None and not search.reach.low_rpm <= set_rpm <= search.reach.high_rpm:
+        return f"{set_rpm:g} rpm is outside {search.reach.words}", OTHER_SPEED
     if set_rpm is not None:
-        return f"no safe depth at {set_rpm:g} rpm"
+        return f"no safe depth at {set_rpm:g} rpm", _cures(search, depth_mm)
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    return f"no safe {named} in {search.reach.words}"
+    return f"no safe {named} in {search.reach.words}", _cures(search, depth_mm)
 
 
 def _cures(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:

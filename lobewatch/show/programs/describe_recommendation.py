@@ -117,7 +117,7 @@ def _chips(setting: Setting, answer: Recommendation) -> str:
         return f"{chips(setting, answer.program, UNIT_FEED):.3g} cm3/min for each {UNIT_FEED:g} mm of feed a tooth"
     teeth_per_min = answer.program.teeth * setting.speed_rpm
     texts = [
-        (f"{chips(setting, answer.program, feed):.3g}", f"{feed:.3g}", rpm(feed * teeth_per_min))
+        (f"{chips(setting, answer.program, feed):.3g}", f"{feed:.3g}", rpm(round(feed * teeth_per_min)))
         for feed in dict.fromkeys(answer.feed_mm)
     ]
     volumes, feeds, speeds = (" to ".join(part) for part in zip(*texts, strict=True))

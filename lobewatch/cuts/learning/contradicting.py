@@ -50,10 +50,11 @@ class ContradictingCut:
 def contradiction(evidence: NewEvidence) -> ContradictingCut | None:
     """What is wrong with a cut under spindles that explain all; None where nothing is."""
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.before.weights
-    wrong = float(np.sum(weights * misheard(cut, prediction)))
+    again = [other for other in evidence.before.cuts if other is not cut and cut.is_again(other)]
+    wrong = float(np.sum(weights * misheard(cut, prediction, again)))
     if np.isfinite(cut.frequency) and cut.chatters:
         near = np.any(prediction.distances(cut) < AWAY * FREQUENCY * cut.frequency, axis=0)
-        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction))
+        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction, again))
         if np.sum(others * near) < NONE * np.sum(others):
             return ContradictingCut(cut, Contradiction.FREQUENCY, wrong)
     if wrong <= WRONG:

@@ -12,8 +12,6 @@ SPEED, DEPTH = 0.01, 0.04
 less deep than an edge (`likelihood.EDGE`) the spindles that are learnt tell by themselves ..."""
 DOUBTED_DEPTH = 0.10
 """... but not where they do not believe it."""
-SAME_SPEED, SAME_DEPTH = 0.002, 0.01
-"""Relative distances up to which a cut is another one again."""
 
 
 def is_taken(
@@ -27,7 +25,7 @@ def is_taken(
         cut.chatters
         and abs(math.log(speed_rpm / cut.speed_rpm)) < SPEED
         and depth > (1 - (DOUBTED_DEPTH if cut in doubted else DEPTH)) * cut.depth
-        and not any(_is_again(cut, later) and not later.chatters for later in cuts[place + 1 :])
+        and not any(cut.is_again(later) and not later.chatters for later in cuts[place + 1 :])
         for place, cut in enumerate(cuts)
     )
 
@@ -35,11 +33,6 @@ def is_taken(
 def cut_again(cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence]) -> CutEvidence | None:
     """The first cut that is not believed and was made once only; None where there is none."""
     for cut in cuts:
-        if cut in doubted and sum(_is_again(cut, other) for other in cuts) == 1:
+        if cut in doubted and sum(cut.is_again(other) for other in cuts) == 1:
             return cut
     return None
-
-
-def _is_again(cut: CutEvidence, other: CutEvidence) -> bool:
-    near = abs(math.log(other.speed_rpm / cut.speed_rpm)) < SAME_SPEED
-    return near and abs(math.log(other.depth / cut.depth)) < SAME_DEPTH

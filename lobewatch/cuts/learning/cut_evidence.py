@@ -10,6 +10,8 @@ from lobewatch.machine.journal.heard_cut import CutWord
 
 AGED = 0.02
 """Change of the natural frequency, relative, after which a cut says 61 % of what it said; chosen."""
+SAME_SPEED, SAME_DEPTH = 0.002, 0.01
+"""Relative distances up to which a cut is another one again."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,12 @@ class CutEvidence:
     def weight(self) -> float:
         """Weight of what it says: less, the more the natural frequency has moved since."""
         return math.exp(-(((self.moved - 1) / AGED) ** 2) / 2)
+
+    def is_again(self, other: CutEvidence) -> bool:
+        """Whether another cut is this one made again: of one program, in one material, at one speed and depth."""
+        near = abs(math.log(other.speed_rpm / self.speed_rpm)) < SAME_SPEED
+        same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)
+        return near and same and abs(math.log(other.depth / self.depth)) < SAME_DEPTH
 
     @property
     def tooth_frequency(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -78,24 +79,38 @@ def predict_cut(cut: CutEvidence, draws: Draws) -> CutPrediction:
     return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True)))
 
 
-def log_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Logarithm of the likelihood of what was written down, shape (r,)."""
-    return np.asarray(np.log(sum(_likelihoods(cut, prediction))))
+def log_likelihood(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
+    """Logarithm of the likelihood of what was written down, shape (r,).
+
+    again: the same cut as it was made at other times, whose words are known: all have one truth, so that of two words
+    that differ one is wrong, however near its limit the cut is.
+    """
+    return np.asarray(np.log(sum(_likelihoods(cut, prediction, again))))
 
 
-def misheard(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Chance that the word of a cut is wrong, of spindles that are the truth, shape (r,)."""
-    right, wrong = _likelihoods(cut, prediction)
+def misheard(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
+    """Chance that the word of a cut is wrong, of spindles that are the truth, shape (r,); again: as above."""
+    right, wrong = _likelihoods(cut, prediction, again)
     return np.asarray(wrong / (right + wrong))
 
 
-def _likelihoods(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]:
-    """Likelihood of what was written down with its word right, and with it wrong; a wrong one sounds anyhow."""
-    chatters = prediction.chatters
+def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence]) -> tuple[Floats, Floats]:
+    """Likelihood of what was written down with its word right, and with it wrong."""
+    truths: tuple[Floats, Floats] = prediction.chatters, 1 - prediction.chatters
+    for other in again:
+        told = [share * word for share, word in zip(truths, _words(other, prediction), strict=True)]
+        truths = told[0] / (told[0] + told[1]), told[1] / (told[0] + told[1])
+    chatters, stable = (share * word for share, word in zip(truths, _words(cut, prediction), strict=True))
+    return (chatters, stable) if cut.chatters else (stable, chatters)
+
+
+def _words(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]:
+    """Likelihood of what was written down where it chatters, and where it is stable; a wrong word sounds anyhow."""
+    ones = np.ones(prediction.excess.shape)
     if not cut.chatters:
-        return (1 - MISJUDGED) * (1 - chatters), MISJUDGED * chatters
+        return MISJUDGED * ones, (1 - MISJUDGED) * ones
     sound = np.exp(_log_of_sound(cut, prediction))
-    return (1 - MISJUDGED) * chatters * sound, MISJUDGED * (1 - chatters) * (0.5 if cut.has_frequency else 1.0)
+    return (1 - MISJUDGED) * sound, MISJUDGED * (0.5 if cut.has_frequency else 1.0) * ones
 
 
 def most_likely(cut: CutEvidence) -> float:

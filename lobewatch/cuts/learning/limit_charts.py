@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import MM, ROUNDING, Grid, floor_depth
-from lobewatch.cuts.learning.likelihood import FREQUENCY
+from lobewatch.cuts.learning.likelihood import EDGE, FREQUENCY
 from lobewatch.cuts.learning.priors import Draws
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce
@@ -26,6 +27,9 @@ LOOSE = 1.5
 """Factor on the error of a chatter frequency, since that at the limit stands for that at the depth; chosen."""
 MARGIN = 1e-6
 """Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
+TRULY = 2.0
+"""Edges (`likelihood.EDGE`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
+the word is more likely wrong."""
 EQUAL = 1e-9
 """Difference of two depths that is none (m)."""
 
@@ -64,17 +68,36 @@ class LimitCharts:
         teeth = grid.cut.repeats * grid.speeds / 60
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
-    def gains(self, weights: Floats, best: float) -> Floats:
-        """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,)."""
-        more = self.chips > best
+    def truly_best(self, cuts: Sequence[CutEvidence]) -> Floats:
+        """Largest removal rate (rpm m) of the cuts that were heard stable and are so, in each draw, shape (r,)."""
+        best = np.zeros(len(self.limits))
+        for cut in cuts:
+            if not cut.chatters:
+                best = np.maximum(best, np.where(self.contradicts(cut), 0.0, cut.speed_rpm * cut.depth))
+        return best
+
+    def contradicts(self, cut: CutEvidence) -> NDArray[np.bool_]:
+        """Whether the word of a cut is wrong in each draw, shape (r,)."""
+        row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
+        excess = np.log(cut.depth / self.limits[:, row])
+        return np.asarray(excess < -TRULY * EDGE if cut.chatters else excess > TRULY * EDGE)
+
+    def gains(self, weights: Floats, best: float | Floats) -> Floats:
+        """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,); best: that so far, of each
+        draw or of all."""
+        more = self.chips > np.min(best)
         speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
-        stable = np.cumsum(weights[self.order[deep][:, speeds]], axis=0)
-        gain = (stable > LIKELY) * stable * (self.chips[deep][:, speeds] - best)
+        order, chips = self.order[deep][:, speeds], self.chips[deep][:, speeds]
+        gain = np.zeros(chips.shape)
+        for value in np.unique(best):
+            stable = np.cumsum((weights * (best == value))[order], axis=0)
+            gain += stable * np.maximum(chips - value, 0.0)
+        likely = np.cumsum(weights[order], axis=0) > LIKELY
         best_gains = np.zeros(speeds.shape)
-        best_gains[speeds] = np.max(gain, axis=0, initial=0.0)
+        best_gains[speeds] = np.max(likely * gain, axis=0, initial=0.0)
         return best_gains
 
-    def candidates(self, best: float) -> Iterator[tuple[int, float]]:
+    def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
         """Speeds, by their place, and depths (m) that are worth looking at."""
         gains = self.gains(np.full(len(self.limits), 1 / len(self.limits)), best)
         places = list[int]()
@@ -87,17 +110,20 @@ class LimitCharts:
             depths = {floor_depth(float(np.quantile(self.limits[:, row], 1 - chance))) for chance in CHANCES}
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
-    def worth(self, row: int, depth: float, best: float, left: int) -> float:
-        """Worth of a cut (rpm m): what it gains, and where more are left what the best next one gains then."""
+    def worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
+        """Worth of a cut (rpm m): what it gains, and where more are left what the best next one gains then; best: as
+        for `gains`."""
         stable = self.limits[:, row] >= depth - EQUAL
         chance, chips = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
-        gain = chance * max(chips - best, 0.0)
-        if left <= 1 or chance <= LIKELY:
-            return gain if chance > LIKELY else 0.0
-        after = chance * self._next(stable / np.sum(stable), max(best, chips))
+        if chance <= LIKELY:
+            return 0.0
+        gain = float(np.mean(stable * np.maximum(chips - best, 0.0)))
+        if left <= 1:
+            return gain
+        after = chance * self._next(stable / np.sum(stable), np.maximum(best, chips))
         return gain + after + (1 - chance) * self._after_chatter(row, ~stable, best)
 
-    def _after_chatter(self, row: int, chatters: NDArray[np.bool_], best: float) -> float:
+    def _after_chatter(self, row: int, chatters: NDArray[np.bool_], best: float | Floats) -> float:
         """Gain of the next cut, over frequencies that may be heard."""
         places = np.flatnonzero(chatters)
         if not places.size:
@@ -112,6 +138,6 @@ class LimitCharts:
             gains.append(self._next(weights, best))
         return float(np.mean(gains))
 
-    def _next(self, weights: Floats, best: float) -> float:
+    def _next(self, weights: Floats, best: float | Floats) -> float:
         """Gain of the best cut at any speed (rpm m)."""
         return float(np.max(self.gains(weights, best)))

@@ -139,7 +139,7 @@ class NewEvidence:
 
     def learn(self) -> Posterior:
         """What is known with it."""
-        log_weight = self.before.log_weight + _log_likelihood(self.cut, self.prediction)
+        log_weight = self.before.log_weight + _log_likelihood(self.cut, self.prediction, self.before.cuts)
         learnt = replace(self.before, log_weight=log_weight, cuts=(*self.before.cuts, self.cut))
         return _refresh(learnt) if learnt.size < ENOUGH else learnt
 
@@ -152,9 +152,10 @@ def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) 
     return Posterior(draw_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
 
 
-def _log_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return cut.weight * log_likelihood(cut, prediction)
+def _log_likelihood(cut: CutEvidence, prediction: CutPrediction, before: Sequence[CutEvidence]) -> Floats:
+    """Logarithm of the likelihood of one cut after those before it; an old one counts less, the more the frequency has
+    moved since."""
+    return cut.weight * log_likelihood(cut, prediction, [other for other in before if cut.is_again(other)])
 
 
 def _weights(log_weight: Floats) -> Floats:
@@ -193,7 +194,7 @@ def _joint(draws: Draws, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            value[asked] += _log_likelihood(cut, predict_cut(cut, draws[asked]))
+            value[asked] += _log_likelihood(cut, predict_cut(cut, draws[asked]), cuts[:k])
     return value
 
 

@@ -53,7 +53,7 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         depth = f"{1e3 * cut.depth:.4g}"
         yield (
             f"{name}: test cut {n_made + 1} of {n_made + next_cut.left}: {rpm(cut.speed_rpm)} rpm, {depth} mm, "
-            f"chance of chatter {round(100 * cut.chance)} %; {_why(cut)}"
+            f"chance of chatter {round(100 * cut.chance)} %; {_why(cut, next_cut.lesson)}"
         )
         observe = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
         yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ)"
@@ -64,9 +64,10 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     yield "a test cut is no advice: lobewatch check says what may be run"
 
 
-def _why(cut: Suggestion) -> str:
+def _why(cut: Suggestion, lesson: Lesson) -> str:
     if cut.repeats:
-        return f"{cut.repeats} once more, since it is not believed"
+        is_believed = cut.repeats in [made.id for made in lesson.believed]
+        return f"{cut.repeats} once more, since {'much hangs on its word' if is_believed else 'it is not believed'}"
     return f"it tells most of {term(cut.settles)}"
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lobewatch.cuts.learning.contradicting import contradictions
 from lobewatch.cuts.learning.cut_again import cut_again, is_taken
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.suggest import suggest
@@ -65,3 +66,20 @@ def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_c
     assert following is not None
     assert following.repeats == ""
     assert abs(math.log(following.speed_rpm / speed)) >= 0.01
+
+
+def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:
+    """As deep 1.5 % faster was stable: more likely right than wrong, and worth a cut."""
+    speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
+    places = [(speed, 1.5e-3, "stable"), (speed, 2e-3, "chatter"), (1.015 * speed, 2e-3, "stable")]
+    cuts = [CutEvidence(mill.cut, *place, id=f"c{k}") for k, place in enumerate(places, 1)]  # type: ignore[arg-type]
+    learnt = mill.prior.learn_from_all(cuts)
+    assert contradictions(learnt) == ()
+    again = suggest(learnt, mill.grid, cuts, 2)
+    assert again is not None
+    assert (again.speed_rpm, again.depth, again.repeats) == (speed, 2e-3, "c2")
+    last = suggest(learnt, mill.grid, cuts, 1)
+    assert last is None or not last.repeats
+    twice = [*cuts, replace(cuts[1], id="c4")]
+    third = suggest(mill.prior.learn_from_all(twice), mill.grid, twice, 2)
+    assert third is None or not third.repeats

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lobes import zero_order
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, floor_depth
 from lobewatch.cuts.learning.limit_charts import LimitCharts
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
@@ -30,15 +31,16 @@ def charts(limits_mm: Floats, frequencies: Floats | None = None) -> LimitCharts:
     return LimitCharts(grid, limits, heard, order, 1000.0, speeds * floored)
 
 
-def counted_gains(chart: LimitCharts, weights: Floats, best: float) -> list[float]:
-    """Gains by going through all depths at which a spindle has its limit."""
+def counted_gains(chart: LimitCharts, weights: Floats, best: float | Floats) -> list[float]:
+    """Gains by going through all depths at which a spindle has its limit; best: of all spindles, or of each."""
     gains = []
     for row, speed in enumerate(chart.grid.speeds):
         gains.append(0.0)
         for limit in chart.limits[:, row]:
-            stable = float(np.sum(weights[chart.limits[:, row] >= limit]))
-            if stable > 0.5:
-                gains[-1] = max(gains[-1], stable * (speed * floor_depth(limit) - best))
+            stable = weights * (chart.limits[:, row] >= limit)
+            if np.sum(stable) > 0.5:
+                more = np.maximum(speed * floor_depth(limit) - best, 0.0)
+                gains[-1] = max(gains[-1], float(np.sum(stable * more)))
     return gains
 
 
@@ -48,6 +50,24 @@ def test_the_gain_at_a_speed_is_that_of_the_best_depth_more_likely_stable_than_n
     chart = charts(random.uniform(0.5, 4.0, (41, 5)))
     for weights in (np.full(41, 1 / 41), random.dirichlet(np.full(41, 0.3))):
         assert chart.gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
+
+
+def test_the_best_so_far_may_differ_from_spindle_to_spindle() -> None:
+    random = np.random.default_rng(4)
+    chart, best = charts(random.uniform(0.5, 4.0, (41, 5))), random.choice([0.0, 9.0, 14.0], 41)
+    for weights in (np.full(41, 1 / 41), random.dirichlet(np.full(41, 0.3))):
+        assert chart.gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
+
+
+def test_the_best_so_far_is_that_of_cuts_whose_word_a_spindle_does_not_contradict() -> None:
+    chart = charts(np.array([[1.0, 2.0], [2.0, 2.0], [2.15, 2.0]]))
+    deep = CutEvidence(SLOT, 6010.0, 2.3e-3, "stable")
+    shallow = replace(deep, depth=1.2e-3, speed_rpm=9000.0)
+    assert chart.contradicts(deep).tolist() == [True, True, False]  # 2.3 mm is 7 % beyond 2.15
+    assert chart.truly_best([deep, shallow]) == pytest.approx([10.8, 10.8, 6010.0 * 2.3e-3])
+    chatter = replace(deep, word="chatter", depth=1.9e-3)
+    assert chart.contradicts(chatter).tolist() == [False, False, True]
+    assert chart.truly_best([chatter]).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_the_last_cut_is_worth_its_gain_times_its_chance() -> None:

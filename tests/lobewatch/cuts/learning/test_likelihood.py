@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,33 @@ def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_3_perce
     assert log_of(stable, predicted(0.0, 0.0, math.log(depth))) == pytest.approx(math.log(1 - chance))
     untold = replace(CHATTER, frequency=math.nan)
     assert log_of(untold, predicted(0.0, 0.0, math.log(depth))) == pytest.approx(math.log(chance))
+
+
+@pytest.mark.parametrize("depth", [0.9, 0.97, 1.0, 1.1])
+def test_the_same_cut_made_twice_has_one_truth(depth: float) -> None:
+    """Of two words that differ one is wrong, however near the limit: 0.03 x 0.97 times either truth."""
+    prediction = predicted(0.0, 0.0, math.log(depth))
+    chatter, stable = replace(CHATTER, frequency=math.nan), replace(CHATTER, word="stable", frequency=math.nan)
+    chance = ndtr(math.log(depth) / 0.05)
+    differ = log_of(chatter, prediction) + float(log_likelihood(stable, prediction, [chatter])[0])
+    assert differ == pytest.approx(math.log(0.03 * 0.97))
+    alike = log_of(chatter, prediction) + float(log_likelihood(chatter, prediction, [chatter])[0])
+    assert alike == pytest.approx(math.log(chance * 0.97**2 + (1 - chance) * 0.03**2))
+    assert misheard(chatter, prediction, [stable])[0] == pytest.approx(1 - chance)
+    assert misheard(stable, prediction, [chatter])[0] == pytest.approx(chance)
+
+
+def test_a_cut_is_another_one_again_at_its_speed_and_depth_in_its_material() -> None:
+    again = replace(CHATTER, speed_rpm=12000 * 1.0015, depth=3e-3 * 1.008, word="stable", frequency=math.nan)
+    assert CHATTER.is_again(again)
+    others: list[dict[str, Any]] = [
+        {"speed_rpm": 12030.0},
+        {"depth": 3.05e-3},
+        {"material": 1},
+        {"cut": replace(SLOT, immersion=0.5)},
+    ]
+    for other in others:
+        assert not CHATTER.is_again(replace(again, **other))
 
 
 def test_a_frequency_far_from_both_says_nothing_in_5_percent_and_one_that_is_met_speaks_for_the_spindle() -> None:

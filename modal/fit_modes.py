@@ -16,11 +16,8 @@ from modal.fitting import BandFit
 from modal.force_dependence import with_force_remarks
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
-from modal.modes.mode import Mode, ratio_or_zero
+from modal.modes.mode import UNKNOWN_PHASE, Mode, ratio_or_zero
 from modal.quality.assess import assess, with_phase_remarks, with_smoothing_remarks
-
-UNKNOWN_PHASE = 90.0
-"""Standard error (degrees) of a phase of which nothing is known."""
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:

@@ -10,7 +10,7 @@ from modal.bands.compare_fits import is_likelier, is_white
 from modal.bands.extraction import Array, FittedBand
 from modal.bands.fit_peaks import are_modes
 from modal.bands.left_about import noise_of
-from modal.bands.systematic import MORE_THAN_NOISE, leaves_rounding
+from modal.bands.systematic import leaves_rounding
 from modal.fitting import fit_band, gain_of_a_pair
 
 SURE = 9.0
@@ -19,6 +19,8 @@ SPLIT = 0.35
 """Half the distance at which two modes in place of one are tried (half-power half-widths)."""
 WITHIN = 2.0
 """Standard errors that the size of a mode may change by where its stiffness is its own all the same."""
+MORE_THAN_NOISE = 2.0
+"""Times the noise (rms) that two modes in place of one leave at most."""
 LINEAR = 0.01
 """Share (rms) of a mode below which what a pair adds to it means nothing: real peaks are no more linear than that."""
 

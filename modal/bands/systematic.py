@@ -13,10 +13,10 @@ from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, values_nearby
 
 SIGNIFICANT = 3.0
 """Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
-HIDDEN = 2.0
-"""Standard error that may hide in what is left about a mode, over what is left as a share of its peak ..."""
-MORE_THAN_NOISE = 2.0
-"""... where that is so many times the noise."""
+HIDDEN = 4.0
+"""Standard error that may hide in what is left about a mode, over the part that is no noise as a share of its peak."""
+CHANCE = 2.0
+"""Times the noise that may be left about a mode where noise is uneven, and nothing else is there."""
 ROUNDING = 1e-7
 """Share of what was measured below which a residual means nothing."""
 PARTS = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
@@ -44,8 +44,9 @@ def systematic(band: FittedBand) -> Systematic:
     independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
     What such structure shifts in the modes the residual does not show: each band is fitted again with fewer and more
     residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most. What
-    is left about a mode beyond noise, as a share of its peak, may hide an error of twice that share of its half-width,
-    its damping ratio and its size, whatever its colour: by that the same hits differ on several sensors.
+    is left about a mode beyond twice the noise, in squares, as a share of its peak, may hide an error of four times
+    that share of its half-width, its damping ratio and its size, whatever its colour: by that the same hits differ on
+    several sensors.
     """
     fit = band.fit
     hidden = _hidden(band)
@@ -62,7 +63,8 @@ def _hidden(band: FittedBand) -> Array:
     """Errors that may hide in what the fit leaves about each mode, where it is more than noise, in the order of
     `BandFit`: as shares of half-width, damping ratio and size."""
     fit, left = band.fit, [left_about(band, i) for i in range(band.fit.frequency.size)]
-    share = np.array([HIDDEN * of_peak if of_noise > MORE_THAN_NOISE else 0.0 for of_peak, of_noise in left])
+    of_peak, of_noise = np.array(left).T
+    share = HIDDEN * of_peak * np.sqrt(1 - (CHANCE / np.maximum(of_noise, CHANCE)) ** 2)
     share = np.zeros(share.size) if leaves_rounding(band) else share
     sizes = (share * np.abs(fit.constant)).ravel()
     free = np.where(fit.held, 0.0, share)

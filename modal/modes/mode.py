@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 
+UNKNOWN_PHASE = 90.0
+"""Standard error (degrees) of a phase of which nothing is known."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mode:

@@ -15,7 +15,8 @@ from modal.bands.left_about import left_about
 from modal.fitting import LEAST_TERMS
 from modal.modes.common_delay import common_delay
 from modal.modes.mode import Mode, ratio_or_zero
-from modal.quality.trust import MISFIT, MISFIT_SHARE, most_left, relative_error, trust_rules
+from modal.quality.ringing_doubt import with_ringing_doubt
+from modal.quality.trust import MISFIT, MISFIT_SHARE, relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
@@ -23,8 +24,11 @@ LARGEST_PHASE = 20.0
 """Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
 FAR_STRONGER = 20.0
 """Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
-MOST_LEFT = 0.02
-"""Share of a mode's decay that may be left when the record ends."""
+LEAST_LEFT, MOST_LEFT = 0.005, 0.02
+"""Share of a mode's decay left when the record ends that is said: from the second on, and from the first on where it
+makes most of the error of K."""
+LARGE_ERROR = 0.2
+"""Relative standard error of damping ratio or stiffness from which it is said."""
 NARROW = 12.0
 """Half-power half-width in lines from which smoothing over five of them bends a mode by less than 2 %."""
 LARGEST_SCATTER = 3.0
@@ -36,7 +40,7 @@ LARGEST_DIFFERENCE, FEWEST_LINES = 0.25, 4
 def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     """Mode i of a band with its figures of quality and the remarks that follow from them."""
     share, misfit = left_about(band, i)
-    judged = replace(
+    figures = replace(
         mode,
         coherence=_coherence(state, mode),
         misfit=misfit,
@@ -45,6 +49,7 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         left_ringing=_left_at_the_end(state.record, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
+    judged = with_ringing_doubt(figures)
     remarks = chain(
         _by_hand(band, i, judged),
         _on_its_place(state, band, i, judged),
@@ -88,7 +93,7 @@ def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> It
     if mode.edge_distance is not None and mode.edge_distance < 1:
         text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
         yield Remark("cut-by-edge", at, text, "widen the band")
-    if mode.left_ringing is not None and mode.left_ringing > min(most_left(mode), MOST_LEFT):
+    if mode.left_ringing is not None and mode.left_ringing > np.clip(_error_of_stiffness(mode), LEAST_LEFT, MOST_LEFT):
         text = f"{100 * mode.left_ringing:.0f} % of it still rings when the record ends"
         yield Remark("still-ringing", at, text, "record longer")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
@@ -101,6 +106,11 @@ def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> It
         where = " and ".join(f"{suspect:.0f}" for suspect in band.suspects)
         text = f"may be several modes, near {where} Hz, too noisy to tell: its K is about that of all of them together"
         yield Remark("several-modes", at, text, "average more hits")
+
+
+def _error_of_stiffness(mode: Mode) -> float:
+    """Relative standard error of K (-); 0 where not estimated."""
+    return 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
 
 
 def _is_bent(state: Extraction, band: FittedBand, i: int) -> bool:
@@ -134,7 +144,7 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
     if error > LARGEST_ERROR:
         text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
         yield Remark("near-node", at, text, "take a driving point where it moves")
-    elif "uncertain" in dict(trust_rules(mode)):
+    elif relative_error(mode) > LARGE_ERROR or "uncertain" in dict(trust_rules(mode)):
         text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
         yield Remark("uncertain", at, text, "average more hits")
     if mode.misfit is not None and mode.misfit > MISFIT and share > MISFIT_SHARE:

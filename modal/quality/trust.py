@@ -9,17 +9,19 @@ from modal.modes.mode import Mode
 
 DOUBTFUL_SHARE, REJECTED_SHARE = 0.05, 0.3
 """What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode."""
-DOUBTFUL_ERROR, REJECTED_ERROR = 0.2, 1 / 3
-"""Relative standard error of damping ratio or stiffness, the larger one."""
+TURNED = 30.0
+"""Phase of the modal constant off real (degrees) beyond which a mode must be known well: what noise and the flanks of
+others make has any phase."""
+WELL_KNOWN, REJECTED_ERROR = 0.1, 1 / 3
+"""Relative standard error of damping ratio or stiffness, the larger one: of a turned mode, and of any."""
 DOUBTFUL_DAMPING, REJECTED_DAMPING = 0.08, 0.15
 """Damping ratio of a mode without a peak of its own; machine structures have 0.005 to 0.08."""
 HEAVY_DAMPING = 0.3
 """Damping ratio that no peak makes a mode."""
 LEAST_COHERENCE = 0.5
 """Mean coherence at the peak below which most of what was measured is not the hammer's."""
-LEAST_LEFT, MOST_LEFT = 0.005, 0.05
-"""Share of the decay left when the record ends: K is off by about as much, which bears on it where its interval is
-narrower (two standard errors, between these)."""
+MOST_LEFT = 0.05
+"""Share of the decay left when the record ends that the errors of the mode stand for."""
 MISFIT = 2.0
 """rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
 MISFIT_SHARE = 0.01
@@ -75,20 +77,13 @@ def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
     else:
         yield "misfit", share, MISFIT_SHARE, DOUBTFUL_SHARE
         yield "heavy-damping", mode.damping_ratio, DOUBTFUL_DAMPING, REJECTED_DAMPING
-    yield "uncertain", relative_error(mode), DOUBTFUL_ERROR, REJECTED_ERROR
+    is_turned = abs(mode.phase_deg) > TURNED
+    yield "uncertain", relative_error(mode), WELL_KNOWN if is_turned else REJECTED_ERROR, REJECTED_ERROR
     if mode.coherence is not None:
         yield "low-coherence", 1 - mode.coherence, 1 - LEAST_COHERENCE, never
     if mode.edge_distance is not None:
         yield "cut-by-edge", 1 - mode.edge_distance, 0.0, 1.0
-    yield "still-ringing", mode.left_ringing or 0.0, most_left(mode), never
-
-
-def most_left(mode: Mode) -> float:
-    """Share of its decay that may be left when the record ends before K is off by more than its interval says."""
-    if not mode.has_stiffness:
-        return MOST_LEFT
-    error = 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
-    return min(max(2 * error, LEAST_LEFT), MOST_LEFT)
+    yield "still-ringing", mode.left_ringing or 0.0, MOST_LEFT, never
 
 
 def relative_error(mode: Mode) -> float:

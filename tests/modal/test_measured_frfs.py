@@ -54,15 +54,36 @@ def test_a_small_peak_on_the_flank_of_a_far_stronger_one_is_doubtful(weaker: flo
     assert ("bent-by-neighbour" in dict(trust_rules(found[1]))) == (verdict is Trust.DOUBTFUL)
 
 
-def test_what_is_left_about_a_mode_is_in_its_errors() -> None:
-    """A ripple from an echo of 2 % is alike over many lines: it may hide a shift, however many lines there are."""
+def with_echo(noise: float) -> Mode:
+    """A mode with a ripple from an echo of 2 %: alike over many lines, it may hide a shift, however many lines there
+    are."""
     echo = 1 + 0.02 * np.exp(-2j * np.pi * 0.35 * LINES)
-    exact, noise = synthesize([Mode(97.1, 0.02, 7e6)], LINES).accelerance * echo, np.random.default_rng(1)
-    off = noise.normal(size=(2, LINES.size)) * 1e-4 * np.max(np.abs(exact))
+    exact, random = synthesize([Mode(97.1, 0.02, 7e6)], LINES).accelerance * echo, np.random.default_rng(1)
+    off = random.normal(size=(2, LINES.size)) * noise * np.max(np.abs(exact))
     (mode,) = fit_modes(from_accelerance(LINES, exact + off[0] + 1j * off[1]))
-    assert mode.misfit is not None
+    return mode
+
+
+def over_left(mode: Mode) -> NDArray[np.float64]:
+    """Its standard errors as shares of half-width, zeta and K, over the share of its peak that the fit leaves."""
     assert mode.misfit_share is not None
-    assert mode.misfit > 2
     scale = np.array([mode.damping_ratio * mode.frequency, mode.damping_ratio, mode.stiffness])
-    assert np.all(mode.standard_error > 2 * mode.misfit_share * scale)
+    return np.asarray(mode.standard_error / scale / mode.misfit_share)
+
+
+def test_what_is_left_about_a_mode_is_in_its_errors() -> None:
+    mode = with_echo(1e-4)
+    assert mode.misfit is not None
+    assert mode.misfit > 4
+    assert np.all(over_left(mode) > 4 * np.sqrt(1 - (2 / mode.misfit) ** 2))
     assert trust_of(mode) is Trust.TRUSTED
+
+
+def test_it_comes_into_them_without_a_step() -> None:
+    misfits, errors = zip(
+        *((m.misfit, over_left(m)[1]) for m in map(with_echo, np.geomspace(1e-3, 6e-3, 25))), strict=True
+    )
+    near = (np.array(misfits) > 1.8) & (np.array(misfits) < 2.2)
+    assert np.min(misfits) < 1.9
+    assert np.max(misfits) > 2.1
+    assert np.ptp(np.array(errors)[near]) < 1.0

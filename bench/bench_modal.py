@@ -26,8 +26,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from race import Race
-from scipy.io import loadmat
 from sdypy import EMA
+from signalcalc import measured_frfs
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf, estimate_frf, from_accelerance, read_hits
@@ -48,7 +48,6 @@ MEASURED_FILES, POINTS = 10, 5
 """Files of a folder that are timed, and FRFs that are fitted with common poles."""
 BEAM = Path(__file__).parents[1] / "tests" / "data" / "ladisk_beam" / "acceleration.lvm"
 """A hit on a steel beam, measured at the University of Ljubljana."""
-STANDARD_GRAVITY = 9.80665
 Values = NDArray[np.float64]
 
 
@@ -85,20 +84,6 @@ def theirs(frfs: Sequence[Frf], frequencies: list[float]) -> Values:
     w, zeta = 2 * np.pi * np.array(model.nat_freq), np.array(model.nat_xi)
     stiffness = w / (2 * np.abs(model.A[0]) * np.sqrt(1 - zeta**2))
     return np.stack([w / (2 * np.pi), zeta, stiffness], axis=1)
-
-
-def measured_frfs(file: Path) -> list[Frf]:
-    """Accelerances of a SignalCalc file, the frequency in the real part of the first column, with their coherence."""
-    table = loadmat(file)
-    sensors = [name[3:] for name in table if name.startswith("H1_")]
-    return [
-        from_accelerance(
-            table[f"H1_{sensor}"][:, 0].real,
-            STANDARD_GRAVITY * table[f"H1_{sensor}"][:, 1],
-            np.clip(table[f"C1_{sensor}"][:, 1].real, 0, 1),
-        )
-        for sensor in sensors
-    ]
 
 
 def time_measured(folder: Path) -> None:

@@ -15,17 +15,13 @@ from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap
 
-STEPS, LEAST, MOST = 10, 6, 8
-"""Power steps of the first attempt, and least and most Arnoldi vectors: two for each mode between."""
-EFFORTS = ((0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
-"""Those of the attempts after it; what is left in doubt goes on to the next, with the vectors that it has where that
-takes no power steps."""
+EFFORTS = ((10, 6), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
+"""Power steps and Arnoldi vectors of each attempt; what is left in doubt goes on to the next, with the vectors that it
+has where that takes no power steps."""
 TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 HUGE = 1e6
 """Of larger multipliers only the order of magnitude is found."""
-NOISE = 10
-"""Rounding errors of a vector, less of which left at right angles to the others is nothing: its space is exhausted."""
 AT_ONCE = 1_600_000
 """Numbers in the matrices of the cases that are solved at once: as much as a processor keeps near."""
 
@@ -76,11 +72,10 @@ def _multipliers(
     rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float, kind: type[np.floating[Any]]
 ) -> Complexes:
     """Multipliers (r, d) of rows whose tooth periods are divided alike."""
-    first = min(max(2 * rows.direction.size, LEAST), MOST)
-    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, STEPS).grown(first)
+    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, EFFORTS[0][0]).grown(EFFORTS[0][1])
     value, doubt = _largest(space.matrix)
     place = np.indices(depth.shape)
-    for steps, vectors in (effort for effort in EFFORTS if effort[1] > first):
+    for steps, vectors in EFFORTS[1:]:
         size, error = np.abs(value[*place]), doubt[*place]
         left = np.nonzero((error > tolerance) & ((size < HUGE) | (error > 0.5)))
         if not left[0].size:
@@ -144,8 +139,7 @@ class _Space:
             overlap = (earlier @ new[..., np.newaxis])[..., 0]
             matrix[..., : k + 1, k] += overlap
             new = new - (overlap[..., np.newaxis, :] @ earlier)[..., 0, :]
-        length, whole = np.linalg.norm(new, axis=-1), np.linalg.norm(matrix[..., : k + 1, k], axis=-1)
-        length = np.where(length > NOISE * np.finfo(new.dtype).eps * whole, length, 0)
+        length = np.linalg.norm(new, axis=-1)
         matrix[..., k + 1, k] = length
         basis[..., k + 1, :] = new / np.where(length > 0, length, 1.0)[..., np.newaxis]
 

@@ -16,7 +16,15 @@ from lobewatch.cuts.listening.find_cut import UNPLACED, CutParts
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.measured_speed import measured_speed
-from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS, WIDE, SortedLines, is_slow, lines_of_cut, sort_lines
+from lobewatch.cuts.listening.sorted_lines import (
+    TOOTH_HARMONICS,
+    WIDE,
+    SortedLines,
+    is_slow,
+    lines_of_cut,
+    sort_lines,
+    with_tones,
+)
 from lobewatch.cuts.listening.spectrum import (
     Floats,
     SpectralLines,
@@ -130,6 +138,9 @@ def judge_cut(
         lines = without_skirts(lines_of(spectra[number]), spectra[number].bin)
         unsteady = unsteadiness(axis, sample_rate, lines, turning, spectra[number].bin)
         by_origin = sort_lines(lines, spectra[number], quiet[number], turning, teeth, unsteady)
+        if len(by_origin.left):
+            tones = with_tones(quiet[number], np.atleast_2d(air)[number], by_origin.left.frequency)
+            by_origin = sort_lines(lines, spectra[number], tones, turning, teeth, unsteady)
         sound = HeardSound(
             "stable", "", turning=turning, ratio=0.0, lines=by_origin, spectrum=spectra[number], axis=number
         )

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
-from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum, joined_lines, lines_of, without_skirts
+from lobewatch.cuts.listening.spectrum import (
+    NEIGHBOURHOOD,
+    Floats,
+    SpectralLines,
+    Spectrum,
+    joined_lines,
+    lines_of,
+    mean_noise,
+    power_of,
+    without_skirts,
+)
 from lobewatch.cuts.listening.steadiness import MOST
 
 WIDE = 1.2
@@ -19,6 +29,11 @@ FOREIGN = 9.0
 """Power of a line over that which it has in air, below which it comes from elsewhere."""
 AIR_WIDE = 2.0
 """Distance up to which a line of the air part is the same (bins of its own)."""
+PIECE = 0.5
+"""Length of the pieces of air in which tones are looked for that come and go (s); each begins in the middle of the one
+before it; chosen ..."""
+TONE = 12.0
+"""... and the power over that of the noise of a tone there: noise reaches it near a line once in 1000 airs of 10 s."""
 HIGHEST = 2.0
 """Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
 UPPER = 0.7
@@ -57,6 +72,28 @@ class SortedLines:
 def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
     """Whether lines are there in air too."""
     return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
+
+
+def with_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
+    """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
+
+    signal: of the air, shape (n,). What stands clear of the noise of its piece (`TONE`) counts: a knock does not.
+    """
+    size = round(PIECE * air.sample_rate)
+    step, level = air.sample_rate / size, np.zeros(frequency.size)
+    near, around = (_places(frequency / step, bins, size // 2) for bins in (round(AIR_WIDE), NEIGHBOURHOOD))
+    for begin in range(0, signal.size - size + 1, size // 2):
+        power = power_of(signal[begin : begin + size], size)
+        tone, noise = np.max(power[near], axis=1), mean_noise(power[around])
+        level = np.maximum(level, np.where(tone > TONE * noise, tone, 0.0))
+    power = air.power.copy()
+    np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)
+    return replace(air, power=power)
+
+
+def _places(middle: Floats, reach: int, last: int) -> NDArray[np.intp]:
+    """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
+    return np.clip(np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1), 0, last)
 
 
 def lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:

@@ -89,12 +89,21 @@ class SpectralLines:
 
 def spectrum_of(signal: Floats, sample_rate: float) -> Spectrum:
     """The spectrum of a part of a recording; signal in m/s^2, shape (n,)."""
+    size = scipy.fft.next_fast_len(PADDED * signal.size, real=True)
+    power, step = power_of(signal, size), sample_rate / size
+    return Spectrum(np.arange(power.size) * step, power, _noise(power), sample_rate / signal.size, sample_rate)
+
+
+def power_of(signal: Floats, size: int) -> Floats:
+    """Square of the amplitude of a sine at each frequency, shape (size // 2 + 1,); signal filled up to this size."""
     phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
     window = sum(share * np.cos(k * phase) for k, share in enumerate(WINDOW))
-    size = scipy.fft.next_fast_len(PADDED * signal.size, real=True)
-    power = (2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2
-    step = sample_rate / size
-    return Spectrum(np.arange(power.size) * step, power, _noise(power), sample_rate / signal.size, sample_rate)
+    return np.asarray((2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2)
+
+
+def mean_noise(power: Floats) -> Floats:
+    """Mean power of noise whose power is distributed exponentially, from the quiet ones of its last dimension."""
+    return np.asarray(np.quantile(power, QUIET, axis=-1) / -np.log(1 - QUIET))
 
 
 def spectra_of(signal: Floats, sample_rate: float) -> list[Spectrum]:
@@ -106,7 +115,7 @@ def _noise(power: Floats) -> Floats:
     """Mean power of noise whose power is distributed exponentially, from the quiet bins of each neighbourhood."""
     count = max(power.size // (PADDED * NEIGHBOURHOOD), 2)
     blocks = np.array_split(power, count)
-    level = np.array([np.quantile(block, QUIET) for block in blocks]) / -np.log(1 - QUIET)
+    level = np.array([mean_noise(block) for block in blocks])
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
     least = np.finfo(np.float64).tiny
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))

@@ -99,3 +99,23 @@ def test_a_clipped_cut_is_no_chatter() -> None:
     clipped = np.abs(signal) >= 12.0
     (heard,) = listen_to(CutRecording(signal, RATE, TEETH, 0.5, 60 * TURN, clipped))
     assert heard.reason == "overload"
+
+
+def tone(loud: float = 4.0) -> Floats:
+    """One that no multiple explains, alone."""
+    return loud * np.sin(2 * np.pi * 1234.5 * TIME)
+
+
+def test_a_tone_of_the_shop_that_comes_and_goes_in_air_is_none_of_the_cut() -> None:
+    """It sounds in a seventh of the air, and all the time in the cut, as loud."""
+    cut, shop = between(2.2, 3.8) * teeth(), (between(0.2, 0.5) + between(2.2, 3.8)) * tone()
+    (heard,) = heard_in(cut + shop + noise(10, 1.0))
+    assert heard.word == "stable"
+    (heard,) = heard_in(cut + between(2.2, 3.8) * tone() + noise(10, 1.0))
+    assert heard.reason == "unexplained-tone"
+
+
+def test_a_tone_that_is_far_fainter_in_air_is_of_the_cut() -> None:
+    """A fifth of its amplitude is less than a ninth of its power."""
+    (heard,) = heard_in(between(2.2, 3.8) * (teeth() + tone()) + between(0.8, 1.3) * tone(4.0 / 5) + noise(11))
+    assert heard.reason == "unexplained-tone"

@@ -133,23 +133,29 @@ def judge_cut(
     turning = _speed_or_reason(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(turning, HeardSound):
         return turning
-    sounds = []
-    for number, axis in enumerate(np.atleast_2d(cut)):
-        lines = without_skirts(lines_of(spectra[number]), spectra[number].bin)
-        unsteady = unsteadiness(axis, sample_rate, lines, turning, spectra[number].bin)
-        by_origin = sort_lines(lines, spectra[number], quiet[number], turning, teeth, unsteady)
-        if len(by_origin.left):
-            tones = with_tones(quiet[number], np.atleast_2d(air)[number], by_origin.left.frequency)
-            by_origin = sort_lines(lines, spectra[number], tones, turning, teeth, unsteady)
-        sound = HeardSound(
-            "stable", "", turning=turning, ratio=0.0, lines=by_origin, spectrum=spectra[number], axis=number
-        )
-        sounds.append(_judge_lines(sound, axis, teeth, immersion))
+    axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
+    sounds = [replace(_judge_axis(*axis, turning, teeth, immersion), axis=number) for number, axis in enumerate(axes)]
     sound = max(sounds, key=_evidence)
     if is_measured or sound.word == "stable" or sound.lines is None or not len(sound.lines.left):
         return sound
     elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.lines.left)
     return sound if np.isnan(elsewhere) else _not_found(spectra[0], elsewhere)
+
+
+def _judge_axis(
+    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
+) -> HeardSound:
+    """The word on an axis; a tone alone is looked for in pieces of the air too."""
+    lines = without_skirts(lines_of(spectrum), spectrum.bin)
+    unsteady = unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin)
+    by_origin = sort_lines(lines, spectrum, quiet, turning, teeth, unsteady)
+    sound = HeardSound("stable", "", turning=turning, ratio=0.0, lines=by_origin, spectrum=spectrum)
+    judged = _judge_lines(sound, cut, teeth, immersion)
+    if judged.reason != "unexplained-tone":
+        return judged
+    tones = with_tones(quiet, air, by_origin.left.frequency)
+    by_origin = sort_lines(lines, spectrum, tones, turning, teeth, unsteady)
+    return _judge_lines(replace(sound, lines=by_origin), cut, teeth, immersion)
 
 
 def _speed_or_reason(

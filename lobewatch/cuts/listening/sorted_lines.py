@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.spectrum import (
-    NEIGHBOURHOOD,
     Floats,
     SpectralLines,
     Spectrum,
     joined_lines,
     lines_of,
-    mean_noise,
     power_of,
     without_skirts,
 )
@@ -32,8 +30,9 @@ AIR_WIDE = 2.0
 PIECE = 0.5
 """Length of the pieces of air in which tones are looked for that come and go (s); each begins in the middle of the one
 before it; chosen ..."""
-TONE = 12.0
-"""... and the power over that of the noise of a tone there: noise reaches it near a line once in 1000 airs of 10 s."""
+TONE, BESIDE = 12.0, 8
+"""... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
+once in 1000 airs of 10 s; chosen."""
 HIGHEST = 2.0
 """Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
 UPPER = 0.7
@@ -77,14 +76,15 @@ def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
 def with_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
 
-    signal: of the air, shape (n,). What stands clear of the noise of its piece (`TONE`) counts: a knock does not.
+    signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
+    does a spindle that is slowing down.
     """
     size = round(PIECE * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
-    near, around = (_places(frequency / step, bins, size // 2) for bins in (round(AIR_WIDE), NEIGHBOURHOOD))
+    near, around = (_places(frequency / step, bins, size // 2) for bins in (round(AIR_WIDE), BESIDE))
     for begin in range(0, signal.size - size + 1, size // 2):
         power = power_of(signal[begin : begin + size], size)
-        tone, noise = np.max(power[near], axis=1), mean_noise(power[around])
+        tone, noise = np.max(power[near], axis=1), np.median(power[around], axis=1) / np.log(2)
         level = np.maximum(level, np.where(tone > TONE * noise, tone, 0.0))
     power = air.power.copy()
     np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)

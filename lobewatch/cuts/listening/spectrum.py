@@ -101,11 +101,6 @@ def power_of(signal: Floats, size: int) -> Floats:
     return np.asarray((2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2)
 
 
-def mean_noise(power: Floats) -> Floats:
-    """Mean power of noise whose power is distributed exponentially, from the quiet ones of its last dimension."""
-    return np.asarray(np.quantile(power, QUIET, axis=-1) / -np.log(1 - QUIET))
-
-
 def spectra_of(signal: Floats, sample_rate: float) -> list[Spectrum]:
     """The spectrum of each axis; signal of shape (n,) or (axes, n)."""
     return [spectrum_of(axis, sample_rate) for axis in np.atleast_2d(signal)]
@@ -115,7 +110,7 @@ def _noise(power: Floats) -> Floats:
     """Mean power of noise whose power is distributed exponentially, from the quiet bins of each neighbourhood."""
     count = max(power.size // (PADDED * NEIGHBOURHOOD), 2)
     blocks = np.array_split(power, count)
-    level = np.array([mean_noise(block) for block in blocks])
+    level = np.array([np.quantile(block, QUIET) for block in blocks]) / -np.log(1 - QUIET)
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
     least = np.finfo(np.float64).tiny
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))

@@ -119,3 +119,10 @@ def test_a_tone_that_is_far_fainter_in_air_is_of_the_cut() -> None:
     """A fifth of its amplitude is less than a ninth of its power."""
     (heard,) = heard_in(between(2.2, 3.8) * (teeth() + tone()) + between(0.8, 1.3) * tone(4.0 / 5) + noise(11))
     assert heard.reason == "unexplained-tone"
+
+
+def test_a_spindle_that_slows_down_in_air_explains_no_tone_of_the_cut() -> None:
+    """It sweeps over the tone within a tenth of a second, as loud."""
+    sweep = between(0.2, 1.7) * 2.0 * np.sin(2 * np.pi * (2500 * TIME - 780 * TIME**2))
+    heard = heard_in(between(2.2, 3.8) * (teeth() + tone()) + sweep + noise(12, 1.0))[-1]
+    assert heard.reason == "unexplained-tone"

@@ -93,7 +93,8 @@ def with_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
 
 def _places(middle: Floats, reach: int, last: int) -> NDArray[np.intp]:
     """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
-    return np.clip(np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1), 0, last)
+    places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
+    return np.asarray(np.clip(places, 0, last))
 
 
 def lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:

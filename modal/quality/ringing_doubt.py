@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modal.modes.mode import UNKNOWN_PHASE, Mode, ratio_or_zero
+from modal.quality.trust import MOST_LEFT
 
 
 def with_ringing_doubt(mode: Mode) -> Mode:
@@ -16,7 +17,8 @@ def with_ringing_doubt(mode: Mode) -> Mode:
     On the lines of the record (multiples of one over its length T) all of the mode is 1 - exp(lambda T) of itself, with
     a size of exp(-zeta w T) = left_ringing and a phase that is not known: K and the phase of the modal constant are off
     by up to that share, by 1/sqrt(2) of it in the mean of squares. f and zeta are so only where the hit came late in
-    the record or zeros were appended to it, by less; they get the same share of zeta f and of zeta.
+    the record or zeros were appended to it, by less; they get the same share of zeta f and of zeta. Where more than 5 %
+    is left the errors stay: that is doubtful, and lines that come from no record, but were computed, have none of it.
 
     Source: integral of exp((lambda - iw) t) from 0 to T.
 
@@ -24,7 +26,7 @@ def with_ringing_doubt(mode: Mode) -> Mode:
     >>> [f"{error:.2g}" for error in with_ringing_doubt(mode).standard_error]  # Hz, -, N/m
     ['0.14', '0.0003', '5.7e+05']
     """
-    if not mode.left_ringing:
+    if not mode.left_ringing or mode.left_ringing > MOST_LEFT:
         return mode
     share = mode.left_ringing / np.sqrt(2)
     off = share * np.array([mode.damping_ratio * mode.frequency, mode.damping_ratio, mode.stiffness])

@@ -80,6 +80,11 @@ def test_more_than_the_errors_stand_for_is_doubtful() -> None:
     assert trust_of(fitted(1500.0, 0.07, 0.0, 0)) is Trust.DOUBTFUL
 
 
+def test_errors_stand_for_no_more() -> None:
+    mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.1, 1e-5, 1e4]) ** 2, left_ringing=0.051)
+    assert with_ringing_doubt(mode) is mode
+
+
 def test_values_that_are_held_stay_without_error() -> None:
     mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.0, 0.0, 1e4]) ** 2, left_ringing=0.04)
     widened = with_ringing_doubt(mode).standard_error

@@ -43,8 +43,8 @@ class LiveTest:
 
     @property
     def running(self) -> bool:
-        """Whether it holds the device."""
-        return self._thread.is_alive() and not self._visit.waits
+        """Whether it holds the device; where it has failed it gives it back."""
+        return self._thread.is_alive() and not self._visit.waits and self.state.word is not TapStep.FAILED
 
     def undo(self) -> None:
         """Take the last good hit back."""

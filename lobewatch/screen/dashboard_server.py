@@ -127,9 +127,10 @@ class DashboardServer(WebThread):
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise web.HTTPBadRequest(text='the body must be {"direction": "x"}, "y" or "xy"') from None
         test = self._tests.get(key)
-        if test is None or not test.running:
-            if test is not None:  # it may wait for a choice that is made by this
-                await asyncio.to_thread(_end, test)
+        begins = test is None or not test.running
+        if test is not None and begins:  # it may wait for a choice that is made by this
+            await asyncio.to_thread(_end, test)
+        if begins and self._tests.get(key) is test:  # else another START was as fast
             self._tests[key] = LiveTest(folder, wish.direction, resume=wish.resume)
         return web.json_response({"url": f"/tap/{quote(key)}/"})
 

@@ -8,6 +8,7 @@ import http.client
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -19,6 +20,7 @@ import pytest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import CutScreenServer, DashboardServer
+from lobewatch.screen.live_test import LiveTest
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator
 from lobewatch.tap.listening.cut_state import CutState, CutStep
@@ -200,6 +202,27 @@ def test_twenty_starts_at_once_begin_one_test(tmp_path: Path) -> None:
             assert answers == [(200, {"url": "/tap/mill/"})] * 20
             assert [thread.name for thread in threading.enumerate()].count("tap test") == 1
             assert ask(server, "POST", "/tap/mill/stop")[0] == 200
+
+
+def test_twenty_starts_at_once_after_a_failure_begin_one_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread of the failed test, which all of them wait for, takes a while to end."""
+    tappable(tmp_path, "/dev/nothing-here")
+    begun: list[LiveTest] = []
+
+    class Counted(LiveTest):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            begun.append(self)
+            super().__init__(*args, **options)
+
+    monkeypatch.setattr("lobewatch.screen.dashboard_server.LiveTest", Counted)
+    monkeypatch.setattr("lobewatch.screen.live_test.return_memory", lambda: time.sleep(1.0))
+    with DashboardServer(tmp_path, token=TOKEN) as server, ThreadPoolExecutor(20) as pool:
+        assert ask(server, "POST", START, X)[0] == 200
+        while begun[0].running:
+            time.sleep(0.02)
+        answers = [*pool.map(lambda _: ask(server, "POST", START, X), range(20))]
+        assert answers == [(200, {"url": "/tap/mill/"})] * 20
+    assert len(begun) == 2
 
 
 def test_nothing_of_a_cut_is_told_to_strangers(cut: CutScreenServer) -> None:

@@ -77,7 +77,7 @@ def with_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
 
     signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
-    does a spindle that is slowing down.
+    does what passes by 40 Hz in a piece or faster, as a multiple of a spindle that is slowing down.
     """
     size = round(PIECE * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)

@@ -18,7 +18,7 @@ from lobewatch.measuring.model import model_frf, model_state
 from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.tool.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
 from lobewatch.verdicts.advice import robust_pockets
-from lobewatch.verdicts.setting_search import Setting
+from lobewatch.verdicts.setting import Setting
 from lobewatch.verdicts.speed_pockets import SpeedPocket, speed_pockets
 from lobewatch.verdicts.verdict import Verdict
 

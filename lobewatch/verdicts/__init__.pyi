@@ -2,7 +2,7 @@
 
 from .advice import Advice, advise, robust_pockets
 from .doubt import Doubt, doubt_of
-from .setting_search import Setting
+from .setting import Setting
 from .spindle_at_speed import SpindleAtSpeed
 from .verdict import Ruling, Verdict, Word
 

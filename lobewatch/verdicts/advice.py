@@ -13,7 +13,8 @@ from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import softening, tolerable_decay
-from lobewatch.verdicts.setting_search import Setting, SettingSearch
+from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.setting_search import SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.tool_remarks import not_described
 from lobewatch.verdicts.verdict import Verdict, Word, is_sure

@@ -14,7 +14,8 @@ from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM, CutRange
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.setting_search import Setting, SettingSearch
+from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.setting_search import SettingSearch
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.tool_remarks import not_described
 from lobewatch.verdicts.verdict import Verdict, Word, judge, unanswered

@@ -29,6 +29,7 @@ from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
 from lobewatch.verdicts.judgement import SURELY, Judgement, drawn_program, weighed
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
 from lobewatch.verdicts.room import APART, DEEPER, LEAST_FALL, all_around, frequency_left, window_rpm
+from lobewatch.verdicts.setting import Setting
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.ways import ways
 
@@ -61,22 +62,6 @@ FEW = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A speed and a depth that would be called stable."""
-
-    speed_rpm: float
-    """Spindle speed (rpm), in steps of 10 unless it is the program's own."""
-    depth_mm: float
-    """Axial depth (mm), in steps of 0.05 unless it is the program's own."""
-    window_rpm: tuple[float, float]
-    """Slowest and fastest speed around it at which the depth would be called stable too."""
-    depth_margin: float
-    """Limit in the middle of the doubt over depth, less 1."""
-    frequency_left: float
-    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
 
 
 def needed_fall(assembly: Assembly, machine: Machine) -> float:

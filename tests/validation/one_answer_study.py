@@ -24,7 +24,8 @@ from lobewatch.verdicts.advice import advise, robust_pockets
 from lobewatch.verdicts.draws import as_program, draw, worst_limit
 from lobewatch.verdicts.recommendation import recommend
 from lobewatch.verdicts.room import DEEPER, at_ends
-from lobewatch.verdicts.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.setting_search import SPARE, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST
 from lobewatch.verdicts.verdict import Word, judge
 

@@ -14,7 +14,8 @@ from lobewatch.verdicts.draws import as_program
 from lobewatch.verdicts.hard_draws import hard_draws
 from lobewatch.verdicts.judgement import weigh
 from lobewatch.verdicts.room import all_around
-from lobewatch.verdicts.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.setting_search import SPARE, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST
 from modal import Mode
 

@@ -56,7 +56,7 @@ def check(
     from lobewatch.logbook.chosen_verdicts import chosen_verdicts
     from lobewatch.machine import MachineFolder
     from lobewatch.machine.additions.accept_settings import accept_settings
-    from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts
+    from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts, summary
     from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines
     from lobewatch.show.programs.describe_verdicts import is_safe
 
@@ -89,6 +89,7 @@ def check(
         as_json,
         *(check_texts(programs, remarks, logbook.machine) if programs else ()),
         *(line for answer in recommendations for line in recommendation_lines(answer)),
+        *([summary(programs, len(recommendations))] if programs else ()),
     )
     if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
         raise typer.Exit(1)

@@ -31,7 +31,7 @@ function fallText({ fall, fall_std: std, series }) {
 function showSize(place, { fall, fall_std: std, limits }) {
   if (fall === null || std === 0) return;
   const change = -Math.round(100 * fall) / 100 + 0; // + 0: no -0
-  place.textContent = `${change < 0 ? "" : "+"}${change.toFixed(2)} %`;
+  place.textContent = `${change > 0 ? "+" : ""}${change.toFixed(2)} %`;
   place.style.setProperty("--share", Math.min(Math.max(fall / limits.at(-1), 0), 1.25));
   place.title = `frequency since the first tests; alarm at -${limits.at(-1)} %`;
 }

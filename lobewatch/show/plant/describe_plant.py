@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.cells import cell_len, set_cell_size
 
+from dsm import plus_minus
 from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import printable
 
@@ -53,7 +54,7 @@ def _fallen(row: Mapping[str, Any]) -> str:
         return ""
     if row["fall_std"] == 0:
         return "first test"
-    return f"{row['fall']:.2f}" + ("" if row["fall_std"] is None else f" ± {row['fall_std']:.2f}")
+    return plus_minus(row["fall"], row["fall_std"])
 
 
 def _due(row: Mapping[str, Any]) -> str:

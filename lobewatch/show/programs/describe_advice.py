@@ -73,7 +73,7 @@ def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> 
 
 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
-    """All programs for people: the table, what is called for, how to read it, how many there are of each word."""
+    """All programs for people: the table, what is called for, how to read it."""
     decays = [decay_text(program.advice) for program in programs]
     verdicts = [program.verdict for program in programs]
     return [
@@ -81,7 +81,6 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
         *(line for program in programs for line in advice_lines(program, machine)),
         *reading_lines(verdicts, machine),
         *remark_lines([*remarks, *(remark for program in programs for remark in program.notes)]),
-        summary(programs),
     ]
 
 
@@ -117,13 +116,15 @@ def counts(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
     }
 
 
-def summary(programs: Sequence[ProgramAdvice]) -> str:
-    """How many there are of each word."""
+def summary(programs: Sequence[ProgramAdvice], others: int) -> str:
+    """How many there are of each word, and of those without a speed or a depth."""
     words = Counter(program.verdict.word for program in programs)
     texts = [f"{words[word]} {word}" for word in Word if words[word]]
     beyond = counts(programs)["beyond_drive"]
     texts += [f"{beyond} beyond the drive"] if beyond else []
-    return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(texts)}"
+    texts += [f"{others} without a speed or a depth"] if others else []
+    number = len(programs) + others
+    return f"{number} program{'s' if number > 1 else ''}: {', '.join(texts)}"
 
 
 def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:

@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from dsm import plus_minus
 from lobewatch.decay.light import Light
 from lobewatch.show.plant.describe_plant import COLUMNS
 from lobewatch.show.report.figure_data import Numbers
@@ -48,8 +49,7 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
     )
     fall, std = row["fall"], row["fall_std"]
     has_changed = fall is not None and std != 0
-    error = "" if std is None else f" ± {std:.2f}"
-    fallen = f"{-fall:+z.2f}{error} %" if has_changed else "nothing to compare with"
+    fallen = f"{plus_minus(-fall, std)} %" if has_changed else "nothing to compare with"
     return {
         "name": row["name"],
         "key": row["key"],

@@ -152,10 +152,10 @@ def _model_changes(history: SeriesHistory) -> list[list[str]]:
 def newest_modes(material: ReportMaterial) -> list[Section]:
     """Modes of the newest test."""
     rows = [
-        [f"{frequency:.2f}", f"{damping * 100:.3f}", _stiffness_text(stiffness), _mode_remark(stiffness)]
+        [f"{frequency:.2f} Hz", f"{damping * 100:.3f}", _stiffness_text(stiffness), _mode_remark(stiffness)]
         for frequency, damping, stiffness, _ in material.last.modes
     ]
-    heads = ["natural frequency (Hz)", "damping ratio (%)", "stiffness (N/µm)", "remark"]
+    heads = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"]
     table = DataTable(heads, rows, if_empty="none was found")
     return [Section("Modes of the newest test", [table], is_framed=False)]
 

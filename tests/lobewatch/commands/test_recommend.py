@@ -84,6 +84,7 @@ def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, ru
     assert [program["name"] for program in said["programs"]] == ["C"]
     a, b = (answer["recommended"] for answer in said["recommendations"])
     assert (code, a["depth_mm"], b["speed_rpm"]) == (0, 1.5, 8700)
+    assert run("check")[1].endswith("3 programs: 1 stable, 2 without a speed or a depth\n")
     shop.edit('name = "A"\n', f'name = "A"\nspeed_rpm = {a["speed_rpm"]:g}\n')
     shop.edit('name = "B"\n', f'name = "B"\ndepth_mm = {b["depth_mm"]:g}\n')
     assert run("check", "--json")[0] == 0

@@ -187,9 +187,16 @@ def test_the_first_screen_fits_with_its_words_and_pictures_beside_each_other(
     assert len(pictures) == 2
     assert all(box["bottom"] <= 657 and box["height"] > 180 for box in boxes)
     assert all(picture["left"] > words["right"] for picture in pictures)
-    browser.resize((390, 844))
-    small = "[...document.querySelectorAll('.pictures text')].map((one) => one.getBoundingClientRect().height)"
-    assert min(browser.ask(small)) >= 10  # of a letter, in dots of the screen
+
+
+def test_letters_of_pictures_can_be_read_on_a_phone(browser: Browser, reports: list[Path]) -> None:
+    """Height in dots of the screen; large pictures scroll beneath it, the page does not."""
+    browser.open(reports[0].as_uri(), (390, 844))
+    for pictures, least in ((".pictures", 10), (".large", 8)):
+        letters = f"[...document.querySelectorAll('{pictures} text')].map((one) => one.getBoundingClientRect().height)"
+        assert min(browser.ask(letters)) >= least, pictures
+    assert browser.ask("document.querySelector('.large').scrollWidth") > 390
+    assert browser.ask("document.documentElement.scrollWidth <= innerWidth")
 
 
 def test_the_words_of_the_demo_fit_the_first_screen(browser: Browser, tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_a_new_section_is_one_function(shop: Shop) -> None:
     assert '<thead><tr><th scope="col">hour</th><th scope="col">how</th></tr></thead>' in added
     assert '<tr><td>9</td><td class="ok">fine</td></tr>' in added
     assert '<tr><td colspan="1">not looked at</td></tr>' in added
-    assert '<figure><svg role="img" aria-label="Hours, &lt;all&gt;"' in added
+    assert '<figure class="large" tabindex="0"><svg role="img" aria-label="Hours, &lt;all&gt;"' in added
     assert f'id="numbers-{drawn + 1}">{{"heads":["hour"],"lines":[[9.0]]}}</script>' in added
     assert 'data-numbers="numbers-minutes" data-name="hours-&lt;all&gt;">CSV: hours, &lt;all&gt;</button>' in added
 

@@ -1,36 +1,32 @@
-"""`lobewatch lobes`: methods, safe pockets, the band of the doubt, pictures, own materials."""
+"""`lobewatch lobes`: methods, safe pockets, the band of the doubt, pictures."""
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from itertools import combinations, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.patches import Rectangle
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, radial_lobes, stability_boundary, zero_order
 from lobewatch.history.history_columns import row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
-from lobewatch.machine import ProgramTable, drive_limit
+from lobewatch.machine import drive_limit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.show.figures.labels import PictureLabels
-from lobewatch.show.figures.lobe_figures import BAND, lobes_figure, radial_figure, waterfall_figure
+from lobewatch.show.figures.lobe_figures import BAND, radial_figure, waterfall_figure
 from lobewatch.show.figures.lobe_pictures import lobes_picture
-from lobewatch.show.figures.style import new_axes, svg
+from lobewatch.show.figures.style import svg
 from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
 from lobewatch.tool import Dynamics, Method, chart, lobes_of, speed_grid
-from lobewatch.verdicts import Setting, Verdict, Word
+from lobewatch.verdicts import Word
 from lobewatch.verdicts.advice import robust_pockets
-from lobewatch.verdicts.limit_band import LimitBand, limit_band
+from lobewatch.verdicts.limit_band import limit_band
 from modal import Mode, synthesize
 from tests.lobewatch.commands.conftest import Run
 
@@ -355,104 +351,6 @@ def test_an_unknown_ending_names_those_that_are_known(run: Run, folder: MachineF
     said = run("lobes", "m", "--figure", "l.xyz")
     assert (said.code, "name a file that ends in .svg, .png or .pdf" in said.err) == (2, True)
     assert "webp" not in said.err
-
-
-EXAMPLE = """
-[machine]
-name = "m"
-[[material]]
-name = "ours"
-tangential_n_per_mm2 = 800
-radial_n_per_mm2 = 200
-[reference_cut]
-teeth = 2
-radial_depth_mm = 5
-tool_diameter_mm = 10
-direction = "up"
-helix_deg = 30
-material = "ours"
-"""
-
-
-def test_own_and_published_materials() -> None:
-    machine = parse_machine(EXAMPLE)
-    assert machine.reference_cut is not None
-    cut = machine.build_cut(machine.reference_cut)
-    assert (cut.tangential, cut.radial, cut.immersion) == (800e6, 200e6, 0.5)
-    assert cut.helix_lag == pytest.approx(2 * np.tan(np.radians(30)) / 0.01)
-    steel = parse_machine(EXAMPLE.replace('material = "ours"', 'material = "Steel (textbook)"'))
-    assert steel.reference_cut is not None
-    assert steel.build_cut(steel.reference_cut).tangential == pytest.approx(2173.3e6)
-
-
-@pytest.mark.parametrize("name", ["42CrMo4", "42crmo4", "1.7225", "AISI 4140", "aisi4140", " UNS G41400"])
-def test_a_material_goes_by_any_of_its_names(name: str) -> None:
-    machine = parse_machine(EXAMPLE.replace('material = "ours"', f'material = "{name}"'))
-    assert machine.reference_cut is not None
-    known = machine.coefficients(machine.reference_cut)
-    assert (known.material, known.iso_group) == ("42CrMo4", "P")
-    assert machine.build_cut(machine.reference_cut).tangential == pytest.approx(2726e6, rel=1e-3)
-
-
-def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
-    for name in ("C45", "c 45"):
-        text = EXAMPLE.replace('name = "ours"', 'name = "C45"').replace('material = "ours"', f'material = "{name}"')
-        machine = parse_machine(text)
-        assert machine.reference_cut is not None
-        assert machine.coefficients(machine.reference_cut).tangential == 800e6
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('material = "ours"', 'material = "our"', "material='our' is not known; is 'ours' meant"),
-        ('material = "ours"', "", "give material, or both"),
-        ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give material, or both"),
-        ('material = "ours"', "tangential_n_per_mm2 = 1", "give material, or both"),
-        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobewatch materials lists those"),
-        ('material = "ours"', 'material = "4140"', "is 'AISI 4140' meant"),
-        ("tangential_n_per_mm2 = 800\n", "", "give either tangential_n_per_mm2 and radial_n_per_mm2"),
-        ("radial_n_per_mm2 = 200", "radial_n_per_mm2 = 200\nforce_angle_deg = 60", "give either tangential"),
-        ("helix_deg = 30", "helix_deg = 90", "helix_deg"),
-        ("teeth = 2", "teeth = 2\nfeed_per_tooth_mm = 0", "feed_per_tooth_mm"),
-        ("[reference_cut]", "[drive]\npower_kw = 0\n[reference_cut]", "drive power_kw"),
-    ],
-)
-def test_bad_materials_are_told_with_their_place(old: str, new: str, message: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(message)):
-        parse_machine(EXAMPLE.replace(old, new))
-
-
-def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
-    speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 2e-3)
-    cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
-    marks = [
-        Verdict(ProgramTable(name=f"p{i}", speed_rpm=1100.0 + 250 * i, depth_mm=3.0, **cut), word)  # type: ignore[arg-type]
-        for i, word in enumerate(Word)
-    ]
-    band, pocket = LimitBand(speed, 0.5 * depth, 2 * depth), Setting(1500.0, 0.85, (1400.0, 1650.0), 0.3, 0.02)
-    (axes,) = lobes_figure(speed, {"then": 0.9 * depth, "now": depth}, marks, "", band, [pocket]).axes
-    shade, filled = (np.asarray(one.get_paths()[0].vertices)[:, 1] for one in axes.collections)
-    assert (filled.min(), filled.max()) == pytest.approx((1.0, 4.0))
-    assert shade.min() == pytest.approx(4.0)
-    (box,) = axes.patches
-    assert isinstance(box, Rectangle)
-    assert (box.get_x(), box.get_width(), box.get_y(), box.get_height()) == (1400.0, 250.0, 0.0, 0.85)
-    texts = [text.get_text() for text in axes.texts]
-    assert texts == ["1500 rpm\n0.85 mm", "p0\nstable", "p1\ndoubtful", "p2\nnot stable", "p3\nunknown"]
-    looks = {(line.get_marker(), line.get_color()) for line in axes.lines[2:]}
-    assert len(looks) == len({mark for mark, _ in looks}) == 4
-
-
-def test_words_in_a_picture_do_not_cover_one_another() -> None:
-    figure, (axes,) = new_axes(1, (8.0, 4.2))
-    axes.set(xlim=(0, 100), ylim=(0, 10))
-    labels = PictureLabels(axes)
-    for place in ((50, 5), (52, 5), (50, 5.3)):
-        labels.add("a program\nnot stable", place)
-    figure.canvas.draw()
-    boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
 def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:

@@ -41,12 +41,12 @@ def lobes(
     from lobewatch.logbook import Logbook, compare_lobes
     from lobewatch.logbook.lobe_comparison import speeds_alone
     from lobewatch.show.cuts.describe_heard import speeds_json, speeds_texts
-    from lobewatch.show.figures.lobe_pictures import save_pictures
     from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
     from lobewatch.tool import Dynamics, Method
 
     logbook = Logbook.open(machine)
-    alone = None if figure or radial or waterfall else speeds_alone(logbook, tool, cut)
+    drawn = figure or radial or waterfall
+    alone = None if drawn else speeds_alone(logbook, tool, cut)
     if alone is not None:
         assembly, pockets = alone
         remarks = [*logbook.remarks, *assembly.remarks]
@@ -55,9 +55,9 @@ def lobes(
     if notes.is_terminal:
         notes.print("looking for speeds and depths that are safe; this takes some seconds")
     comparison = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
-    remarks = [
-        *logbook.remarks,
-        *comparison.remarks,
-        *save_pictures(logbook, comparison, Method(method), figure, radial, waterfall),
-    ]
+    remarks = [*logbook.remarks, *comparison.remarks]
+    if drawn:
+        from lobewatch.show.figures.lobe_pictures import save_pictures  # brings matplotlib
+
+        remarks += save_pictures(logbook, comparison, Method(method), figure, radial, waterfall)
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))

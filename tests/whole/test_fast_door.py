@@ -80,3 +80,9 @@ def test_a_history_waits_neither_for_hdf5_nor_for_what_fits_modes(tmp_path: Path
     modules = imported(COMMAND_LINE, "history", "mill", cwd=tmp_path)
     assert "lobewatch.history.history" in modules
     assert not ({"h5py", "matplotlib"} | NUMERICAL) & modules
+
+
+def test_lobes_that_are_not_drawn_do_not_wait_for_pictures(tmp_path: Path) -> None:
+    imported(COMMAND_LINE, "demo", "--taps", "2", "--out", "mill", cwd=tmp_path)
+    assert "matplotlib" not in imported(COMMAND_LINE, "lobes", "mill", cwd=tmp_path)
+    assert "matplotlib" in imported(COMMAND_LINE, "lobes", "mill", "--figure", "lobes.svg", cwd=tmp_path)

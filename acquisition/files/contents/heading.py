@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 from acquisition.files.contents.contents import Role
 from acquisition.files.contents.units import VOLTS, unit_of
@@ -14,21 +15,29 @@ _PART_OF_FRF = re.compile(
     re.IGNORECASE,
 )
 """Such as Re(H), or imag(FRF) [m/N]."""
-ANGLES = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg", "rad": "rad", "radians": "rad"}
+_BEFORE_UNIT = re.compile(r"\s*/\s*|\s*,\s*|\s+in\s+")
+"""Between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
+ANGLES = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度"), "deg") | {
+    "rad": "rad",
+    "radians": "rad",
+}
 """Units of a phase as they are written in lower case."""
+_OF_FRF = re.compile(r"(frf|receptance|mobility|accelerance|h\d?)(?![^\W_])[\W\d_]*")
+"""What stands before the part of an FRF that a column holds: "H1 real"."""
 _BY_NAME: tuple[tuple[str, Role], ...] = (
-    (r"(time|zeit|t$|x_value$)", "time"),
-    (r"(freq|f$)", "frequency"),
-    (r"(re\b|real)", "real"),
-    (r"(im\b|imag)", "imag"),
-    (r"(coh|kohärenz|gamma)", "coherence"),
-    (r"(phase|angle|arg\b)", "phase"),
-    (r"(mag|ampl|abs\b|betrag|db\b)", "magnitude"),
-    (r"(frf|receptance|mobility|accelerance|h1\b|h2\b)", "frf"),
-    (r"(force|hammer|kraft)", "force"),
-    (r"(acc|resp|vel|disp|beschl)", "response"),
+    (r"time|zeit|temps|tiempo|tempo|时间|時間|t$|x_value$", "time"),
+    (r"freq|frec|频率|頻率|周波数|f$", "frequency"),
+    (r"re\b|real|reel|part\w+ re|实部|実部", "real"),
+    (r"im\b|imag|part\w+ im|虚部", "imag"),
+    (r"coh|koharenz|gamma|相干|コヒーレンス", "coherence"),
+    (r"phase|fase|angle|arg\b|相位|位相", "phase"),
+    (r"mag|ampl|ampiezza|module|modulo|abs\b|betrag|db\b|幅值|振幅", "magnitude"),
+    (_OF_FRF.pattern, "frf"),
+    (r"force|hammer|kraft|fuerza|forza|力", "force"),
+    (r"acc|acel|resp|vel|disp|beschl|加速度|速度|位移|変位", "response"),
     (r"tacho", "tacho"),
 )
+"""Beginnings of names in lower case and without accents, in seven languages -> what the column is."""
 ROLES: dict[str, tuple[Role, str]] = {
     "time": ("time", ""),
     "frequency": ("frequency", ""),
@@ -55,16 +64,16 @@ ROLES: dict[str, tuple[Role, str]] = {
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """Of "Force [N]", "Force (N)", "force_N" or "Re(H) [m/N]"; no unit where there is none that stands apart."""
+    """Of "Force [N]", "Force (N)", "Force / N", "force_N" or "Re(H) [m/N]"; no unit where none stands apart."""
     part = _PART_OF_FRF.fullmatch(heading)
     if part:
         return part[1], name_and_unit(part[2])[1]
     bracketed = _BRACKETS.fullmatch(heading)
     if bracketed:
         return bracketed[1], bracketed[2]
-    for at in (underscore.start() for underscore in re.finditer("_", heading)):
-        name, unit = heading[:at], heading[at + 1 :]
-        if name and (is_unit(unit)):
+    for sign in (*_BEFORE_UNIT.finditer(heading), *re.finditer("_", heading)):
+        name, unit = heading[: sign.start()], heading[sign.end() :]
+        if name and is_unit(unit) and not is_unit(name.split()[-1]):
             return name, unit
     return heading, ""
 
@@ -79,9 +88,19 @@ def is_level(unit: str) -> bool:
     return unit.lower().startswith("db")
 
 
+def unit_of_level(unit: str) -> str:
+    """The unit that a level is a multiple of, "1 um/N" of "dB re 1 um/N"; empty where it does not say."""
+    reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?[\s,)]*", "", unit)
+    is_known = unit_of(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
+    return reference if is_known else ""
+
+
 def role_of(name: str, unit: str) -> Role:
     """What a column is by its name and its unit, the unit first; empty where neither tells."""
-    by_name = next((role for pattern, role in _BY_NAME if re.match(pattern, name.strip().lower())), "")
+    letters = unicodedata.normalize("NFKD", name.strip().lower())
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    plain = _OF_FRF.sub("", plain, count=1) if _OF_FRF.match(plain) and not _OF_FRF.fullmatch(plain) else plain
+    by_name = next((role for pattern, role in _BY_NAME if re.match(pattern, plain)), "")
     parsed = unit_of(unit)
     quantity = parsed.quantity if parsed else ""
     if quantity == "frequency" and by_name != "frequency" and parsed == unit_of("rpm"):

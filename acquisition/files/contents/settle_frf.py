@@ -108,6 +108,9 @@ def _values(candidate: Candidate, ledger: Ledger) -> NDArray[np.complex128] | No
         ledger.ask("the unit of its phase", '--columns "frequency,magnitude,phase [deg]"')
         return None
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
+    if not is_level(first.unit) and np.any(first.values < 0):
+        ledger.ask(f"whether {first.name}, which falls below 0, is in dB", '--columns "frequency,db,phase [deg]"')
+        return None
     size = 10 ** (first.values / 20) if is_level(first.unit) else first.values
     return np.asarray(size * np.exp(1j * phase))
 

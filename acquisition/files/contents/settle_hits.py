@@ -118,8 +118,7 @@ def kind_of(signal: Signal) -> str:
 
 def rate_of(signals: Sequence[Signal], used: Sequence[Signal], description: Description, ledger: Ledger) -> float:
     """Samples a second (Hz); 0 where it is missing or wrong."""
-    if not used:
-        used = signals
+    used = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
     if len({signal.values.size for signal in used}) > 1:
         ledger.faults.append(f"its channels differ in length: {names_of(used)}")
         return 0.0

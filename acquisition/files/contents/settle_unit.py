@@ -7,7 +7,7 @@ from typing import cast
 
 from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description
-from acquisition.files.contents.heading import is_level
+from acquisition.files.contents.heading import is_level, unit_of_level
 from acquisition.files.contents.ledger import Ledger, Origin
 from acquisition.files.contents.sensitivity import sensed_frf
 from acquisition.files.contents.units import Unit, motion_of, unit_of
@@ -33,7 +33,7 @@ def chosen(signals: Sequence[Signal], response: int | None, noun: str, ledger: L
 
 def frf_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[str, float] | None:
     """Quantity of the response, and the factor to SI, of an FRF."""
-    in_file = "" if is_level(signal.unit) else signal.unit
+    in_file = unit_of_level(signal.unit) if is_level(signal.unit) else signal.unit
     sensed = sensed_frf(in_file or description.unit, description, ledger)
     if sensed is None:
         return None

@@ -62,10 +62,12 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
     "Hz": (1.0, (0, -1, 0)),
     "kHz": (1e3, (0, -1, 0)),
     "rpm": (1 / 60, (0, -1, 0)),
+    "cpm": (1 / 60, (0, -1, 0)),
     "rad": (1 / (2 * math.pi), _NONE),
     "N": (1.0, _FORCE),
     "newton": (1.0, _FORCE),
     "newtons": (1.0, _FORCE),
+    "daN": (10.0, _FORCE),
     "kN": (1e3, _FORCE),
     "mN": (1e-3, _FORCE),
     "lbf": (POUND_FORCE, _FORCE),
@@ -73,6 +75,7 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
     "kgf": (STANDARD_GRAVITY, _FORCE),
     "kg": (1.0, (-1, 2, 1)),
     "g": (STANDARD_GRAVITY, (1, -2, 0)),
+    "gal": (1e-2, (1, -2, 0)),
     "gn": (STANDARD_GRAVITY, (1, -2, 0)),
 }
 _LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
@@ -80,7 +83,7 @@ _LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
 _TURNS = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
 """Turns a minute as they are written: minutes are no unit otherwise ("x_min" is the least)."""
-_PLAIN = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
+_PLAIN = str.maketrans({"µ": "u", "μ": "u", "¹": "^1", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,13 @@ def unit_of(text: str) -> Unit | None:
 
     Hz, rad/s and rpm are frequency, in Hz; g is standard gravity.
     """
-    plain = re.sub(r"_?\bper\b_?|_per_", "/", text.strip()).translate(_PLAIN).replace("**", "^")
+    plain = (
+        re.sub(r"_?\bper\b_?|_per_", "/", text.strip())
+        .replace("⁻", "-")
+        .translate(_PLAIN)
+        .replace("-^", "^-")
+        .replace("**", "^")
+    )
     plain = "rpm" if _TURNS.fullmatch(plain) else plain
     try:
         tokens = _tokens(plain)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from acquisition.files.contents.contents import Contents, Role, Signal
 from acquisition.files.contents.heading import role_of
+from acquisition.files.readers.array_columns import columns_of
 from acquisition.files.readers.mat_window import window_of
 
 _FREQUENCY = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
@@ -186,7 +187,8 @@ def _frf_signals(
 
 
 def _over_time(v: Mapping[str, Any]) -> Contents | None:
-    """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell."""
+    """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell. What
+    else stands in the file has no role, so that `--columns` can have it."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
     rate = next((float(v[name]) for name in v if _RATE.fullmatch(name) and _is_number(v[name])), None)
     axis = next((name for name in arrays if _TIME.fullmatch(name) and _has_company(name, arrays)), None)
@@ -197,7 +199,10 @@ def _over_time(v: Mapping[str, Any]) -> Contents | None:
     signals += [
         Signal(name, values, role_of(name, ""), rate=rate) for name, values in _of_length(arrays, n) if name != axis
     ]
-    return Contents(tuple(signals)) if signals else None
+    if not signals:
+        return None
+    beside = columns_of({name: value for name, value in v.items() if n not in np.shape(value) or name not in arrays})
+    return Contents((*signals, *(replace(signal, role="") for signal in beside)))
 
 
 def _has_company(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -26,8 +27,8 @@ def read_lvm(path: Path) -> Contents:
     ends = [i for i, line in enumerate(lines) if line.startswith(_END)]
     if len(ends) < 2:
         raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
-    words = (line.rstrip().split("\t", 1) for line in lines[: ends[0]])
-    head = {pair[0]: pair[1].strip() for pair in words if len(pair) == 2}
+    pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator stands in one of them
+    head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
     starts = [*ends[1:], len(lines)]
     signals = [
         signal
@@ -85,8 +86,8 @@ def _column(
     """One channel; place: its first line, the line after the last, the column, and how many values it should have."""
     first, after, column, n = place
     last = after if after == len(lines) else min(after, first + n)
-    while last > first and not lines[last - 1].strip():
-        last -= 1
+    while last > first and not _word(lines[last - 1].split(split), column):
+        last -= 1  # other channels may be longer
     if last - first < n:
         raise DataError(f"{path}: {last - first} of {n} samples are there; the file is cut short")
     values = np.empty(last - first)

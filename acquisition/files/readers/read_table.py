@@ -10,7 +10,7 @@ heading behind the first row of numbers. Complex numbers are read as Python, MAT
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -27,6 +27,7 @@ from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lin
 from acquisition.files.readers.row_form import (
     RowForm,
     begins_with_number,
+    dialect,
     numbers_of,
     plain_complex,
     row_form,
@@ -34,7 +35,9 @@ from acquisition.files.readers.row_form import (
 from acquisition.files.readers.table_heading import Heading, heading_above, heading_behind, is_unit_line
 from acquisition.files.readers.text import is_text, text_of
 
-_MAY_BE_ROW = re.compile(r"\d|nan|inf", re.IGNORECASE)
+_DIGIT = re.compile(r"\d|nan|inf", re.IGNORECASE)
+_WORD = re.compile(r"[\s\"']*(?!(?:nan|inf|infinity)\b)[^\W\d_]{2}", re.IGNORECASE)
+"""At the begin of a line that is no row."""
 BEGIN = 3
 """Lines in a row that begin with a number where the rows of a table begin."""
 
@@ -44,21 +47,39 @@ def read_table(path: Path, skip: int = 0) -> Contents:
     text = text_of(path)
     lines, comments = numbered_lines(text, skip)
     lines, footer = _without_footer(lines)
-    rows, form, heading = _rows(path, lines, comments)
     pairs = [(key.strip().lower(), value.strip()) for key, _, value in (comment.partition(":") for comment in comments)]
     keys, machines = dict(pairs), tuple(dict.fromkeys(value for key, value in pairs if key == "machine" and value))
+    signals, notes = list[Signal](), list[str]()
+    for record, table in enumerate(_tables(path, lines)):
+        rows, form, heading = _rows(path, table, comments)
+        signals += [replace(s, record=record) for s in signals_of(numbers_of(rows, form, str(path)), heading)]
+        beside = [word for i, word in enumerate(form.words(rows.texts[-1])) if word and i not in form.columns]
+        notes += [f"beside its columns stands {word!r} in the last row" for word in beside]
     _check_whole(path, keys, rows, text)
-    contents = _contents(path, signals_of(numbers_of(rows, form, str(path)), heading), keys)
-    beside = [word for i, word in enumerate(form.words(rows.texts[-1])) if word and i not in form.columns]
-    notes = [f"beside its columns stands {word!r} in the last row" for word in beside]
     notes += [f"below its rows stands {line!r}" for line in footer]
-    return replace(contents, machines=machines, notes=tuple(notes))
+    return replace(_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
+
+
+def _tables(path: Path, lines: NumberedLines) -> Iterator[NumberedLines]:
+    """The table, or those beneath each other where a line above the rows stands again below; with their headings."""
+    texts = lines.texts
+    first = _first_row(path, lines)
+    above = {line for line in texts[:first] if _WORD.match(line)}
+    again = [i for i in range(first, len(texts)) if texts[i] in above]
+    begins = dict.fromkeys(next(j for j in range(i, 0, -1) if begins_with_number(texts[j - 1])) for i in again)
+    return map(lines.__getitem__, map(slice, [0, *begins], [*begins, len(texts)]))
 
 
 def _without_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
     """Lines up to the last that may be a row, and words behind it."""
-    last = next((i for i in range(len(lines.texts), 0, -1) if _MAY_BE_ROW.search(lines.texts[i - 1])), 0)
+    form = dialect(lines.texts[-1:] or [""])
+    last = next((i for i in range(len(lines.texts), 0, -1) if _may_be_row(lines.texts[i - 1], form)), 0)
     return (lines[:last], lines.texts[last:]) if last else (lines, [])
+
+
+def _may_be_row(line: str, form: RowForm) -> bool:
+    """Whether it has a digit, and more than one number where it begins with a word."""
+    return bool(_DIGIT.search(line)) and (not _WORD.match(line) or sum(map(form.is_number, form.words(line))) > 1)
 
 
 def signals_of(values: Sequence[NDArray[Any]], heading: Heading) -> tuple[Signal, ...]:
@@ -68,11 +89,11 @@ def signals_of(values: Sequence[NDArray[Any]], heading: Heading) -> tuple[Signal
 
 
 def _signal(name: str, unit: str, column: NDArray[Any]) -> Signal:
-    """Of a magnitude in "dB re 1 m/N" the unit, of one in dB that; complex numbers are an FRF."""
-    level = re.fullmatch(r"dB\s*(?:re|ref|rel)\.?\s*1?\s*(.+)", unit, re.IGNORECASE)
-    if is_level(unit):
-        return Signal(name, column, "magnitude", f"dB {level[1]}" if level else "dB")
-    return Signal(name, column, "frf" if np.iscomplexobj(column) else role_of(name, unit), unit)
+    """Complex numbers are an FRF, and real ones none."""
+    if np.iscomplexobj(column):
+        return Signal(name, column, "frf", unit)
+    role = "magnitude" if is_level(unit) else role_of(name, unit)
+    return Signal(name, column, "" if role == "frf" else role, unit)
 
 
 def _rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowForm, Heading]:
@@ -114,7 +135,8 @@ def _refuse_broken_row(path: Path, above: NumberedLines, form: RowForm, width: i
     """DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
     words = form.words(plain_complex(above.texts[-1])) if above.texts else []
     numbers = sum(map(form.is_number, words))
-    if len(words) == width and 2 * numbers >= len(form.columns) and not is_unit_line(above.texts[-2:-1], form, width):
+    may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _WORD.match(above.texts[-1])
+    if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):
         cure = f"mend it, or pass over what stands above the rows with --skip {above.numbers[-1]}"
         place = f"{path}: line {above.numbers[-1]}"
         raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,11 +14,13 @@ from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.files.readers.numbered_lines import NumberedLines
+from acquisition.files.readers.text import fields
 
 SAMPLE = 200
 """Rows that tell which words are columns."""
 FEW = 3
 """Rows below which a word that is no number is no column of words, but a mistake."""
+_COMMA_DECIMAL = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*")
 _COMMA_NUMBER = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 _POSITIVE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _PAIR = re.compile(rf"\(\s*([+-]?{_POSITIVE})\s*,\s*([+-]?{_POSITIVE})\s*\)")
@@ -25,6 +29,8 @@ _EITHER = _POSITIVE.replace(r"\.", "[.,]")
 _SUM = re.compile(rf"({_EITHER})\s*([+-])\s*({_EITHER})\s*[ij]\b")
 _IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
 _TIMESTAMP = re.compile(r"\d{1,4}([-/.:])\d{1,2}\1\d{1,4}")
+_MISSING = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QNAN|SNAN)0*", re.IGNORECASE)
+"""In place of a number, as spreadsheets and older C libraries write it."""
 _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
 
 
@@ -42,6 +48,8 @@ class RowForm:
     def words(self, line: str) -> list[str]:
         """The words of a line."""
         line = line.strip(" \r\n") if self.separator == "\t" else line.strip()
+        if '"' in line and self.separator != r"\s+":
+            return fields(line, self.separator)
         return [word.strip().strip('"') for word in re.split(self.separator, line)]
 
     def number(self, word: str) -> complex:
@@ -50,6 +58,8 @@ class RowForm:
         try:
             return float(plain)
         except ValueError:
+            if _MISSING.fullmatch(word):
+                return math.nan
             return complex(plain) if _IMAGINARY.fullmatch(plain) else float(re.sub("[dD]", "e", plain))
 
     def is_row(self, line: str) -> bool:
@@ -92,7 +102,8 @@ def dialect(rows: Sequence[str]) -> RowForm:
     words = with_comma.split()
     if len(words) > 1 and all(map(_COMMA_NUMBER.fullmatch, words)):
         return RowForm(r"\s+", comma=True)
-    return RowForm("," if with_comma else r"\s+", comma=False)
+    in_quotes = '"' in with_comma and any(map(_COMMA_DECIMAL.fullmatch, fields(with_comma, ",")))
+    return RowForm("," if with_comma else r"\s+", in_quotes)
 
 
 def row_form(rows: Sequence[str]) -> RowForm:
@@ -116,7 +127,9 @@ def numbers_of(rows: NumberedLines, form: RowForm, place: str) -> list[NDArray[A
     at_once = _at_once(form, rows.texts)
     if at_once is not None:
         return list(at_once)
-    one_by_one = [_row(line, number, form, place) for line, number in zip(rows.texts, rows.numbers, strict=True)]
+    cures = [f"; pass over it with --skip {rows.numbers[0]}, and name the columns with --columns"]
+    in_turn = itertools.zip_longest(rows.texts, rows.numbers, cures, fillvalue="")
+    one_by_one = [_row(line, form, f"{place}: line {number}", cure) for line, number, cure in in_turn]
     return [column if np.any(column.imag) else column.real for column in np.array(one_by_one).T]
 
 
@@ -136,14 +149,14 @@ def _at_once(form: RowForm, rows: Sequence[str]) -> NDArray[np.float64] | None:
     return np.array(values).reshape(len(rows), len(form.columns)).T
 
 
-def _row(line: str, number: int, form: RowForm, place: str) -> list[complex]:
+def _row(line: str, form: RowForm, place: str, cure: str) -> list[complex]:
     words, width = form.words(line), len(form.columns)
     behind = words[form.columns[-1] + 1 :]
     if form.columns[-1] >= len(words) or (behind and form.is_number(behind[0])):
         n = sum(map(form.is_number, words))
         if n != width:
-            raise DataError(f"{place}: line {number}: {n} numbers where other rows have {width}")
+            raise DataError(f"{place}: {n} numbers where other rows have {width}{cure}")
     try:
         return [form.number(words[i]) for i in form.columns]
     except (ValueError, IndexError) as error:
-        raise DataError(f"{place}: line {number}: {line.strip()[:60]!r} is no row of numbers") from error
+        raise DataError(f"{place}: {line.strip()[:60]!r} is no row of numbers{cure}") from error

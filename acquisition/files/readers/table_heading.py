@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,12 +9,15 @@ from dataclasses import replace
 from acquisition.files.contents.heading import is_unit, name_and_unit, role_of
 from acquisition.files.contents.units import unit_of
 from acquisition.files.readers.row_form import RowForm
+from acquisition.files.readers.text import fields
 
 Heading = list[tuple[str, str]]
 """Name and unit of each column; empty where they are not said."""
 _RATIO = "Units: Ratio"
 _PRODUCT = re.compile(r"(\(.+\))(\(.+\))")
 _LETTER = re.compile(r"[^\W\d_]")
+_UNIT_LABEL = re.compile(r"unit|einheit|unidad|単位|单位", re.IGNORECASE)
+"""At the begin of a line of units."""
 _MARK = re.compile(r"^\s*[#%!*/]+\s*")
 """Of a comment."""
 _UNTIL_BRACKET = re.compile(r"\s+(?=[\[(])")
@@ -33,7 +35,7 @@ def heading_above(lines: Sequence[str], form: RowForm, width: int) -> Heading:
     named = [words for words in by_line if any(map(_LETTER.search, words)) and not any(map(form.is_number, words))]
     names = [words for words in named if words is not units] or [[""] * len(units)]
     in_turn = _words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
-    if in_turn and is_unit(in_turn[1]):
+    if in_turn and all(in_turn[::2]) and is_unit(in_turn[1]):
         return _alternating(in_turn)
     return _paired(max(names, key=_known), units, is_ratio=_RATIO in lines)
 
@@ -86,13 +88,13 @@ def _words(line: str, form: RowForm, width: int) -> list[str]:
 
 def _split(line: str, separator: str) -> list[str]:
     if separator in ",;\t":
-        return next(csv.reader([line], delimiter=separator), [])
+        return fields(line, separator)
     return re.split(separator, line.strip())
 
 
 def _are_units(words: Sequence[str]) -> bool:
     """Whether all are units; or the first is one of time or frequency and no other a name that is known."""
-    bare = [word.strip("()[] ") for word in words]
+    bare = [word.strip("()[] ") for word in words if not _UNIT_LABEL.match(word)]
     if not any(bare):
         return False
     if all(not word or word == "-" or is_unit(word) for word in bare):
@@ -105,6 +107,7 @@ def _paired(names: Sequence[str], units: Sequence[str], *, is_ratio: bool) -> He
     """is_ratio: whether a product of units is meant as a ratio."""
     if not units:
         return [name_and_unit(name) for name in names]
-    bare = [word.strip("()[] ") if unit_of(word) is None else word for word in units]
+    said = ["" if _UNIT_LABEL.match(word) else word for word in units]
+    bare = [word.strip("()[] ") if unit_of(word) is None else word for word in said]
     texts = [_PRODUCT.sub(r"\1/\2", unit) if is_ratio else unit for unit in bare]
     return [(name, text.strip("-")) for name, text in zip(names, texts, strict=True)]

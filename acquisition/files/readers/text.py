@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import re
 from pathlib import Path
 
@@ -30,6 +31,12 @@ def decoded(content: bytes) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+def fields(line: str, separator: str) -> list[str]:
+    """The words of a line; within quotes a separator is none, but in a line that stands in quotes as a whole."""
+    words = [word.strip() for word in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    return fields(words[0], separator) if len(words) == 1 and separator in words[0] else words
 
 
 def is_text(head: bytes) -> bool:

@@ -120,6 +120,15 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=FRF:1", "frf [m/N]=FRF:2"))))
 
 
+def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> None:
+    path, time = tmp_path / "a.mat", np.arange(200.0)
+    scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
+    said = complaint(path)
+    assert f"t (200), u (200), y (200), w ({F.size}), ts ({F.size})" in said
+    assert "length" not in said
+    assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
+
+
 def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     np.save(path, np.array([{"f": F}], dtype=object), allow_pickle=True)

@@ -1,6 +1,5 @@
 """The operator's screen in a browser: pages that follow a tap test and a cut, and a dashboard of machines."""
 
-from lobewatch.screen.dashboard_server import DashboardServer
-from lobewatch.screen.screen_server import CutScreenServer, ScreenServer
+import lazy_loader
 
-__all__ = ["CutScreenServer", "DashboardServer", "ScreenServer"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -82,7 +82,9 @@ def test_a_history_waits_neither_for_hdf5_nor_for_what_fits_modes(tmp_path: Path
     assert not ({"h5py", "matplotlib"} | NUMERICAL) & modules
 
 
-def test_lobes_that_are_not_drawn_do_not_wait_for_pictures(tmp_path: Path) -> None:
-    imported(COMMAND_LINE, "demo", "--taps", "2", "--out", "mill", cwd=tmp_path)
+def test_a_report_waits_for_no_server_and_lobes_that_are_not_drawn_for_no_pictures(tmp_path: Path) -> None:
+    modules = imported(COMMAND_LINE, "demo", "--taps", "2", "--out", "mill", cwd=tmp_path)
+    assert "lobewatch.show.report.report" in modules
+    assert "aiohttp" not in modules
     assert "matplotlib" not in imported(COMMAND_LINE, "lobes", "mill", cwd=tmp_path)
     assert "matplotlib" in imported(COMMAND_LINE, "lobes", "mill", "--figure", "lobes.svg", cwd=tmp_path)

@@ -71,7 +71,7 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     bracketed = _BRACKETS.fullmatch(heading)
     if bracketed:
         return bracketed[1], bracketed[2]
-    for sign in (*_BEFORE_UNIT.finditer(heading), *re.finditer("_", heading)):
+    for sign in (*re.finditer("_", heading), *_BEFORE_UNIT.finditer(heading)):
         name, unit = heading[: sign.start()], heading[sign.end() :]
         if name and is_unit(unit) and not is_unit(name.split()[-1]):
             return name, unit

@@ -21,7 +21,7 @@ from acquisition.tap import Conditions
 
 COLUMNS_ANY = (
     f"{COLUMNS_HIT}, those of --force FILE where the force stands in another file behind them; or {COLUMNS_FRF}, "
-    "without frequency where --spacing says it"
+    "without time where --rate says it, without frequency where --spacing does"
 )
 """How any of both is named."""
 

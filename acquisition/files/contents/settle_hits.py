@@ -100,9 +100,10 @@ def _by_kind(signals: Sequence[Signal], description: Description, ledger: Ledger
     if unclear and ((needs_force and not forces) or not responses):
         ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_HIT)
         return forces, responses
-    if needs_force and len(forces) != 1:
-        count = "no force channel" if not forces else f"{len(forces)} force channels"
-        ledger.faults.append(f"{count} among {names}; one is needed{'' if forces else f' ({NO_SENSOR})'}")
+    if needs_force and not forces:
+        ledger.faults.append(f"no force channel among {names}; one is needed ({NO_SENSOR})")
+    if needs_force and len(forces) > 1:
+        ledger.ask(f"which force of {names_of(forces)} goes with which response", COLUMNS_HIT)
     if not responses:
         ledger.faults.append(f"no channel of a response among {names}")
     return forces, responses

@@ -22,6 +22,8 @@ def columns_of(variables: Mapping[str, Any], glue: str = ".", prefix: str = "") 
     for name, value in variables.items():
         if isinstance(value, Mapping):
             yield from columns_of(value, glue, f"{prefix}{name}{glue}")
+        elif isinstance(value, list):
+            yield from columns_of({str(i): part for i, part in enumerate(value, 1)}, glue, f"{prefix}{name}:")
         elif isinstance(value, np.ndarray) and value.dtype.kind in "fiuc":
             yield from _of_array(f"{prefix}{name}", value)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.files.contents.contents import Contents, Role, Signal
-from acquisition.files.contents.heading import role_of
+from acquisition.files.contents.heading import name_and_unit, role_of
 from acquisition.files.readers.array_columns import columns_of
 from acquisition.files.readers.mat_window import window_of
 
@@ -115,9 +115,10 @@ def _at(texts: Sequence[str], channel: str) -> str:
 def _test_lab(v: Mapping[str, Any]) -> Contents | None:
     """Structs with `x_values` (start_value, increment) and `y_values` (values, quantity with a label)."""
     signals = list[Signal]()
-    for name, struct in v.items():
-        if isinstance(struct, Mapping) and {"x_values", "y_values"} <= struct.keys():
-            signals += _of_struct(name, struct["x_values"], struct["y_values"], len(signals))
+    for name, value in v.items():
+        for struct in value if isinstance(value, list) else [value]:
+            if isinstance(struct, Mapping) and {"x_values", "y_values"} <= struct.keys():
+                signals += _of_struct(name, struct["x_values"], struct["y_values"], len(signals))
     return Contents(tuple(signals)) if signals else None
 
 
@@ -173,7 +174,7 @@ def _vectors(v: Mapping[str, Any]) -> Contents | None:
 def _frf_signals(
     arrays: Mapping[str, NDArray[Any]], frequency: str, frfs: Sequence[tuple[str, NDArray[Any]]]
 ) -> Iterator[Signal]:
-    yield Signal(frequency, arrays[frequency], "frequency")
+    yield Signal(frequency, arrays[frequency], "frequency", name_and_unit(frequency)[1])
     yield from (Signal(name, values, "frf") for name, values in frfs)
     n = arrays[frequency].size
     taken = {frequency, *(name for name, _ in frfs)}

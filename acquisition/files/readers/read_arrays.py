@@ -37,9 +37,9 @@ def _read(file: BinaryIO, path: Path) -> Contents:
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
-        return Contents(tuple(columns_of(_fields(loaded))))
+        return _contents(_fields(loaded))
     with loaded:
-        return _contents({name: loaded[name] for name in loaded.files})
+        return _contents({name: loaded[name][()] for name in loaded.files})
 
 
 def _fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
     hit = np.zeros(400, [("t", "f8"), ("force", "f4"), ("acc", "f4")])
     hit["t"], hit["force"][20:24], hit["acc"][22:] = time, 50.0, np.sin(np.arange(378))
     np.save(tmp_path / "hit.npy", hit)
-    assert "what its columns are (t, force, acc)" in complaint(tmp_path / "hit.npy")
+    assert "the unit of force (--force-unit" in complaint(tmp_path / "hit.npy")
     said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
     assert read_hits(tmp_path / "hit.npy", said)[0].sample_rate == pytest.approx(4000)
     np.save(tmp_path / "rows.npy", np.stack([hit["force"], hit["acc"]]))
@@ -127,6 +127,39 @@ def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> No
     assert f"t (200), u (200), y (200), w ({F.size}), ts ({F.size})" in said
     assert "length" not in said
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
+
+
+@pytest.mark.parametrize("name", ["freq_kHz", "freq_rad_s"])
+def test_an_axis_is_in_the_unit_of_its_name(tmp_path: Path, name: str) -> None:
+    path, axis = tmp_path / "a.mat", F / 1000 if "kHz" in name else 2 * np.pi * F
+    scipy.io.savemat(path, {name: axis, "H": H})
+    assert is_h(read_frf(path, Description(unit="m/N")))
+
+
+def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
+    force, said = np.zeros(200), Description(unit="m/s^2", force_unit="N")
+    force[20:24] = 9, 20, 20, 9
+    response = np.where(np.arange(200) < 20, 0.0, np.exp(-np.arange(200) / 20) * np.sin(np.arange(200)))
+    path = npz(tmp_path / "a.npz", fs=2000, force=force, acceleration=response)
+    (hit,) = read_hits(path, said)
+    assert hit.sample_rate == pytest.approx(2000)
+    two = npz(tmp_path / "two.npz", fs=2000, force=np.stack([force, force]), acc=np.stack([response, response]))
+    assert "which force of force:1, force:2 goes with which response (--columns" in complaint(two)
+    columns = ("force [N]=force:2", "acceleration [g]=acc:2")
+    assert len(read_hits(two, Description(columns=columns, rate=2000))) == 1
+
+
+def test_what_stands_in_cells_has_numbers(tmp_path: Path) -> None:
+    path, cells = tmp_path / "a.mat", np.empty(2, dtype=object)
+    cells[:] = [H, 2 * H]
+    scipy.io.savemat(path, {"H": cells, "w": 2 * np.pi * F})
+    assert "which of its 2 FRFs is meant: 1 H:1, 2 H:2" in complaint(path)
+    assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=H:2"))), 2 * H)
+    axis = {"start_value": 1.0, "increment": 1.0, "quantity": {"label": "Hz"}}
+    cells[:] = [{"x_values": axis, "y_values": {"values": k * H, "quantity": {"label": "m/N"}}} for k in (1, 2)]
+    scipy.io.savemat(path, {"FRF": cells})
+    assert "which of its 2 FRFs is meant" in complaint(path)
+    assert is_h(read_frf(path, Description(response=2)), 2 * H)
 
 
 def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:

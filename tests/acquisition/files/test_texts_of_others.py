@@ -46,7 +46,9 @@ def test_magnitude_and_phase_as_several_countries_write_them(tmp_path: Path, nam
     assert is_h(read_frf(path))
 
 
-@pytest.mark.parametrize("heading", ["t / s,F / N,a / (m/s²)", "Temps (s),Force (daN),Accélération (m·s⁻²)"])
+@pytest.mark.parametrize(
+    "heading", ["t / s,F / N,a / (m/s²)", "t/s,F/N,acc_m/s^2", "Temps (s),Force (daN),Accélération (m·s⁻²)"]
+)
 def test_hits_as_several_countries_write_them(tmp_path: Path, heading: str) -> None:
     force = FORCE / 10 if "daN" in heading else FORCE
     path = write(tmp_path / "a.csv", f"{heading}\n" + rows(TIME, force, RESPONSE, separator=","))

@@ -33,6 +33,8 @@ class Judgement(NamedTuple):
 
     middle: ProgramLimit
     """Limit in the middle of the doubt."""
+    lowest: float
+    """Lowest limit of any of the spindles (m)."""
     low: float
     """1 % quantile of the limit over the doubt (m)."""
     high: float
@@ -88,7 +90,7 @@ def weighed(program: DrawnProgram) -> Judgement:
     around = draws.around(SURELY * depth) >= 0
     near = (draws.limits <= below) | around
     chatters = _chatters(draws, near, around, limits, depth)
-    return Judgement(middle, float(low), float(high), draws, chatters, across)
+    return Judgement(middle, float(np.min(limits)), float(low), float(high), draws, chatters, across)
 
 
 def _chatters(

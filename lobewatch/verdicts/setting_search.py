@@ -209,9 +209,9 @@ class SettingSearch:
         return not any(self.likely.is_joined(speed, setting.speed_rpm) for setting in taken)
 
     def _climbed(self, speed: float, depths: dict[float, float], looked: set[float]) -> float:
-        """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), each once."""
-        looked.update(depths)
-        for _ in range(CLIMBS):
+        """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), once for each top."""
+        for _ in range(0 if speed in looked else CLIMBS):
+            looked.add(speed)
             if (beside := self._beside(speed, depths[speed])) in looked:
                 break
             looked.add(beside)
@@ -280,7 +280,7 @@ class SettingSearch:
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
             self.chattered.update(places[:REMEMBERED].tolist())
-            calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.low)
+            calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.lowest)
             return min(calm, LESS * depth_mm, depth_mm - MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
         window = window_rpm(near, hardest, speed, depth, self.reach)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from one_answer_study import answers, summary
 from random_milling import random_case
-from verdict_study import MACHINE, program
+from verdict_study import MACHINE, assembly, program
 
 from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.verdicts.setting_search import SettingSearch
 
 
 @pytest.mark.parametrize("seed", [31, 32])
@@ -45,3 +46,15 @@ def test_no_depth_is_named_that_would_be_asked_about() -> None:
     table = program(random_case(np.random.default_rng(34).spawn(16)[4]), 54.85)
     assert table.depth_mm > 3 * table.tool_diameter_mm
     assert CutRange.of(MACHINE, table).deepest_mm == 2 * table.tool_diameter_mm
+
+
+@pytest.mark.parametrize("number", [234, 287])
+def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_stable_again(number: int) -> None:
+    """Few depths are looked at on the way, and step over such islands."""
+    milling = random_case(np.random.default_rng(6).spawn(number + 1)[number])
+    table, tool = program(milling, 1.0), assembly(milling)
+    search = SettingSearch(table, tool, MACHINE)
+    nearest = search.nearest(table.depth_mm, table.speed_rpm)
+    assert search.best is not None
+    assert nearest is not None
+    assert search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm

@@ -47,14 +47,19 @@ class ContradictingCut:
     """Chance that its word is wrong."""
 
 
+def chance_wrong(evidence: NewEvidence) -> float:
+    """Chance that the word of a cut is wrong under spindles that explain all."""
+    cut, before = evidence.cut, evidence.before
+    return float(np.sum(before.weights * misheard(cut, evidence.prediction, _again(cut, before))))
+
+
 def contradiction(evidence: NewEvidence) -> ContradictingCut | None:
     """What is wrong with a cut under spindles that explain all; None where nothing is."""
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.before.weights
-    again = [other for other in evidence.before.cuts if other is not cut and cut.is_again(other)]
-    wrong = float(np.sum(weights * misheard(cut, prediction, again)))
+    wrong = chance_wrong(evidence)
     if np.isfinite(cut.frequency) and cut.chatters:
         near = np.any(prediction.distances(cut) < AWAY * FREQUENCY * cut.frequency, axis=0)
-        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction, again))
+        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction, _again(cut, evidence.before)))
         if np.sum(others * near) < NONE * np.sum(others):
             return ContradictingCut(cut, Contradiction.FREQUENCY, wrong)
     if wrong <= WRONG:
@@ -76,6 +81,11 @@ def contradiction_remarks(learnt: Posterior, contradicting: Sequence[Contradicti
         between = f"between {USUAL[0]:g} and {USUAL[1]:g} times it"
         text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
+
+
+def _again(cut: CutEvidence, learnt: Posterior) -> list[CutEvidence]:
+    """The same cut as it was made at other times."""
+    return [other for other in learnt.cuts if other is not cut and cut.is_again(other)]
 
 
 def _contradiction_remark(contradicting: ContradictingCut) -> Remark:

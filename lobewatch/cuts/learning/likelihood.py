@@ -21,6 +21,8 @@ EDGE = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
 MISJUDGED = 0.03
 """Share of cuts that are written down as what they are not; chosen: 2.7 % are heard wrong, some are typed wrong."""
+UNTOLD = 0.06
+"""The same of chatter of which no frequency was told, so that nothing speaks for it but the word; chosen."""
 FREQUENCY = 0.01
 """Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
 STRANGE = 0.05
@@ -109,8 +111,9 @@ def _words(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]
     ones = np.ones(prediction.excess.shape)
     if not cut.chatters:
         return MISJUDGED * ones, (1 - MISJUDGED) * ones
-    sound = np.exp(_log_of_sound(cut, prediction))
-    return (1 - MISJUDGED) * sound, MISJUDGED * (0.5 if cut.has_frequency else 1.0) * ones
+    if not cut.has_frequency:
+        return (1 - UNTOLD) * ones, UNTOLD * ones
+    return (1 - MISJUDGED) * _sound(cut, prediction), MISJUDGED / 2 * ones
 
 
 def most_likely(cut: CutEvidence) -> float:
@@ -122,10 +125,8 @@ def most_likely(cut: CutEvidence) -> float:
     return float(log_likelihood(cut, same)[0])
 
 
-def _log_of_sound(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Logarithm of the likelihood of kind and frequency, where it chatters; 0 where neither was told."""
-    if not cut.has_frequency:
-        return np.zeros(prediction.excess.shape)
+def _sound(cut: CutEvidence, prediction: CutPrediction) -> Floats:
+    """Likelihood of kind and frequency that were told, where it chatters."""
     alike = prediction.flip == (cut.word == "flip")
     kind = np.where(alike, 1 - OTHER_KIND, OTHER_KIND)
     wide = FREQUENCY * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
@@ -133,7 +134,7 @@ def _log_of_sound(cut: CutEvidence, prediction: CutPrediction) -> Floats:
     near = np.exp(-((distances / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
     anywhere = 2 / cut.tooth_frequency
     near = np.mean(np.where(np.isfinite(distances), near, anywhere), axis=0)
-    return np.asarray(np.log(kind * ((1 - STRANGE) * near + STRANGE * anywhere) / anywhere))
+    return np.asarray(kind * ((1 - STRANGE) * near + STRANGE * anywhere) / anywhere)
 
 
 def _folded_chatter(cut: CutEvidence) -> Floats:

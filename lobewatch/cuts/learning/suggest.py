@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.cuts.learning.contradicting import chance_wrong
 from lobewatch.cuts.learning.cut_again import cut_again, is_taken
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, floor_depth
@@ -25,9 +26,9 @@ CAREFUL, DEEPER = 0.2, 1.5
 """Greatest chance of chatter of a first test cut that is deeper than so many times the depth of its program."""
 CAREFULLY = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
 """Shares of a depth that are looked at in turn for such a first cut; chosen."""
-WORTH_A_CUT = 0.06
-"""Chance that a word is wrong, from which it is asked for again while another cut is left; chosen: the last of five
-cuts gains 4 % of the optimum, a word that is wrong costs 20 %."""
+WORTH_A_CUT = 0.05
+"""Chance that a word "chatter" is wrong, from which it is asked for again while another cut is left; chosen, see
+docs/cuts.md: the last of five cuts gains 4 % of the optimum, a word that is wrong costs 20 %."""
 GAINED = 0.005
 """Share of the best removal rate so far below which an expected gain is none; chosen."""
 LEAST_RATE = 1e-3
@@ -76,9 +77,9 @@ def suggest(
     proposes; what is chosen was judged by semi-discretisation. programmed: depth of the program (m); the first cut is
     about as deep, or chatters hardly.
     """
-    best, draws = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.sample(DRAWS)
-    chart = LimitCharts.of(draws, grid)
-    if (again := _asked_again(chart, learnt, cuts, left, doubted)) is not None:
+    best, few = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.drawn(DRAWS)
+    draws, chart = few.draws, LimitCharts.of(few.draws, grid)
+    if (again := _asked_again(few, [cut for cut in cuts if grid.holds(cut.speed_rpm)], left, doubted)) is not None:
         return replace(_judged(grid, again.speed_rpm, again.depth, best, draws), repeats=again.id)
     true = np.maximum(chart.truly_best(cuts), best_removal_rate([cut for cut in cuts if cut not in learnt.cuts]))
     least = GAINED * max(best, LEAST_RATE * float(np.max(chart.chips)))
@@ -96,12 +97,18 @@ def suggest(
 
 
 def _asked_again(
-    chart: LimitCharts, learnt: Posterior, cuts: Sequence[CutEvidence], left: int, doubted: Collection[CutEvidence]
+    few: Posterior, cuts: Sequence[CutEvidence], left: int, doubted: Collection[CutEvidence]
 ) -> CutEvidence | None:
     """The cut whose word is to be asked for again; None where all are sure enough, or were asked for."""
-    unsure = [cut for cut in cuts if cut in learnt.cuts and np.mean(chart.contradicts(cut)) > WORTH_A_CUT]
-    asked = [*doubted, *(unsure if left > 1 else ())]
-    return cut_again(cuts, [cut for cut in asked if chart.grid.holds(cut.speed_rpm)])
+    again = cut_again(cuts, doubted)
+    if again is not None or left <= 1:
+        return again
+    once = [cut for cut in cuts if cut in few.cuts and cut_again(cuts, [cut])]
+    chances = [chance_wrong(few.predict(cut)) for cut in once]
+    if max(chances, default=0.0) <= WORTH_A_CUT:
+        return None
+    most = once[int(np.argmax(chances))]
+    return most if most.chatters else None
 
 
 def _likely_stable(

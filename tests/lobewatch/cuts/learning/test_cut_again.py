@@ -83,3 +83,24 @@ def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_le
     twice = [*cuts, replace(cuts[1], id="c4")]
     third = suggest(mill.prior.learn_from_all(twice), mill.grid, twice, 2)
     assert third is None or third.repeats != "c2"
+
+
+def test_chatter_is_asked_for_again_where_no_frequency_speaks_for_it(mill: Mill) -> None:
+    """6 % less deep than the limit, at the frequency that the spindle has there."""
+    chatter = mill.chatter(12000)
+    told = replace(chatter, depth=0.85 * chatter.depth, id="c1")
+    for cut, repeats in ((told, ""), (replace(told, frequency=math.nan), "c1")):
+        found = suggest(mill.prior.learn_from(cut), mill.grid, [cut], 3)
+        assert found is not None
+        assert found.repeats == repeats
+
+
+def test_chatter_is_not_asked_for_again_where_a_stable_word_is_more_doubtful(mill: Mill) -> None:
+    """Stable between two cuts that chatter, and deeper."""
+    first, last = (replace(mill.chatter(speed), frequency=math.nan) for speed in (12000, 12400))
+    between = CutEvidence(mill.cut, 12200, 1.1 * first.depth, "stable")
+    cuts = [first, between, last]
+    found = suggest(mill.prior.learn_from_all(cuts), mill.grid, cuts, 2)
+    assert found is not None
+    assert found.repeats == ""
+    assert (found.speed_rpm, found.depth) not in [(cut.speed_rpm, cut.depth) for cut in cuts]

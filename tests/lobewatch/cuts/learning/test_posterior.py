@@ -10,7 +10,7 @@ import pytest
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.learning.contradicting import Contradiction, contradictions
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predict_cut
+from lobewatch.cuts.learning.likelihood import MISJUDGED, UNTOLD, log_likelihood, most_likely, predict_cut
 from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.machine.journal.heard_cut import CutWord
@@ -39,9 +39,9 @@ def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
 def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_misheard(mill: Mill) -> None:
     stable, chatters = (CutEvidence(mill.cut, 12000, 1e-5, word) for word in ("stable", "chatter"))
     assert likelihood(stable, mill.prior) == pytest.approx(1 - MISJUDGED)
-    assert likelihood(chatters, mill.prior) == pytest.approx(MISJUDGED)
+    assert likelihood(chatters, mill.prior) == pytest.approx(UNTOLD)
     deep = replace(chatters, depth=0.05)
-    assert likelihood(deep, mill.prior) == pytest.approx(1 - MISJUDGED)
+    assert likelihood(deep, mill.prior) == pytest.approx(1 - UNTOLD)
 
 
 @pytest.mark.parametrize(

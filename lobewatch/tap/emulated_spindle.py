@@ -45,10 +45,8 @@ HIGHER = 0.05
 """Relative distance of the frequencies along the second axis of a spindle whose modes lie askew."""
 RIGID = 1e30
 """Modal stiffness of what does not move (N/m)."""
-AHEAD = 8
-"""Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
 PATIENCE = 0.2
-"""Time that it waits for a host that asks for no more (s); then it sends a block all the same."""
+"""Time that a device in step waits for a host that asks for no more (s); then it sends a block all the same."""
 
 
 @dataclass(frozen=True)
@@ -113,38 +111,38 @@ def emulator(structure: Structure, random: np.random.Generator, *, realtime: boo
 def device_in_step(
     structure: Structure, random: np.random.Generator, *, tcp: bool = False
 ) -> Iterator[Callable[[], TapsSource]]:
-    """Somebody taps this structure on a TAPS/1 device that runs hardly ahead of its host; yields what opens it.
+    """Somebody taps this structure on a TAPS/1 device that waits for its host; yields what opens it.
 
-    The reader of a port takes all that comes while a hit is judged, and most of it would be thrown away: samples that
-    nobody asks for are not worked out.
+    Device and host work in turns: two threads that work at once hand the interpreter over at each step, and the reader
+    of a port takes all that comes while a hit is judged, most of which would be thrown away.
     """
-    hammered, room = HammeredStructure(structure, SAMPLE_RATE, random, Hammering()), threading.Semaphore(AHEAD)
+    hammered, wanted = HammeredStructure(structure, SAMPLE_RATE, random, Hammering()), threading.Semaphore()
 
     def signal(first_scan: int, n_scans: int) -> NDArray[np.float64]:
-        room.acquire(timeout=PATIENCE)
+        wanted.acquire(timeout=PATIENCE)
         return hammered(first_scan, n_scans)
 
     with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, tcp=tcp) as device:
-        yield lambda: _SourceInStep(device.port, room)
+        yield lambda: _SourceInStep(device.port, wanted)
 
 
 class _SourceInStep(TapsSource):
-    """Makes room for another block whenever one is asked for; they are longer than where somebody watches."""
+    """Wants another block when the one before is done with; they are longer than where somebody watches."""
 
     _frame_time = 0.06
 
-    def __init__(self, port: str, room: threading.Semaphore) -> None:
+    def __init__(self, port: str, wanted: threading.Semaphore) -> None:
         super().__init__(port)
-        self._room = room
+        self._wanted = wanted
 
     def blocks(self) -> Iterator[Block]:
         for block in super().blocks():
-            self._room.release()
             yield block
+            self._wanted.release()
 
     def close(self) -> None:
+        self._wanted.release()
         super().close()
-        self._room.release()
 
 
 def emulate_machine(

@@ -10,7 +10,7 @@ import functools
 import hashlib
 import io
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Channel, tap_direction
+from acquisition.channel import tap_direction
 from acquisition.errors import DataError
+from acquisition.files.raw_hits import PACKED, SetUp, dataset, plain, read_raw, write_hits, write_raw, write_set_up
 from acquisition.files.readers.hdf5_in import hdf5_in
 from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
@@ -38,7 +39,6 @@ VERSION, WITHOUT_FORCE = 1, 2
 """Version of a file, and that of one without force and FRF, which older programs cannot read."""
 CHUNK = 1_000_000
 """Bytes of a replayed file that are packed together."""
-PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
@@ -65,7 +65,7 @@ def tap_content(tap: TapTest) -> bytes:
     with hdf5_in(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=_version(tap.hits), software=_software(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
-        _write_raw(file, tap.hits, tap.flags)
+        write_raw(file, tap.hits, tap.flags)
         if tap.frf is not None:
             _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
@@ -94,7 +94,7 @@ def read_tap(path: Path | str) -> TapTest:
     """A tap test from its file; DataError where it is none or damaged."""
     with _open(Path(path)) as file:
         try:
-            hits, flags = _read_raw(file)
+            hits, flags = read_raw(file)
             return TapTest(
                 file.attrs["id"], _read_circumstances(file), _read_frf(file), hits, flags, _read_source(file)
             )
@@ -105,22 +105,32 @@ def read_tap(path: Path | str) -> TapTest:
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
     """One hit of a test in progress, as each sensor felt it, and the verdict on it, sealed; on the disk when this
     returns, else OSError."""
+    memory = io.BytesIO(_without_hit(circumstances, _version([hit]), SetUp.of(hit)))
+    with hdf5_in(memory, "r+") as file:
+        file.attrs["file"] = Path(path).name
+        write_hits(file["raw"], [hit], [flags])
+        if hit.beside is not None:
+            write_raw(file.create_group("beside"), [hit.beside], [flags])
+    atomic_write(Path(path), sealed(memory.getvalue()))
+
+
+@functools.lru_cache(maxsize=1)
+def _without_hit(about: Circumstances, version: int, set_up: SetUp) -> bytes:
+    """The file of a hit of this test before the hit is in it, which is a third of the work."""
     memory = io.BytesIO()
     with hdf5_in(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=_version([hit]), file=Path(path).name)
-        _write_circumstances(file, circumstances)
-        _write_raw(file, [hit], [flags])
-        if hit.beside is not None:
-            _write_raw(file.create_group("beside"), [hit.beside], [flags])
-    atomic_write(Path(path), sealed(memory.getvalue()))
+        file.attrs.update(format=FORMAT, version=version)
+        _write_circumstances(file, about)
+        write_set_up(file.create_group("raw"), set_up)
+    return memory.getvalue()
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
     """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then; DataError as read_tap."""
     with _open(Path(path)) as file:
-        hits, flags = _read_raw(file)
+        hits, flags = read_raw(file)
         if "beside" in file:
-            pairs = zip(hits, _read_raw(file["beside"])[0], strict=True)
+            pairs = zip(hits, read_raw(file["beside"])[0], strict=True)
             hits = tuple(replace(hit, beside=beside) for hit, beside in pairs)
         return hits, _read_circumstances(file), flags
 
@@ -171,73 +181,10 @@ def _read_circumstances(file: h5py.File) -> Circumstances:
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
     text = file["machine_toml"][()].decode()
-    under = Conditions.of(_plain(file.attrs))  # none in the first files
+    under = Conditions.of(plain(file.attrs))  # none in the first files
     return Circumstances(
         created=created, direction=direction, machine_toml=text, device=device, conditions=under, **named
     )
-
-
-def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:
-    group.create_dataset(name, data=data, **options).attrs["units"] = units
-
-
-def _write_raw(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
-    if not hits:
-        return
-    raw = file.create_group("raw")
-    first = hits[0]
-    if first.codes is not None and first.channels is not None:
-        word = np.int16 if max(channel.adc_bits for channel in first.channels) <= 16 else np.int32
-        codes = np.stack([hit.codes for hit in hits if hit.codes is not None]).astype(word)
-        _dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **PACKED)
-        for i, channel in enumerate(first.channels):
-            raw.create_group(f"channel_{i}").attrs.update(
-                {field.name: getattr(channel, field.name) for field in fields(Channel)}
-            )
-    else:
-        samples = np.stack([hit.signals for hit in hits])
-        _dataset(
-            raw,
-            "samples",
-            samples,
-            "N, m/s^2" if first.has_force else "m/s^2",
-            chunks=(1, *samples.shape[1:]),
-            **PACKED,
-        )
-    raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
-    _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
-    _dataset(raw, "overload", [hit.overload for hit in hits], "1")
-    _dataset(raw, "accepted", [not flag for flag in flags], "1")
-    raw["verdict"] = [flag.words for flag in flags]
-
-
-def _read_raw(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
-    if "raw" not in file:
-        return (), ()
-    raw = file["raw"]
-    rate, before = float(raw.attrs["sample_rate_hz"]), int(raw.attrs["pre_trigger_samples"])
-    lost = raw["lost_scans"][()].tolist()
-    overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
-    flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
-    if "codes" in raw:
-        rows = raw["codes"][()]
-        channels = tuple(_read_channel(raw[f"channel_{i}"]) for i in range(rows.shape[1]))
-        coded = zip(rows, lost, overload, strict=True)
-        return tuple(Hit.from_codes(codes, channels, rate, before, n, mask) for codes, n, mask in coded), flags
-    sampled = zip(raw["samples"][()], lost, overload, strict=True)
-    nothing = np.empty(0)
-    return tuple(
-        Hit(signals[0] if len(signals) > 1 else nothing, signals[-1], rate, before, n, overload=mask)
-        for signals, n, mask in sampled
-    ), flags
-
-
-def _read_channel(group: h5py.Group) -> Channel:
-    return Channel(**_plain(group.attrs))
-
-
-def _plain(attributes: h5py.AttributeManager) -> dict[str, Any]:
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
 
 
 def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> None:
@@ -254,11 +201,11 @@ def _write_lines(
     group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
 ) -> None:
     """Arrays over frequency, which becomes their dimension scale."""
-    _dataset(group, "frequency", frequency, "Hz", **PACKED)
+    dataset(group, "frequency", frequency, "Hz", **PACKED)
     group["frequency"].make_scale("frequency")
     for name, (data, units) in arrays.items():
         if data is not None:
-            _dataset(group, name, data, units, **PACKED)
+            dataset(group, name, data, units, **PACKED)
             group[name].dims[0].attach_scale(group["frequency"])
 
 

@@ -41,7 +41,7 @@ from acquisition import (
     write_hit,
     write_tap,
 )
-from acquisition.files.tap_file import as_written
+from acquisition.files.tap_file import as_written, read_hit_name
 
 ABOUT = Circumstances(
     "mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n", "DI-4108"
@@ -149,6 +149,19 @@ def test_a_hit_in_progress_is_read_back_with_its_circumstances(tap: TapTest, tmp
     assert same_hit(hit, tap.hits[0])
     assert about == ABOUT
     assert flags == (HitFlags.UNDONE,)
+
+
+def test_hits_in_progress_of_two_set_ups_keep_each_their_own(tap: TapTest, tmp_path: Path) -> None:
+    first, second = tap.hits[:2]
+    bare, later = replace(second, codes=None, channels=None, sample_rate=5120.0), replace(ABOUT, operator="Ida")
+    written = [(first, ABOUT), (second, ABOUT), (second, later), (bare, later), (first, ABOUT)]
+    for number, (hit, about) in enumerate(written):
+        write_hit(tmp_path / f"{number:04d}.h5", hit, about, HitFlags.OK)
+    for number, (hit, about) in enumerate(written):
+        (read,), circumstances, _ = read_tap_hits(tmp_path / f"{number:04d}.h5")
+        assert same_hit(read, hit)
+        assert circumstances == about
+        assert read_hit_name(tmp_path / f"{number:04d}.h5") == f"{number:04d}.h5"
 
 
 @pytest.mark.parametrize("place", [0, 100, 4000, -200, -30])

@@ -150,6 +150,7 @@ def main() -> None:
     parser.add_argument("headings", nargs="*", metavar="HEADING", help="these only, nothing is written")
     wanted = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the commands that are started
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # what pip installs has its byte code
     run_of, before = about(), read_stated(STATED)
     with threadpool_limits(1):
         results = measured(wanted.headings or list(BENCHES), wanted.quick)

@@ -50,6 +50,12 @@ SIGNALS = "leekunhwee/Vibration-Signal-Processing"
 WING = "Renkinios/MECA0062-1_vibration_testing/data"
 PLATE = "kobyhuazai/Vibration"
 TESTING = "Vibration-Testing/vibrationtesting/vibrationtesting/data"
+BLADE = "csatobalint/modal_analysis_hw/blade_measurements"
+HAMMER = "Sidwrittenallover/Experimental_Modal_Analysis/data"
+VIBROMETER = "joaonunovalente/vibrometer-analysis"
+OLD_TESTING = "Vibration-Testing/Vibration-Testing-Matlab"
+SHM = "High-Rate-SHM-Working-Group"
+PLATE_FRF = "MAT_001_FRF_Channel_8"
 CHANNELS = '--columns "time [s],acceleration [g],time [s],force [N]"'
 FILES = (
     PublicFile(f"{DYNAMICS}/FrequencyDomain/Milling/General/FRF[XY].frf"),
@@ -80,6 +86,36 @@ FILES = (
     PublicFile(f"{TESTING}/mckiddat.mat", "--response 1 --unit m/N"),
     PublicFile(f"{TESTING}/testdata.mat", '--columns "time [s]=t,force [N]=xn,acceleration [g]=yn"'),
     PublicFile("TimVrtac/Impact-testing-DS/test_DS/F?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 20000'),
+    PublicFile(
+        "TimVrtac/Impact-testing-v2/series_meas/?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 51200'
+    ),
+    PublicFile(f"{BLADE}/K?_H221.txt"),
+    PublicFile(f"{BLADE}/M1[13][268].txt"),
+    PublicFile(f"{BLADE}/M110.txt", '--sensitivity "10.2 mV/g"'),
+    PublicFile(f"{HAMMER}/imp_ham_set?_no*mass.CSV", '--columns "time [s],acceleration [cm/s^2],-,-,-,force [N]"'),
+    PublicFile(f"{HAMMER}/[Ii]mp_ham_calib_set?.CSV", '--columns "time [s],acceleration [cm/s^2],force [N]"'),
+    PublicFile(f"{VIBROMETER}/*reflection/data/N?_*.mat", "--response 1 --unit m/s^2/N"),
+    PublicFile(f"{VIBROMETER}/*EGS*/data/medida?.mat", "--response 1 --unit m/s^2/N --conjugate"),
+    PublicFile(
+        "WangSuhan/Modal-identification-of-plate/20201016/*.mat",
+        f'--columns "frequency [Hz]={PLATE_FRF}:1,frf={PLATE_FRF}:2" --unit m/s^2/N',
+    ),
+    PublicFile("torebutlin/pydvma/data/examples/ruler_grid_acc_3.mat", "--response 1 --unit m/s^2/N"),
+    PublicFile(f"{OLD_TESTING}/freqdemo.mat", '--columns "frequency [Hz]=w,frf=ts" --unit m/N'),
+    PublicFile(f"{OLD_TESTING}/vtestingdata1.mat", '--columns "time [s]=t,force [N]=y:1,displacement [m]=y:2"'),
+    PublicFile(f"{OLD_TESTING}/hkdat1.mat"),
+    PublicFile("KIT-FAST/modalAnalysis-OMA-EMA/modalAnalysis/records/EMA_records_demo.mat", "--response 1 --unit m/N"),
+    PublicFile(
+        "ual-arm/vibration-test-matlab/vib-test-toolkit/*.mat",
+        '--columns "frequency [Hz]=DATOS:1,frf=DATOS:2" --unit m/s^2/N',
+    ),
+    PublicFile("KuanHsienn/Vibrometer-Plotter/*.uff"),
+    PublicFile(f"{SHM}/Dataset-7-forced-vibration-and-shock/data/testset-B/*/*/*.lvm"),
+    PublicFile(f"{SHM}/Dataset-11-*/Data/*/*.lvm", '--skip 1 --columns "time [s],force [N],acceleration [g]"'),
+    PublicFile(f"{SHM}/Dataset-5-Extended-Impact-Testing/data/dataset-1/data-1/*/acc_*.txt"),
+    PublicFile("OWI-Lab/sdypy_io_tdms/tests/static/good/*.tdms"),
+    PublicFile("adamreeve/npTDMS/nptdms/test/data/raw1.tdms"),
+    PublicFile("EnriqueGarMac/ModalAnalysis/Class_III_Signal processing/Phyphox/Enrique.csv"),
     PublicFile("JiaxinZhong/PulseLabshop/matlab/data/pls?.txt"),
     PublicFile("Collins-Ogbodo/Experimental-Modal-Analysis/Test/H_simulated.npy"),
 )

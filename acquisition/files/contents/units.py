@@ -83,6 +83,8 @@ _LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
 _TURNS = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
 """Turns a minute as they are written: minutes are no unit otherwise ("x_min" is the least)."""
+_MS = re.compile(r"\bms\^?-([12])\b")
+"""Metres a second, or a second squared, without a sign between: no unit of a tap test is a power of a millisecond."""
 _PLAIN = str.maketrans({"µ": "u", "μ": "u", "¹": "^1", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
@@ -108,6 +110,7 @@ def unit_of(text: str) -> Unit | None:
         .replace("-^", "^-")
         .replace("**", "^")
     )
+    plain = _MS.sub(r"m/s^\1", plain)
     plain = "rpm" if _TURNS.fullmatch(plain) else plain
     try:
         tokens = _tokens(plain)

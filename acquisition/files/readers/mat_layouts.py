@@ -189,7 +189,7 @@ def _frf_signals(
 
 def _over_time(v: Mapping[str, Any]) -> Contents | None:
     """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell. What
-    else stands in the file has no role, so that `--columns` can have it."""
+    else stands in the file has no role, so that `--columns` can have it; an FRF is taken before signals of no name."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
     rate = next((float(v[name]) for name in v if _RATE.fullmatch(name) and _is_number(v[name])), None)
     axis = next((name for name in arrays if _TIME.fullmatch(name) and _has_company(name, arrays)), None)
@@ -200,9 +200,11 @@ def _over_time(v: Mapping[str, Any]) -> Contents | None:
     signals += [
         Signal(name, values, role_of(name, ""), rate=rate) for name, values in _of_length(arrays, n) if name != axis
     ]
-    if not signals:
+    others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
+    beside = list(columns_of(others))
+    has_frf = any(signal.role == "frf" for signal in beside)
+    if not signals or (has_frf and not any(signal.role in ("force", "response") for signal in signals)):
         return None
-    beside = columns_of({name: value for name, value in v.items() if n not in np.shape(value) or name not in arrays})
     return Contents((*signals, *(replace(signal, role="") for signal in beside)))
 
 

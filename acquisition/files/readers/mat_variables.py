@@ -120,7 +120,9 @@ def _plain(node: Any) -> Any:
 
 
 def _packed(value: object) -> object:
-    """What MessagePack has no form of."""
+    """What MessagePack has no form of; structs that stand in matrices have their names beside them."""
+    if hasattr(value, "_fieldnames"):
+        return {name: field for name, field in vars(value).items() if name != "_fieldnames"}
     if not isinstance(value, np.ndarray | np.generic) or value.dtype.kind not in "biufcSUO":
         return None
     if value.dtype.kind == "O":

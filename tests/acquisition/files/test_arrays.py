@@ -123,10 +123,26 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
 def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> None:
     path, time = tmp_path / "a.mat", np.arange(200.0)
     scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
-    said = complaint(path)
-    assert f"t (200), u (200), y (200), w ({F.size}), ts ({F.size})" in said
-    assert "length" not in said
+    assert '--columns "frequency [Hz]=w,frf=ts", or [rad/s]' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
+    scipy.io.savemat(path, {"fs": 1.0, "u": time, "force": time, "w": 2 * np.pi * F, "ts": H})
+    said = complaint(path)
+    assert f"u (200), force (200), w ({F.size}), ts ({F.size})" in said
+    assert "differ in length" not in said
+    assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
+
+
+def test_structs_in_a_matrix_as_siglab_writes_them(tmp_path: Path) -> None:
+    path, cells = tmp_path / "a.vna", np.empty((2, 3), dtype=object)
+    for i, j in np.ndindex(2, 3):
+        cells[i, j] = {"xfer": j * H if (i, j) in ((0, 1), (0, 2)) else [], "coh": []}
+    labels = {"SampleRate": 2560, "ChanStat": np.eye(3, 6)}
+    scipy.io.savemat(path, {**labels, "SLm": {"xcmeas": cells, "fdxvec": F}}, appendmat=False)
+    said = complaint(path)
+    assert "1 SLm.xcmeas:1:2.xfer, 2 SLm.xcmeas:1:3.xfer" in said
+    assert '"frequency [Hz]=SLm.fdxvec,frf=SLm.xcmeas:1:2.xfer"' in said
+    columns = ("frequency [Hz]=SLm.fdxvec", "frf [(ms-2)/N]=SLm.xcmeas:1:3.xfer")
+    assert read_frf(path, Description(columns=columns)).accelerance == pytest.approx(2 * H)
 
 
 @pytest.mark.parametrize("name", ["freq_kHz", "freq_rad_s"])

@@ -12,6 +12,8 @@ from acquisition.files.contents.contents import Signal
 
 MOST_COLUMNS = 64
 """Columns of an array that are told one by one."""
+FEWEST_LINES = 8
+"""Complex numbers that may be an FRF; fewer are poles."""
 
 
 def columns_of(variables: Mapping[str, Any], glue: str = ".", prefix: str = "") -> Iterator[Signal]:
@@ -38,6 +40,6 @@ def _of_array(name: str, value: NDArray[Any]) -> Iterator[Signal]:
 
 def _signal(name: str, column: NDArray[Any]) -> Signal:
     """Numbers that have no imaginary part at all are real: MATLAB has one type for all columns of a matrix."""
-    if not np.iscomplexobj(column):
-        return Signal(name, column)
-    return Signal(name, column, "frf") if np.any(column.imag) else Signal(name, column.real)
+    if not np.iscomplexobj(column) or not np.any(column.imag):
+        return Signal(name, column.real)
+    return Signal(name, column, "frf" if column.size >= FEWEST_LINES else "")

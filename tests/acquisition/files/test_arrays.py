@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import struct
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -125,6 +126,9 @@ def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> No
     scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
     assert '--columns "frequency [Hz]=w,frf=ts", or [rad/s]' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
+    poles = np.array([-1 + 9j, -1 - 9j])
+    scipy.io.savemat(path, {"fs": 1.0, "u": time, "y": time, "poles": poles})
+    assert "what its columns are (u (200), y (200), poles (2))" in complaint(path)
     scipy.io.savemat(path, {"fs": 1.0, "u": time, "force": time, "w": 2 * np.pi * F, "ts": H})
     said = complaint(path)
     assert f"u (200), force (200), w ({F.size}), ts ({F.size})" in said
@@ -163,6 +167,21 @@ def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
     assert "which force of force:1, force:2 goes with which response (--columns" in complaint(two)
     columns = ("force [N]=force:2", "acceleration [g]=acc:2")
     assert len(read_hits(two, Description(columns=columns, rate=2000))) == 1
+
+
+def test_objects_of_matlab_are_passed_over(tmp_path: Path) -> None:
+    """Source: MAT-File Format (The MathWorks), level 5; class 17 is an object that MATLAB alone knows."""
+
+    def element(kind: int, content: bytes) -> bytes:
+        return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"f": F, "H": H})
+    texts = b"".join(element(1, text) for text in (b"T", b"MCOS", b"table"))
+    number = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, b"")
+    inner = element(14, number + element(6, struct.pack("<I", 1)))
+    path.write_bytes(path.read_bytes() + element(14, element(6, struct.pack("<II", 17, 0)) + texts + inner))
+    assert is_h(read_frf(path, Description(unit="m/N")))
 
 
 def test_what_stands_in_cells_has_numbers(tmp_path: Path) -> None:

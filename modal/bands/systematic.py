@@ -9,7 +9,7 @@ import numpy as np
 
 from modal.bands.extraction import Array, ComplexArray, FittedBand
 from modal.bands.left_about import left_about
-from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, values_nearby
+from modal.fitting import MOST_TERMS, BandFit, values_nearby
 
 SIGNIFICANT = 3.0
 """Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
@@ -19,6 +19,8 @@ CHANCE = 2.0
 """Times the noise that may be left about a mode where noise is uneven, and nothing else is there."""
 ROUNDING = 1e-7
 """Share of what was measured below which a residual means nothing."""
+FEWER = 2
+"""Residual terms that the fit is tried without again; without more it may follow no mode at all."""
 PARTS = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
 """Of the lines of a band, that the fit is tried on again."""
 
@@ -87,7 +89,7 @@ def _others(band: FittedBand) -> Iterator[tuple[Array, ComplexArray]]:
     """Poles and constants of the same modes with other residual terms, and on parts of the lines."""
     data, n = band.data, band.data.frequency.size
     everything = slice(0, n)
-    tries = [(everything, terms) for terms in range(LEAST_TERMS - 2, MOST_TERMS + 1) if terms != band.terms]
+    tries = [(everything, terms) for terms in range(band.terms - FEWER, MOST_TERMS + 1) if terms != band.terms]
     for part, terms in [*tries, *((slice(round(low * n), round(high * n)), band.terms) for low, high in PARTS)]:
         values = values_nearby(band.fit, data.frequency[part], data.own[:, part], data.weight[:, part], terms)
         if values is not None:

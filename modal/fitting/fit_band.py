@@ -134,7 +134,7 @@ def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int
         if not np.isfinite(state.cost):
             break
         step, gain, promise = _step(state, damping)
-        size = float(np.max(np.abs(step), initial=0.0))
+        size = float(np.abs(step).max(initial=0.0))
         if gain < GAINED * state.cost / state.freedom or size < CONVERGED:
             return state, True
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
@@ -152,7 +152,7 @@ def _step(state: FitAtPoles, damping: float) -> tuple[Array, float, float]:
     """Damped Gauss-Newton step in units of the scale, shape (k,), the squared change of the model that it makes to
     first order, and the fall of the cost that it promises."""
     gram, gradient = state.gram, state.gradient
-    norm = np.sqrt(np.diagonal(gram))
+    norm = np.sqrt(gram.diagonal())
     scaled = gram / (norm[:, np.newaxis] * norm)
     scaled.flat[:: norm.size + 1] += damping
     step = np.linalg.solve(scaled, -gradient / norm) / norm

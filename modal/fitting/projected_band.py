@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,29 +40,26 @@ class ProjectedBand:
         return np.tile(~self.held, 2)
 
     @cached_property
+    def _root(self) -> ComplexArray:
+        """i f, (n,)."""
+        return np.asarray(1j * self.frequency)
+
+    @cached_property
     def _both(self) -> Array:
         """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
         return np.tile(self.weight, 2)[:, np.newaxis]
 
     def at(self, poles: Array, is_complex: bool) -> FitAtPoles:
         """The best modal constants at these poles, (2, m)."""
-        curves = _curves(self.frequency, poles)
-        columns = np.concatenate([curves.curve, curves.turn * curves.curve]) if is_complex else curves.curve
-        q, inverse = _orthonormal(self._weighted(split(columns)))
+        m = poles.shape[1]
+        rows = _without(self.bases, self._both * _rows(self._root, poles))
+        q, inverse = _orthonormal(rows[:, : 2 * m if is_complex else m])
         part = self.data @ q
-        left = (self.data - part @ q.mT)[:, 0]
-        linear = (part @ inverse.mT)[:, 0]
+        left = self.data - part @ q.mT
+        linear = part @ inverse.mT
         unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
-        slope = partial(self._slope, curves, linear)
-        return FitAtPoles(poles, self._free, q, inverse, linear, left, unknowns, slope)
-
-    def _slope(self, curves: _Curves, linear: Array) -> Array:
-        slope = self._weighted(_slope(curves, linear[..., np.newaxis]))
-        return slope if np.all(self._free) else slope[:, self._free]
-
-    def _weighted(self, rows: Array) -> Array:
-        """What residual terms leave of rows, (k, 2 n) or (p, k, 2 n), times the weights of each FRF, (p, k, 2 n)."""
-        return _without(self.bases, self._both * rows)
+        squares = rows[:, 2 * m :].reshape(len(rows), 2, m, -1)
+        return FitAtPoles(poles, self._free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
 
 
 def projected_band(
@@ -114,53 +111,26 @@ def _orthonormal(rows: Array) -> tuple[Array, Array]:
     gram = rows @ rows.mT
     with contextlib.suppress(np.linalg.LinAlgError):
         lower = np.linalg.cholesky(gram)
-        apart = np.diagonal(lower, axis1=1, axis2=2) ** 2 > APART**2 * np.diagonal(gram, axis1=1, axis2=2)
-        if np.all(apart):
+        apart = lower.diagonal(axis1=1, axis2=2) ** 2 > APART**2 * gram.diagonal(axis1=1, axis2=2)
+        if apart.all():
             inverse = np.linalg.inv(lower).mT
             return rows.mT @ inverse, inverse
     q, triangle = np.linalg.qr(rows.mT)
     return q, np.linalg.inv(triangle)
 
 
-@dataclass(frozen=True, eq=False)
-class _Curves:
-    """Shapes of m modes over n lines, each (m, n) or (m, 1)."""
+def _rows(root: ComplexArray, poles: Array) -> Array:
+    """Modes of constants 1, of constants i, and their slopes by both parts of the pole, (4 m, 2 n); root is i f, (n,).
 
-    r: Array
-    zeta: Array
-    root: Array
-    """sqrt(1 - zeta^2)."""
-    curve: ComplexArray
-    """Of a modal constant of 1."""
-    turn: ComplexArray
-    """Times curve: of a modal constant of i."""
-
-
-def _curves(frequency: Array, poles: Array) -> _Curves:
-    fn, zeta = poles[:, :, np.newaxis]
-    r = frequency / fn
-    root = np.sqrt(1 - zeta**2)
-    turn = (zeta + 1j * r) / root
-    return _Curves(r, zeta, root, 1 / (1 - r**2 + 2j * zeta * r), turn)
-
-
-def _slope(c: _Curves, linear: Array) -> Array:
-    """Of modes by scaled frequency and damping, (p, 2 m, 2 n), for the parts of their constants, (p, m or 2 m, 1).
-
-    Only the constants differ from FRF to FRF: the curves that they multiply are worked out once.
+    With lambda in Hz, h = g / (i f - lambda), g = f_n / (2 sqrt(1 - zeta^2)), and h' for its conjugate: -i (h - h'),
+    h + h', h^2 + h'^2 and i (h^2 - h'^2).
     """
-    m = c.zeta.size
-    steps = c.zeta * c.curve**2
-    by_damping = -2j * c.r * steps
-    by_frequency = -c.zeta * by_damping - 2 * c.r**2 * steps
-    both = linear[:, np.newaxis]
-    slope = both[:, :, :m] * split(np.stack([by_frequency, by_damping]))
-    if linear.shape[1] > m:
-        off = c.zeta / c.root * c.curve
-        by_frequency = by_frequency * c.turn - 1j * c.r * off
-        by_damping = by_damping * c.turn + (1 + c.turn * c.zeta / c.root) * off
-        slope += both[:, :, m:] * split(np.stack([by_frequency, by_damping]))
-    return slope.reshape(len(linear), 2 * m, -1)
+    fn, zeta = poles[:, :, np.newaxis]
+    turning = np.sqrt(1 - zeta**2)
+    pole, size = fn * (1j * turning - zeta), fn / (2 * turning)
+    here, there = size / (root - pole), size / (root - pole.conj())
+    square, of_there = here * here, there * there
+    return split(np.concatenate([1j * (there - here), here + there, square + of_there, 1j * (square - of_there)]))
 
 
 def _without(bases: Array, values: Array) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modal.bands.extraction import Array, ComplexArray, FittedBand
 from modal.bands.left_about import left_about
@@ -22,7 +23,9 @@ ROUNDING = 1e-7
 FEWER = 2
 """Residual terms that the fit is tried without again; without more it may follow no mode at all."""
 PARTS = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
-"""Of the lines of a band, that the fit is tried on again."""
+"""Of the lines of a band, that the fit is tried on again ..."""
+PEAK = 2.0
+"""... for the modes of which they hold all lines within so many half-widths; others have no peak there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +48,10 @@ def systematic(band: FittedBand) -> Systematic:
     Structure that the model lacks leaves a residual that is alike over many lines. As many of its values are
     independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
     What such structure shifts in the modes the residual does not show: each band is fitted again with fewer and more
-    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most. What
-    is left about a mode beyond twice the noise, in squares, as a share of its peak, may hide an error of four times
-    that share of its half-width, its damping ratio and its size, whatever its colour: by that the same hits differ on
-    several sensors.
+    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most; a part
+    that cuts a peak says nothing of that mode. What is left about a mode beyond twice the noise, in squares, as a share
+    of its peak, may hide an error of four times that share of its half-width, its damping ratio and its size, whatever
+    its colour: by that the same hits differ on several sensors.
     """
     fit = band.fit
     hidden = _hidden(band)
@@ -56,7 +59,7 @@ def systematic(band: FittedBand) -> Systematic:
     is_white = independent > fit.freedom * (1 - SIGNIFICANT / np.sqrt(fit.residual.size / 2))
     if is_white or leaves_rounding(band):
         return Systematic(1.0, fit.freedom, np.diag(hidden**2))
-    moved = np.array([_moved(fit, *values) for values in _others(band)]).reshape(-1, hidden.size)
+    moved = np.array(list(_moves(band))).reshape(-1, hidden.size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
     return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2 + hidden**2))
 
@@ -85,15 +88,23 @@ def _independent_values(fit: BandFit) -> float:
     return float(4 * power.sum() ** 2 / np.sum(power**2)) if power.any() else float(fit.residual.size)
 
 
-def _others(band: FittedBand) -> Iterator[tuple[Array, ComplexArray]]:
-    """Poles and constants of the same modes with other residual terms, and on parts of the lines."""
-    data, n = band.data, band.data.frequency.size
+def _moves(band: FittedBand) -> Iterator[Array]:
+    """Changes of the same modes with other residual terms, and on parts of the lines, in the order of `BandFit`; 0 of
+    those that a part cuts."""
+    fit, data, n = band.fit, band.data, band.data.frequency.size
     everything = slice(0, n)
     tries = [(everything, terms) for terms in range(band.terms - FEWER, MOST_TERMS + 1) if terms != band.terms]
     for part, terms in [*tries, *((slice(round(low * n), round(high * n)), band.terms) for low, high in PARTS)]:
-        values = values_nearby(band.fit, data.frequency[part], data.own[:, part], data.weight[:, part], terms)
+        values = values_nearby(fit, data.frequency[part], data.own[:, part], data.weight[:, part], terms)
         if values is not None:
-            yield values
+            moved = _moved(fit, *values).reshape(-1, fit.frequency.size)
+            yield np.where(_is_cut(fit, np.delete(data.frequency, part)), 0.0, moved).ravel()
+
+
+def _is_cut(fit: BandFit, left_out: Array) -> NDArray[np.bool_]:
+    """Whether lines (Hz) that are left out belong to the peak of each mode, (m,)."""
+    distance = np.abs(left_out[:, np.newaxis] - fit.frequency)
+    return np.asarray(np.any(distance < PEAK * np.prod(fit.poles, axis=0), axis=0))
 
 
 def _moved(fit: BandFit, poles: Array, constant: ComplexArray) -> Array:

@@ -48,6 +48,18 @@ def test_what_the_model_lacks_widens_the_errors_until_they_hold_the_truth() -> N
     assert reach[0] > 5 * band.fit.standard_error[0, i]
 
 
+def test_parts_of_the_lines_that_cut_the_peak_of_a_mode_say_nothing_of_it() -> None:
+    true = [Mode(800.0 + 100.0 * i, 0.02, 3.5e7) for i in range(4)]
+    frf = noisy(true, 1e-4, 0)
+    rippled = Frf(frf.frequency, frf.receptance * (1 + 0.02 * np.sin(frf.frequency / 30)), measured_as="accelerance")
+    modes = fit_modes(rippled, band=(500.0, 1500.0))
+    assert [round(mode.frequency, -2) for mode in modes] == [800.0, 900.0, 1000.0, 1100.0]
+    shares = [mode.standard_error[2] / mode.stiffness for mode in modes]
+    assert max(shares) < 1.5 * min(shares)
+    for mode, exact in zip(modes, true, strict=True):
+        assert np.all(np.abs(values(mode) - values(exact)) < mode.quantile() * mode.standard_error)
+
+
 def test_an_frf_without_noise_is_not_taken_for_coloured() -> None:
     (band,) = extract([synthesize([MODE], np.arange(5.0, 4000.0, 5.0))]).bands
     assert systematic(band).factor == 1.0

@@ -62,9 +62,14 @@ def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
 
 def turned(matrix: Floats, feed_angle: Floats) -> Floats:
     """Matrices in the frame of the feed (..., 2, 2) as machine axes x and y see them; feed_angle (rad) broadcasts."""
-    c, s = np.cos(feed_angle), np.sin(feed_angle)
-    turn = np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=-2)
+    turn = turns(feed_angle)
     return np.asarray(np.swapaxes(turn, -1, -2) @ matrix @ turn)
+
+
+def turns(feed_angle: Floats) -> Floats:
+    """From displacements along machine axes x and y to those in the frame of the feed, shape (..., 2, 2)."""
+    c, s = np.cos(feed_angle), np.sin(feed_angle)
+    return np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=-2)
 
 
 def _in_machine(cut: Cut, shares: Floats) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.floquet.milling_rows import MillingRows
-from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.multipliers import spectral_radii
 
 LIMITS = (1e-300, 1e300)
 """Magnitudes of multipliers that are told apart."""
@@ -34,5 +34,5 @@ def growth(
     [[-0.157, -0.042]]
     """
     kind = np.float32 if tolerance >= SINGLE else np.float64
-    multipliers = largest_multipliers(rows, depth, numbers, RESIDUAL * tolerance, kind)
-    return np.asarray(np.log(np.clip(np.abs(multipliers), *LIMITS)))
+    radii = spectral_radii(rows, depth, numbers, RESIDUAL * tolerance, kind)
+    return np.asarray(np.log(np.clip(radii, *LIMITS)))

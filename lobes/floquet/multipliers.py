@@ -1,8 +1,9 @@
-"""The largest Floquet multiplier of milling."""
+"""The largest Floquet multiplier of milling, or its magnitude alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,39 +16,78 @@ from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap
 
-EFFORTS = ((10, 6), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
+EFFORTS = ((10, 8), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt; what is left in doubt goes on to the next, with the vectors that it
 has where that takes no power steps."""
 TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 HUGE = 1e6
 """Of larger multipliers only the order of magnitude is found."""
-AT_ONCE = 1_600_000
+LOOK = 4
+"""Squarings of a matrix after which what is still seen of smaller Ritz values counts as doubt: 0.5 of the largest has
+become 1.5e-5 by then."""
+MORE = 3
+"""Squarings beyond those that bring the share of a number near 1 below the tolerance: sizes of powers are off by some.
+"""
+TOGETHER = 4
+"""Squarings without a look at the size: powers of 16 of what is scaled to 1 still are numbers."""
+AT_ONCE = 800_000
 """Numbers in the matrices of the cases that are solved at once: as much as a processor keeps near."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Ritz = Callable[[Floats], tuple[Complexes, Floats]]
+"""From Hessenberg matrices (..., k + 1, k) to what is wanted of the largest Ritz value, and its residual over its size:
+that of any that may be larger by as much, since two that are nearly one look smaller until they part. A period that
+grows beyond what a number can hold has the multiplier inf."""
 
 
 def largest_multipliers(
-    rows: MillingRows,
-    depth: Floats,
-    numbers: NDArray[np.int64],
-    tolerance: float = TOLERANCE,
-    kind: type[np.floating[Any]] = np.float64,
+    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], tolerance: float = TOLERANCE
 ) -> Complexes:
     """Multiplier of largest magnitude over one tooth period, of uneven teeth over their pattern, shape (r, d).
 
     depth (r, d) in m, numbers (r,): pieces of that time (`piece_numbers`). Power steps, then Arnoldi, until the
     residual is below `tolerance` times the multiplier. Raises ArithmeticError for one that stays in doubt.
     """
+    return _largest(rows, depth, numbers, tolerance, np.float64, _value)
+
+
+def spectral_radii(
+    rows: MillingRows,
+    depth: Floats,
+    numbers: NDArray[np.int64],
+    tolerance: float = TOLERANCE,
+    kind: type[np.floating[Any]] = np.float64,
+) -> Floats:
+    """Magnitude of it, in less time: eigenvalues are taken where powers leave it in doubt. kind: precision."""
+
+    def radius(matrices: Floats) -> tuple[Complexes, Floats]:
+        value, doubt = _radius(matrices, math.ceil(-math.log2(tolerance)) + MORE)
+        left = doubt > tolerance
+        value[left], doubt[left] = _value(matrices[left])
+        return value, doubt
+
+    return np.abs(_largest(rows, depth, numbers, tolerance, kind, radius))
+
+
+def _largest(
+    rows: MillingRows,
+    depth: Floats,
+    numbers: NDArray[np.int64],
+    tolerance: float,
+    kind: type[np.floating[Any]],
+    ritz: Ritz,
+) -> Complexes:
+    """What is wanted of the largest multipliers (r, d)."""
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
         flat = np.repeat(np.arange(len(rows)), depth.shape[1])
-        found = largest_multipliers(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance, kind)
+        found = _largest(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance, kind, ritz)
         return found.reshape(depth.shape)
     multipliers = np.empty(depth.shape, dtype=np.complex128)
     for which, pieces in _alike(rows, depth, numbers):
-        multipliers[which] = _multipliers(rows[which], depth[which], pieces, tolerance, kind)
+        over_period = period_map(rows[which], depth[which], pieces, kind)
+        multipliers[which] = _multipliers(rows[which], depth[which], over_period, tolerance, ritz)
     return multipliers
 
 
@@ -69,11 +109,11 @@ def _alike(
 
 
 def _multipliers(
-    rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float, kind: type[np.floating[Any]]
+    rows: MillingRows, depth: Floats, over_period: PeriodMap | UnevenMap, tolerance: float, ritz: Ritz
 ) -> Complexes:
     """Multipliers (r, d) of rows whose tooth periods are divided alike."""
-    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, EFFORTS[0][0]).grown(EFFORTS[0][1])
-    value, doubt = _largest(space.matrix)
+    space = _Space.of(over_period, depth.shape, EFFORTS[0][0]).grown(EFFORTS[0][1])
+    value, doubt = ritz(space.matrix)
     place = np.indices(depth.shape)
     for steps, vectors in EFFORTS[1:]:
         size, error = np.abs(value[*place]), doubt[*place]
@@ -82,8 +122,9 @@ def _multipliers(
             return value
         space, place = space[left], place[:, *left, np.newaxis]
         space = (_Space.of(space.over_period, place[0].shape, steps) if steps else space).grown(vectors)
-        value[*place], doubt[*place] = _largest(space.matrix)
-    row, column = np.unravel_index(np.argmax(np.where(np.abs(value) < HUGE, doubt, 0.0)), doubt.shape)
+        value[*place], doubt[*place] = ritz(space.matrix)
+    doubt = np.where(np.abs(value) < HUGE, doubt, 0.0)
+    row, column = np.unravel_index(np.argmax(doubt), doubt.shape)
     if doubt[row, column] <= tolerance:
         return value
     raise ArithmeticError(
@@ -144,14 +185,9 @@ class _Space:
         basis[..., k + 1, :] = new / np.where(length > 0, length, 1.0)[..., np.newaxis]
 
 
-def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
-    """Largest Ritz value of each Hessenberg matrix (..., k + 1, k), and its residual relative to it.
-
-    The residual is that of any that may be larger by as much: two that are nearly one look smaller until they part.
-    A period that grows beyond what a number can hold has the multiplier inf.
-    """
-    finite = np.all(np.isfinite(matrices), axis=(-1, -2))
-    matrices = np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0)
+def _value(matrices: Floats) -> tuple[Complexes, Floats]:
+    """The Ritz value itself."""
+    matrices, finite = _finite(matrices)
     values, vectors = np.linalg.eig(matrices[..., :-1, :])
     values = values.astype(np.complex128)
     size, residual = np.abs(values), matrices[..., -1, -1, np.newaxis] * np.abs(vectors[..., -1, :])
@@ -159,4 +195,36 @@ def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
     most = np.take_along_axis(size, place, axis=-1)
     doubt = np.max(np.where(size + residual >= most, residual, 0.0), axis=-1)
     largest = np.take_along_axis(values, place, axis=-1)[..., 0]
-    return np.where(finite, largest, np.inf), doubt / np.maximum(most[..., 0], np.finfo(matrices.dtype).tiny ** 0.5)
+    return np.where(finite, largest, np.inf), doubt / np.maximum(most[..., 0], _tiny(matrices))
+
+
+def _radius(matrices: Floats, squarings: int) -> tuple[Complexes, Floats]:
+    """Its magnitude, from the size of the matrix's power 2^squarings.
+
+    The last row of the power 2^LOOK over all of it is the last component of the vectors that are largest by then:
+    theirs is the residual.
+    Source: Gelfand's formula, Horn & Johnson, Matrix Analysis, 2nd ed., corollary 5.6.14.
+    """
+    matrices, finite = _finite(matrices)
+    power, log = matrices[..., :-1, :].astype(np.float64), np.zeros(finite.shape)
+    for i in range(squarings + 1):
+        if i % TOGETHER == 0 or i == squarings:
+            size = np.maximum(np.max(np.abs(power), axis=(-1, -2)), np.finfo(np.float64).tiny)
+            log += np.log(size) / 2**i
+            power /= size[..., np.newaxis, np.newaxis]
+        if i == LOOK:
+            rows = np.sum(power**2, axis=-1)
+            share = np.sqrt(rows[..., -1] / np.maximum(np.sum(rows, axis=-1), np.finfo(np.float64).tiny))
+        power = power @ power
+    radius = np.exp(log)
+    return np.where(finite, radius, np.inf) + 0j, matrices[..., -1, -1] * share / np.maximum(radius, _tiny(matrices))
+
+
+def _finite(matrices: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """The matrices with 0 for those that are not finite, and which are."""
+    finite = np.all(np.isfinite(matrices), axis=(-1, -2))
+    return np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0), finite
+
+
+def _tiny(matrices: Floats) -> float:
+    return float(np.finfo(matrices.dtype).tiny ** 0.5)

@@ -29,7 +29,7 @@ from lobes.floquet.piece_response import PieceResponse, ringing
 from lobes.floquet.pieces import is_free, segment_ends
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap, UnevenPiece, surfaces
-from lobes.tooth_force import force_shares, turned
+from lobes.tooth_force import force_shares, turns
 
 Floats = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ class _Segment:
     time: Floats
     """Time of each (s), shape (r,)."""
     forces: Floats | None
-    """Depth times force matrix at their nodes (N/m), shape (delays, r, d, k, s, p, p); None where no tooth cuts."""
+    """Depth times force matrix at their nodes (N/m), shape (delays, p, p, s, k, r, d); None where no tooth cuts."""
 
     @classmethod
     def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> _Segment:
@@ -123,7 +123,7 @@ def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: type[np.flo
             pieces.append((False, segment.ringing(rows).astype(kind)))
         else:
             maps = PieceResponse.of(rows, segment.time).rounded(kind).cutting(segment.forces[0].astype(kind))
-            pieces += [(True, maps[:, :, i]) for i in range(maps.shape[2])]
+            pieces += [(True, piece) for piece in maps]
     return PeriodMap(tuple(pieces), rows.direction.size, gauss_stages().node.size * rows.axes.size)
 
 
@@ -134,7 +134,7 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
     lengths = np.hstack(
         [np.repeat(segment.angle[apart, np.newaxis], segment.starts.shape[1], 1) for segment in cutting]
     )
-    forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=3)
+    forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=4)
     met = surfaces(rows.cut.delays, sum(rows.cut.pattern), starts, lengths, forces)
     pieces = list[UnevenPiece]()
     for segment in segments:
@@ -142,19 +142,21 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
             pieces.append(UnevenPiece(segment.ringing(rows)))
         else:
             maps = PieceResponse.of(rows, segment.time).loaded(segment.forces.sum(axis=0))
-            pieces += [UnevenPiece(maps[:, :, i], next(met)) for i in range(maps.shape[2])]
+            pieces += [UnevenPiece(piece, next(met)) for piece in maps]
     return UnevenMap(tuple(pieces), rows.direction.size, rows.axes.size)
 
 
 def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
     """Depth times force matrix of the teeth of each delay at the nodes of pieces that start at angles (r, k) (N/m).
 
-    Shape (delays, r, d, k, s, p, p).
+    Shape (delays, p, p, s, k, r, d).
     """
     is_alike = rows.cut.helix_lag == 0 or bool(np.all(depth[:, 0] == depth[0, 0]))
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
     at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
-    matrix = np.einsum("rc,grkscij->grksij", np.stack((rows.tangential, rows.radial), axis=1), shares)
-    matrix = turned(matrix, rows.feed_angle[:, np.newaxis, np.newaxis])[..., rows.axes[:, np.newaxis], rows.axes]
-    return np.asarray(depth[..., *([np.newaxis] * 4)] * matrix[:, :, np.newaxis])
+    frame, coefficients = turns(rows.feed_angle)[..., rows.axes], np.stack((rows.tangential, rows.radial), axis=1)
+    by_share = np.einsum("rc,rmi,rnj->rcmnij", coefficients, frame, frame).reshape(len(rows), 8, -1)
+    matrix = shares.reshape(*shares.shape[:2], -1, 8) @ by_share
+    matrix = matrix.reshape(*matrix.shape[:2], *at.shape[1:], *[rows.axes.size] * 2)
+    return np.asarray(np.multiply(np.moveaxis(matrix, (1, 2, 3), (5, 4, 3))[..., np.newaxis], depth, order="C"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,50 +92,53 @@ class PieceResponse:
         return PieceResponse(*(values.astype(kind) for values in (self.ends, self.shows, self.gives, self.pushes)))
 
     def cutting(self, force: Floats) -> Floats:
-        """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p).
+        """The maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes, force (p, p, s, k, r, d).
 
         From z and w at the begin to z at the end and d.
         """
         inverse, push = self._closed(force)
-        states, size = push.shape[-2:]
-        maps, i = np.empty((*inverse.shape[:3], states + size, states + size), inverse.dtype), np.arange(size)
-        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
-        np.negative(inverse, out=maps[..., states:, states:])
-        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
-        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
-        maps[..., states + i, states + i] += 1
+        maps, i = self._maps(inverse, push, -inverse), np.arange(push.shape[-2], sum(push.shape[-2:]))
+        maps[..., i, i] += 1
         return maps
 
     def loaded(self, force: Floats) -> Floats:
-        """The maps (r, d, k, m, m) of k pieces with forces f - force d at their nodes, force (r, d, k, s, p, p).
+        """The maps (k, r, d, m, m) of k pieces with forces f - force d at their nodes, force (p, p, s, k, r, d).
 
         From z at the begin and f to z at the end and d.
         """
         inverse, push = self._closed(force)
         states, size = push.shape[-2:]
-        maps = np.empty((*inverse.shape[:3], states + size, states + size))
-        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
-        np.matmul(inverse, self._given()[:, np.newaxis, np.newaxis], out=maps[..., states:, states:])
-        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
-        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
-        maps[..., :states, states:] += self.pushes.reshape(-1, 1, 1, states, size)
+        maps = self._maps(inverse, push, inverse @ self._given()[:, np.newaxis])
+        maps[..., :states, states:] += self.pushes.reshape(-1, 1, states, size)
+        return maps
+
+    def _maps(self, inverse: Floats, push: Floats, answer: Floats) -> Floats:
+        """Maps from z and what is given at the nodes, which is answered by d; that of z pushes back at its end."""
+        states, size = push.shape[-2:]
+        maps = np.empty((*inverse.shape[:3], states + size, states + size), inverse.dtype)
+        np.matmul(inverse, self.shows.reshape(-1, 1, size, states), out=maps[..., states:, :states])
+        maps[..., states:, states:] = answer
+        np.matmul(push, maps[..., states:, :], out=maps[..., :states, :])
+        np.negative(maps[..., :states, :], out=maps[..., :states, :])
+        maps[..., :states, :states] += self.ends[:, np.newaxis]
         return maps
 
     def _closed(self, force: Floats) -> tuple[Floats, Floats]:
-        """Displacements of the closed loop from the open one's (r, d, k, ps, ps), z from them (r, d, k, 2n, ps)."""
-        *cases, s, p, _ = force.shape
-        size, states = p * s, self.ends.shape[-1]
-        forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
-        loop, push = np.zeros((*cases, size, size), force.dtype), np.zeros((*cases, states, size), force.dtype)
+        """Displacements of the closed loop from the open one's (k, r, d, ps, ps), z from them (k, r, d, 2n, ps)."""
+        p, _, s, *cases = force.shape
+        size, states, depths = p * s, self.ends.shape[-1], cases[-1]
+        forces = force.reshape(p, p, s, cases[0], -1)
+        loop = np.zeros((p, s, p, *forces.shape[2:]), force.dtype)
+        push = np.zeros((states, p, *forces.shape[2:]), force.dtype)
         for shown, pushed in zip(*np.nonzero(np.any(self.gives, axis=(0, 3, 4))), strict=True):
-            gives = self.gives[:, np.newaxis, np.newaxis, shown, pushed, :, np.newaxis]
-            loop.reshape(*cases, p, s, p, s)[..., shown, :, :, :] += gives * forces[..., np.newaxis, pushed, :, :]
-        i = np.arange(size)
-        loop[..., i, i] += 1
+            gives = np.repeat(np.moveaxis(self.gives[:, shown, pushed], 0, -1), depths, axis=-1)
+            loop[shown] += gives[:, np.newaxis, :, np.newaxis] * forces[pushed]
+        loop = loop.reshape(size, size, *forces.shape[3:])
+        loop[np.arange(size), np.arange(size)] += 1
         for direction in range(p):
-            pushes = self.pushes[:, np.newaxis, np.newaxis, :, direction, np.newaxis]
-            push.reshape(*cases, states, p, s)[...] += pushes * forces[..., np.newaxis, direction, :, :]
-        return inverses(loop), push
+            pushes = np.repeat(np.moveaxis(self.pushes[:, :, direction], 0, -1), depths, axis=-1)
+            push += pushes[:, np.newaxis, :, np.newaxis] * forces[direction]
+        return _first(inverses(loop), cases), _first(push.reshape(states, size, *forces.shape[3:]), cases)
 
     def _given(self) -> Floats:
         """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
@@ -142,10 +146,18 @@ class PieceResponse:
         return np.moveaxis(self.gives, 2, 3).reshape(r, p * s, p * s)
 
 
+def _first(matrices: Floats, cases: Sequence[int]) -> Floats:
+    """Matrices (m, n, ...) of some cases as (cases, m, n)."""
+    flat = matrices.reshape(*matrices.shape[:2], -1)
+    return np.ascontiguousarray(np.moveaxis(flat, -1, 0)).reshape(*cases, *matrices.shape[:2])
+
+
 def _sums(values: Complexes, shares: Complexes) -> Floats:
     """Twice the real parts of the sums of values (..., k) at the roots times shares (k, ...)."""
-    flat = values.reshape(-1, values.shape[-1]) @ shares.reshape(len(shares), -1)
-    return np.asarray(2 * flat.real.reshape(*values.shape[:-1], *shares.shape[1:]))
+    parts = np.concatenate((values.real, values.imag), axis=-1)
+    weights = 2 * np.concatenate((shares.real, -shares.imag))
+    flat = parts.reshape(-1, parts.shape[-1]) @ weights.reshape(len(weights), -1)
+    return np.asarray(flat.reshape(*values.shape[:-1], *shares.shape[1:]))
 
 
 def _by_direction(rows: MillingRows, place: Floats) -> Floats:

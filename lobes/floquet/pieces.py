@@ -10,6 +10,8 @@ from lobes.floquet.milling_rows import MillingRows
 
 CYCLES = 0.75
 """Cycles of the fastest mode that counts in one piece, at most: multipliers within 1e-6 of the exact ones."""
+ROUGH = 1.0
+"""The same where growth within 1e-4 is enough."""
 GROWTH = 1.3
 """Larger numbers are rounded up to powers of this, so that neighbouring speeds share theirs."""
 QUIET = 0.1
@@ -44,13 +46,16 @@ def is_free(cut: Cut, ends: Floats, depth: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.all(np.mod(middle + cut.ahead, 2 * np.pi) > reach, axis=-1))
 
 
-def piece_numbers(rows: MillingRows, deepest: float) -> NDArray[np.int64]:
-    """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,)."""
+def piece_numbers(rows: MillingRows, deepest: float, most: float = CYCLES) -> NDArray[np.int64]:
+    """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,).
+
+    most: cycles of the fastest mode that counts in one.
+    """
     loop = deepest * rows.force[:, np.newaxis] / (2 * rows.stiffness * rows.damping_ratio) * np.hypot(*rows.seen)
     loop = loop * np.sum(rows.vector**2, axis=-1)
     fastest = np.maximum(np.max(np.where(loop > QUIET, rows.frequency, 0.0), axis=1), np.min(rows.frequency, axis=1))
     cycles = fastest / (2 * np.pi) * rows.period
-    return np.asarray(np.ceil(np.maximum(cycles / CYCLES, 1.0)), dtype=np.int64)
+    return np.asarray(np.ceil(np.maximum(cycles / most, 1.0)), dtype=np.int64)
 
 
 def segment_pieces(cut: Cut, number: NDArray[np.int64], ends: Floats) -> NDArray[np.int64]:

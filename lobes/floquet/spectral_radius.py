@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from lobes.cut import Cut
 from lobes.floquet.depths import check_depths
 from lobes.floquet.milling_rows import rows_of
-from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.multipliers import spectral_radii
 from lobes.floquet.pieces import piece_numbers
 from lobes.milling_system import milling_system
 from lobes.speeds import check_speeds
@@ -48,4 +48,4 @@ def spectral_radius(
     system, speed, deep = milling_system(x, y, vectors), check_speeds(speed_rpm), check_depths(depth)
     rows = rows_of(system, cut, speed)
     grid = np.broadcast_to(deep, (speed.size, deep.size))
-    return np.abs(largest_multipliers(rows, grid, piece_numbers(rows, float(np.max(deep)))))
+    return spectral_radii(rows, grid, piece_numbers(rows, float(np.max(deep))))

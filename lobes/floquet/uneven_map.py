@@ -120,11 +120,11 @@ def surfaces(
     """What the teeth of each delay (rad) meet in each piece in which any cut.
 
     The pieces start at angles (r or 1, k) and are as long (rad) in a pattern of `turn` (rad); forces: depth times force
-    matrix of the teeth of each delay at the nodes (N/m), shape (delays, r, d, k, s, p, p).
+    matrix of the teeth of each delay at the nodes (N/m), shape (delays, p, p, s, k, r, d).
     """
     node = starts[..., np.newaxis] + lengths[..., np.newaxis] * gauss_stages().node
     met = [_met(np.mod(node - delay, turn), starts, lengths) for delay in delays]
-    forces = np.moveaxis(forces, 4, -1)
+    forces = np.moveaxis(forces, (5, 6, 4), (1, 2, 3))
     cut = np.any(forces, axis=(1, 2, 4, 5, 6))
     for k in range(starts.shape[1]):
         yield tuple(Surface(*met[i][k], forces[i, :, :, k]) for i in np.flatnonzero(cut[:, k]))

@@ -22,6 +22,7 @@ from lobes import (
     program_limit,
     rows_of,
 )
+from lobes.floquet.pieces import ROUGH
 from lobes.floquet.program_limit import DEEPEST, places_alike
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
@@ -100,7 +101,7 @@ class ProgramDraws:
             here = np.flatnonzero(np.isin(cut, alike))
             if here.size:
                 rows = replace(self.rows[row[here]], cut=self.cuts[alike[0]], feed_angle=angles[cut[here]])
-                number = self.finer * piece_numbers(rows, float(np.max(depths)))
+                number = self.finer * piece_numbers(rows, float(np.max(depths)), ROUGH)
                 grown[here] = growth(rows, depths[here], number)
         return grown
 

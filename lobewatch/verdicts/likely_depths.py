@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows, growth, milling_system, piece_numbers, rows_of
+from lobes.floquet.pieces import ROUGH
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.mean_lobes import mean_lobes
@@ -145,7 +146,7 @@ def _crossing(rows: MillingRows, depths: Floats) -> Floats:
     """The same between depths (mm) (r, d)."""
     if not depths.size:
         return np.empty(0)
-    grown = growth(rows, depths / 1e3, piece_numbers(rows, float(np.max(depths)) / 1e3))
+    grown = growth(rows, depths / 1e3, piece_numbers(rows, float(np.max(depths)) / 1e3, ROUGH))
     first, row = np.argmax(grown >= 0, axis=1), np.arange(len(grown))
     before = np.maximum(first - 1, 0)
     low, high = grown[row, before], grown[row, first]

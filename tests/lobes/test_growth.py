@@ -11,6 +11,7 @@ from random_milling import random_case
 from lobes import Cut, MillingRows, growth, milling_system, piece_numbers, rows_of
 from lobes.floquet import largest_multipliers
 from lobes.floquet.multipliers import HUGE
+from lobes.floquet.pieces import ROUGH
 from modal import Mode
 
 DEPTHS = np.geomspace(0.05e-3, 8e-3, 16)[np.newaxis]
@@ -40,6 +41,16 @@ def test_growth_near_zero_is_within_the_tolerance(tolerance: float) -> None:
         assert np.all(error < tolerance), seed
         near += error.size
     assert near > 300
+
+
+@pytest.mark.parametrize("seed", [25, 111, 145, 150, 221, 229, 295])
+def test_rough_pieces_are_enough_for_growth_within_1e_4(seed: int) -> None:
+    """Programs in some of which pieces of 1.25 cycles are not."""
+    rows, deepest = program(seed), float(DEPTHS.max())
+    exact = np.log(np.abs(largest_multipliers(rows, DEPTHS, 2 * piece_numbers(rows, deepest), 1e-9)))
+    error = np.abs(growth(rows, DEPTHS, piece_numbers(rows, deepest, ROUGH)) - exact)[np.abs(exact) < NEAR]
+    assert error.size > 0
+    assert np.all(error < 1e-4)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])

@@ -94,8 +94,17 @@ FILES = (
     PublicFile(f"{BLADE}/M110.txt", '--sensitivity "10.2 mV/g"'),
     PublicFile(f"{HAMMER}/imp_ham_set?_no*mass.CSV", '--columns "time [s],acceleration [cm/s^2],-,-,-,force [N]"'),
     PublicFile(f"{HAMMER}/[Ii]mp_ham_calib_set?.CSV", '--columns "time [s],acceleration [cm/s^2],force [N]"'),
-    PublicFile(f"{VIBROMETER}/*reflection/data/N?_*.mat", "--response 1 --unit m/s^2/N"),
-    PublicFile(f"{VIBROMETER}/*EGS*/data/medida?.mat", "--response 1 --unit m/s^2/N --conjugate"),
+    PublicFile(
+        f"{VIBROMETER}/*reflection/data/N?_*.mat",
+        '--response 1 --unit V/V --sensitivity "23.65 mV/N,10.79 mV/(m/s^2)"',
+    ),
+    PublicFile(
+        f"{VIBROMETER}/*EGS*/data/medida?.mat",
+        '--response 1 --unit V/V --sensitivity "23.65 mV/N,10.79 mV/(m/s^2)"',
+    ),
+    PublicFile(f"{VIBROMETER}/*/measurements/*.vna", "--response 1"),
+    PublicFile("vibrationtoolbox/vtoolbox/vtb7_3_?.mat", "--unit m/s^2/N"),
+    PublicFile("vibrationtoolbox/vtoolbox/vtb7_2ex.mat", '--columns "force [N]=f,displacement [m]=x" --rate 1000'),
     PublicFile(
         "WangSuhan/Modal-identification-of-plate/20201016/*.mat",
         f'--columns "frequency [Hz]={PLATE_FRF}:1,frf={PLATE_FRF}:2" --unit m/s^2/N',

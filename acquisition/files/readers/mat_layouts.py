@@ -21,6 +21,7 @@ from acquisition.files.contents.contents import Contents, Role, Signal
 from acquisition.files.contents.heading import name_and_unit, role_of
 from acquisition.files.readers.array_columns import columns_of
 from acquisition.files.readers.mat_window import window_of
+from acquisition.files.readers.siglab import siglab
 
 _FREQUENCY = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
 _COHERENCE = re.compile(r".*(coh|gamma)", re.IGNORECASE)
@@ -31,7 +32,7 @@ _TIME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
 
 def recognised(variables: Mapping[str, Any]) -> Contents | None:
     """What the variables of a file mean where they are of a known layout; None where they are of none."""
-    for layout in (_ours, _signal_calc, _test_lab, _logger, _vectors, _over_time):
+    for layout in (_ours, _signal_calc, siglab, _test_lab, _logger, _vectors, _over_time):
         contents = layout(variables)
         if contents is not None:
             return replace(contents, window=window_of(variables))

@@ -44,4 +44,4 @@ def _is_v4(head: bytes) -> bool:
     return False
 
 
-MAT = Format("mat", "MATLAB file", (".mat",), _is_mat, read_mat)
+MAT = Format("mat", "MATLAB file", (".mat", ".vna"), _is_mat, read_mat)

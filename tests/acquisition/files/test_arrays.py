@@ -136,17 +136,22 @@ def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> No
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
 
 
-def test_structs_in_a_matrix_as_siglab_writes_them(tmp_path: Path) -> None:
-    path, cells = tmp_path / "a.vna", np.empty((2, 3), dtype=object)
+def test_siglab_has_volts_over_volts_and_the_units_beside(tmp_path: Path) -> None:
+    path, cells, channels = tmp_path / "a.vna", np.empty((2, 3), dtype=object), np.empty(3, dtype=object)
     for i, j in np.ndindex(2, 3):
-        cells[i, j] = {"xfer": j * H if (i, j) in ((0, 1), (0, 2)) else [], "coh": []}
-    labels = {"SampleRate": 2560, "ChanStat": np.eye(3, 6)}
-    scipy.io.savemat(path, {**labels, "SLm": {"xcmeas": cells, "fdxvec": F}}, appendmat=False)
-    said = complaint(path)
-    assert "1 SLm.xcmeas:1:2.xfer, 2 SLm.xcmeas:1:3.xfer" in said
-    assert '"frequency [Hz]=SLm.fdxvec,frf=SLm.xcmeas:1:2.xfer"' in said
-    columns = ("frequency [Hz]=SLm.fdxvec", "frf [(ms-2)/N]=SLm.xcmeas:1:3.xfer")
-    assert read_frf(path, Description(columns=columns)).accelerance == pytest.approx(2 * H)
+        is_measured = (i, j) in ((0, 1), (0, 2))
+        cells[i, j] = {"xfer": j * H if is_measured else [], "coh": np.full(F.size, 0.3 * j) if is_measured else []}
+    named = (("hammer", 40.0, "N", 1), ("sensor", 100.0, "ms-2", 1), ("laser", 0.01, "ms-1", 0))
+    channels[:] = [dict(zip(("label", "euscale_fac", "eu_string", "eu_on_off"), row, strict=True)) for row in named]
+    measured = {"xcmeas": cells, "scmeas": channels, "fdxvec": F, "navg": 5}
+    scipy.io.savemat(path, {"SampleRate": 2560, "SLm": measured}, appendmat=False)
+    assert "1 sensor over hammer, 2 laser over hammer (--response 1)" in complaint(path)
+    frf = read_frf(path, Description(response=1))
+    assert frf.accelerance == pytest.approx(H * 100 / 40)
+    assert frf.coherence == pytest.approx(0.3)
+    assert frf.n_averages == 5
+    laser = read_frf(path, Description(response=2, sensitivity=("100 mV/(mm/s)",)))
+    assert laser.mobility == pytest.approx(2 * H / 40 / 100, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["freq_kHz", "freq_rad_s"])

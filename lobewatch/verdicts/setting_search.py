@@ -21,14 +21,14 @@ from lobes import Cut, Program
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM, RPM, CutRange, floored_mm
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.series import fall_in
 from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws
 from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
 from lobewatch.verdicts.judgement import SURELY, Judgement, drawn_program, weighed
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
-from lobewatch.verdicts.room import APART, DEEPER, LEAST_FALL, all_around, frequency_left, window_rpm
+from lobewatch.verdicts.needed_fall import needed_fall
+from lobewatch.verdicts.room import APART, DEEPER, all_around, frequency_left, window_rpm
 from lobewatch.verdicts.setting import Setting
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.ways import ways
@@ -37,10 +37,6 @@ SPARE = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
 MOST_SPARE = 20.0
 """Depth to spare that stands for more too, and for no limit: no deeper is looked."""
-INTERVALS = 2
-"""Number of tap intervals that it must last ..."""
-UNKNOWN_FALL = 0.02
-"""... or fall of the frequency that it must stand where no rate is known; chosen."""
 MOST_PLACES = 12
 """Number of speeds that few draws are looked at at before it is said that there is none."""
 HOPE = 1.1
@@ -50,6 +46,8 @@ NEAR = np.concatenate([sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0
 """Relative distances of speeds that are looked at beside that of most chips ..."""
 CLIMBS = 2
 """... and number of times that they are."""
+SEVERAL = 3
+"""Number of speeds judged in vain that say what is left at others of their pocket."""
 TRIES, MOST_TRIES = 4, 12
 """Number of depths that are judged at one speed, and at all of them."""
 NEARLY = 0.85
@@ -62,13 +60,6 @@ FEW = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
 
 Floats = NDArray[np.float64]
-
-
-def needed_fall(assembly: Assembly, machine: Machine) -> float:
-    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
-    days = INTERVALS * machine.machine.tap_interval_days
-    falls = [fall_in(series, days) for series in assembly.series.values()]
-    return max((UNKNOWN_FALL if fall is None else max(fall, LEAST_FALL) for fall in falls), default=UNKNOWN_FALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +80,8 @@ class SettingSearch:
     """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
+    kept: dict[float, float] = field(default_factory=dict)
+    """Share that all draws left of the depth that few allowed, by speeds (rpm) that were judged in vain."""
     judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
     """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
 
@@ -202,6 +195,7 @@ class SettingSearch:
                 del depths[speed]
                 yield setting
             else:
+                self.kept[speed] = self.kept.get(speed, 1.0) * setting / depths[speed]
                 depths[speed] = floored_mm(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
@@ -222,10 +216,15 @@ class SettingSearch:
     def _most_chips(self, depths: dict[float, float]) -> float:
         """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
         while True:
-            speed = max(depths, key=lambda speed: speed * depths[speed], default=0.0)
+            speed = max(depths, key=lambda speed: speed * depths[speed] * self._share(speed), default=0.0)
             if not speed or self.hard[speed].chattered == self.chattered:
                 return speed
             depths[speed] = min(depths[speed], floored_mm(self._calm(speed)))
+
+    def _share(self, speed: float) -> float:
+        """Share of its depth that is likely to be left at a speed (rpm), when several of its pocket were judged."""
+        shares = [share for other, share in self.kept.items() if self.likely.is_joined(speed, other)]
+        return 1.0 if speed in self.kept or len(shares) < SEVERAL else max(shares)
 
     def _beside(self, speed: float, depth_mm: float) -> float:
         """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""

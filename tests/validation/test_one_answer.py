@@ -48,7 +48,7 @@ def test_no_depth_is_named_that_would_be_asked_about() -> None:
     assert CutRange.of(MACHINE, table).deepest_mm == 2 * table.tool_diameter_mm
 
 
-@pytest.mark.parametrize("number", [234, 287])
+@pytest.mark.parametrize("number", [234, 348])
 def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_stable_again(number: int) -> None:
     """Few depths are looked at on the way, and step over such islands."""
     milling = random_case(np.random.default_rng(6).spawn(number + 1)[number])

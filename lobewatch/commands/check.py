@@ -71,9 +71,8 @@ def check(
         "direction": direction,
     }
     if accept:
-        notes.print(
-            *(f"accepted: {line}\n" for line in accept_settings(MachineFolder(machine), accept)), sep="", end=""
-        )
+        for line in accept_settings(MachineFolder(machine), accept):
+            notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
     verdicts, recommendations = chosen_verdicts(logbook, program or (), said)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()

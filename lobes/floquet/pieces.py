@@ -11,7 +11,7 @@ from lobes.floquet.milling_rows import MillingRows
 CYCLES = 0.75
 """Cycles of the fastest mode that counts in one piece, at most: multipliers within 1e-6 of the exact ones."""
 ROUGH = 1.0
-"""The same where growth within 1e-4 is enough."""
+"""The same where growth within 1e-4 is enough: that of draws."""
 GROWTH = 1.3
 """Larger numbers are rounded up to powers of this, so that neighbouring speeds share theirs."""
 QUIET = 0.1

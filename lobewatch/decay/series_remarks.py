@@ -16,7 +16,8 @@ from lobewatch.measuring.estimate import Estimate
 
 BESIDE = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
 """Values that are watched beside the frequency, and what they are called; that of the bearings follows from it."""
-
+LEAST_CHANGE = 0.1
+"""Change of these (%) that is told; no verdict feels a smaller one, and computed data have such."""
 SETTLING = "; it fell among its first tests and has slowed since: settling (run-in)?"
 """What is said of a fall as that of bearings that run in; it rings like any other."""
 
@@ -64,7 +65,7 @@ def about_others(name: str, series: SeriesHistory) -> Iterator[Remark]:
     """Remarks on changes of damping ratio and stiffness."""
     for field, word in BESIDE.items():
         newest = series.values[field].newest_change()
-        if newest is not None:
+        if newest is not None and abs(newest[1].size) >= LEAST_CHANGE:
             time, change = newest
             verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
             course = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"

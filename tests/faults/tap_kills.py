@@ -31,7 +31,7 @@ LINES = 10
 """About as many as the command prints."""
 HITS = 5
 """Of a test."""
-DELAY = 0.05
+DELAY = 0.03
 """After a line it is killed within this time (s)."""
 Started = tuple[int, int]
 """Process, and what it prints."""

@@ -71,7 +71,7 @@ def make_environment(extras):
     sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % folder)
     venv.create(folder, with_pip=False, clear=True)
     locked = ["--require-hashes", "--no-deps", "-r", os.path.join(ROOT, LOCKS[extras])]
-    steps = [["--upgrade", "pip"], ["--no-deps", "--editable", ROOT]]
+    steps = [["--upgrade", "--no-compile", "pip"], ["--no-deps", "--editable", ROOT]]
     if subprocess.call(command + locked):
         sys.stderr.write("The locked packages do not fit here (see above): taking what pyproject.toml allows.\n")
         steps[1] = ["--editable", ROOT + extras]

@@ -67,7 +67,7 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
 def _why(cut: Suggestion, lesson: Lesson) -> str:
     if cut.repeats:
         is_believed = cut.repeats in [made.id for made in lesson.believed]
-        return f"{cut.repeats} once more, since {'much hangs on its word' if is_believed else 'it is not believed'}"
+        return f"{cut.repeats} once more, since {'its word may be wrong' if is_believed else 'it is not believed'}"
     return f"it tells most of {term(cut.settles)}"
 
 

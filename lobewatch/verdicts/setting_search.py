@@ -264,6 +264,8 @@ class SettingSearch:
 
     def verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
+        if depth_mm < self.reach.shallowest_mm:
+            return 0.0
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
         deep = DEEPER * depth
         program = drawn_program(table, self.assembly, self.machine, self.at_speed, self.either)

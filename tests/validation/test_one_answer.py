@@ -11,6 +11,7 @@ from random_milling import random_case
 from verdict_study import MACHINE, assembly, program
 
 from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.verdicts.advice import robust_pockets
 from lobewatch.verdicts.setting_search import SettingSearch
 
 
@@ -58,3 +59,11 @@ def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_
     assert search.best is not None
     assert nearest is not None
     assert search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
+
+
+def test_no_depth_is_named_that_is_so_small_that_it_would_be_asked_about() -> None:
+    milling = random_case(np.random.default_rng(6).spawn(935)[934])
+    table, tool = program(milling, 0.07), assembly(milling)
+    named = robust_pockets(table, tool, MACHINE)
+    assert named
+    assert min(setting.depth_mm for setting in named) >= 0.002 * table.tool_diameter_mm > 0.05

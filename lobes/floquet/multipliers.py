@@ -26,7 +26,7 @@ HUGE = 1e6
 LOOK = 4
 """Squarings of a matrix after which what is still seen of smaller Ritz values counts as doubt: 0.5 of the largest has
 become 1.5e-5 by then."""
-MORE = 3
+MORE = 6
 """Squarings beyond those that bring the share of a number near 1 below the tolerance: sizes of powers are off by some.
 """
 TOGETHER = 4

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from lobes import Cut, Program
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import MM, RPM, CutRange, floored_mm
+from lobewatch.machine.settings.cut_range import MM, RPM, CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
@@ -60,6 +60,10 @@ FEW = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
 
 Floats = NDArray[np.float64]
+Depths = dict[float, float]
+"""Depths (mm) that may be safe, by speeds (rpm)."""
+Shares = dict[float, float]
+"""Shares that all draws left of the depths that few allowed, by speeds (rpm) that were judged in vain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +84,6 @@ class SettingSearch:
     """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
-    kept: dict[float, float] = field(default_factory=dict)
-    """Share that all draws left of the depth that few allowed, by speeds (rpm) that were judged in vain."""
     judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
     """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
 
@@ -175,19 +177,19 @@ class SettingSearch:
         if self.reach.is_empty:
             return
         tops = [(_rounded(speed), depth) for speed, depth in self.likely.tops(MOST_PLACES)][::-1]
-        depths: dict[float, float] = {}
+        depths, kept = Depths(), Shares()
         looked, left = set[float](), 0.0
         for _ in range(MOST_TRIES):
             tops = [top for top in tops if self._is_free(top[0], taken)]
             depths = {speed: depth for speed, depth in depths.items() if self._is_free(speed, taken)}
-            speed = self._most_chips(depths)
+            speed = self._most_chips(depths, kept)
             while tops and HOPE * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
                 top, likely = tops.pop()
-                depths[top] = floored_mm(self._calm(top))
-                left, speed = max(left, depths[top] / likely), self._most_chips(depths)
+                depths[top] = self.reach.floored(self._calm(top))
+                left, speed = max(left, depths[top] / likely), self._most_chips(depths, kept)
             if not depths.get(speed):
                 return
-            speed = self._climbed(speed, depths, looked)
+            speed = self._climbed(speed, depths, kept, looked)
             if not self._is_free(speed, taken):
                 continue
             setting = self.verified(speed, depths[speed])
@@ -195,36 +197,36 @@ class SettingSearch:
                 del depths[speed]
                 yield setting
             else:
-                self.kept[speed] = self.kept.get(speed, 1.0) * setting / depths[speed]
-                depths[speed] = floored_mm(setting)
+                kept[speed] = kept.get(speed, 1.0) * setting / depths[speed]
+                depths[speed] = self.reach.floored(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
         """Whether a speed (rpm) lies in none of the pockets that are taken."""
         return not any(self.likely.is_joined(speed, setting.speed_rpm) for setting in taken)
 
-    def _climbed(self, speed: float, depths: dict[float, float], looked: set[float]) -> float:
+    def _climbed(self, speed: float, depths: Depths, kept: Shares, looked: set[float]) -> float:
         """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), once for each top."""
         for _ in range(0 if speed in looked else CLIMBS):
             looked.add(speed)
             if (beside := self._beside(speed, depths[speed])) in looked:
                 break
             looked.add(beside)
-            depths[beside] = floored_mm(self._calm(beside))
-            speed = self._most_chips(depths)
+            depths[beside] = self.reach.floored(self._calm(beside))
+            speed = self._most_chips(depths, kept)
         return speed
 
-    def _most_chips(self, depths: dict[float, float]) -> float:
+    def _most_chips(self, depths: Depths, kept: Shares) -> float:
         """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
         while True:
-            speed = max(depths, key=lambda speed: speed * depths[speed] * self._share(speed), default=0.0)
+            speed = max(depths, key=lambda speed: speed * depths[speed] * self._share(speed, kept), default=0.0)
             if not speed or self.hard[speed].chattered == self.chattered:
                 return speed
-            depths[speed] = min(depths[speed], floored_mm(self._calm(speed)))
+            depths[speed] = min(depths[speed], self.reach.floored(self._calm(speed)))
 
-    def _share(self, speed: float) -> float:
+    def _share(self, speed: float, kept: Shares) -> float:
         """Share of its depth that is likely to be left at a speed (rpm), when several of its pocket were judged."""
-        shares = [share for other, share in self.kept.items() if self.likely.is_joined(speed, other)]
-        return 1.0 if speed in self.kept or len(shares) < SEVERAL else max(shares)
+        shares = [share for other, share in kept.items() if self.likely.is_joined(speed, other)]
+        return 1.0 if speed in kept or len(shares) < SEVERAL else max(shares)
 
     def _beside(self, speed: float, depth_mm: float) -> float:
         """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""
@@ -254,7 +256,7 @@ class SettingSearch:
     def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
         """The deepest setting up to a depth (mm)."""
         for _ in range(TRIES):
-            if (depth_mm := floored_mm(depth_mm)) < MM:
+            if not (depth_mm := self.reach.floored(depth_mm)):
                 return None
             setting = self.verified(speed, depth_mm)
             if isinstance(setting, Setting):
@@ -264,8 +266,6 @@ class SettingSearch:
 
     def verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
-        if depth_mm < self.reach.shallowest_mm:
-            return 0.0
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
         deep = DEEPER * depth
         program = drawn_program(table, self.assembly, self.machine, self.at_speed, self.either)

@@ -65,7 +65,7 @@ def test_stiffness_and_length_of_a_vector_count_together() -> None:
         stability_boundary(modes, None, CUT, SPEEDS, 0.02, share * turned_by(35)).depth
         for modes, share in ((PAIR, 1.0), (softer, 0.5))
     )
-    assert half == pytest.approx(whole, rel=1e-8)
+    assert half == pytest.approx(whole, rel=1e-9)
 
 
 @pytest.mark.parametrize("angle", [20.0, 35.0, 70.0])

@@ -12,6 +12,7 @@ from verdict_study import MACHINE, assembly, program
 
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.verdicts.advice import robust_pockets
+from lobewatch.verdicts.setting import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
 
 
@@ -49,21 +50,33 @@ def test_no_depth_is_named_that_would_be_asked_about() -> None:
     assert CutRange.of(MACHINE, table).deepest_mm == 2 * table.tool_diameter_mm
 
 
-@pytest.mark.parametrize("number", [234, 348])
-def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_stable_again(number: int) -> None:
-    """Few depths are looked at on the way, and step over such islands."""
+def search_of(number: int, depth_mm: float = 1.0) -> SettingSearch:
+    """Of a random cut; where it is deep itself, so may be what is looked for."""
     milling = random_case(np.random.default_rng(6).spawn(number + 1)[number])
-    table, tool = program(milling, 1.0), assembly(milling)
-    search = SettingSearch(table, tool, MACHINE)
-    nearest = search.nearest(table.depth_mm, table.speed_rpm)
+    return SettingSearch(program(milling, depth_mm), assembly(milling), MACHINE)
+
+
+@pytest.mark.parametrize(("number", "depth_mm"), [(19, 1.0), (234, 1.0), (348, 14.36)])
+def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_stable_again(
+    number: int, depth_mm: float
+) -> None:
+    """Few depths are looked at on the way, and step over such islands."""
+    search = search_of(number, depth_mm)
     assert search.best is not None
-    assert nearest is not None
-    assert search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
+    nearest = search.nearest(search.table.depth_mm, search.table.speed_rpm)
+    assert nearest is None or search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
+
+
+def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
+    search = search_of(234)
+    less = search.verified(24000.0, 1.45)
+    assert isinstance(less, float)
+    assert less < 1.3
+    assert isinstance(search.verified(24000.0, search.reach.floored(less)), Setting)
 
 
 def test_no_depth_is_named_that_is_so_small_that_it_would_be_asked_about() -> None:
-    milling = random_case(np.random.default_rng(6).spawn(935)[934])
-    table, tool = program(milling, 0.07), assembly(milling)
+    table, tool = search_of(934).table, search_of(934).assembly
     named = robust_pockets(table, tool, MACHINE)
     assert named
     assert min(setting.depth_mm for setting in named) >= 0.002 * table.tool_diameter_mm > 0.05

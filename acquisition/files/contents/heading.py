@@ -22,6 +22,8 @@ ANGLES = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", 
     "radians": "rad",
 }
 """Units of a phase as they are written in lower case."""
+_LEVEL = re.compile(r"(?<![^\W_])db(?![^\W\d_])", re.IGNORECASE)
+"""In the name of a level: "Magnitude dB", "Mag_dB"."""
 _OF_FRF = re.compile(r"(frf|receptance|mobility|accelerance|h\d?)(?![^\W_])[\W\d_]*")
 """What stands before the part of an FRF that a column holds: "H1 real"."""
 _BY_NAME: tuple[tuple[str, Role], ...] = (
@@ -88,9 +90,14 @@ def is_level(unit: str) -> bool:
     return unit.lower().startswith("db")
 
 
+def unit_by_name(name: str, unit: str) -> str:
+    """The unit of a column; "dB m/N" where its name says that it is a level of what its unit says."""
+    return f"dB {unit}".strip() if _LEVEL.search(name) and not is_level(unit) else unit
+
+
 def unit_of_level(unit: str) -> str:
     """The unit that a level is a multiple of, "1 um/N" of "dB re 1 um/N"; empty where it does not say."""
-    reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?[\s,)]*", "", unit)
+    reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?(?:\)\s*[\[(]|[\s,)]*)", "", unit)
     is_known = unit_of(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
     return reference if is_known else ""
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from acquisition.files.contents.contents import Signal
-from acquisition.files.contents.heading import ROLES, is_level, name_and_unit
+from acquisition.files.contents.heading import ROLES, name_and_unit, unit_by_name
 from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.units import unit_of
 
@@ -33,8 +33,7 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
         if role is None:
             ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(ROLES)}")
         elif signal is not None and role[0] != "ignored":
-            unit = unit or signal.unit
-            unit = f"dB {unit}".strip() if word.lower() == "db" and not is_level(unit) else unit
+            unit = unit_by_name(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
                 ledger.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))

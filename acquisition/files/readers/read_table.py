@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
-from acquisition.files.contents.heading import is_level, role_of
+from acquisition.files.contents.heading import is_level, role_of, unit_by_name
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lines
 from acquisition.files.readers.row_form import (
@@ -92,6 +92,7 @@ def _signal(name: str, unit: str, column: NDArray[Any]) -> Signal:
     """Complex numbers are an FRF, and real ones none."""
     if np.iscomplexobj(column):
         return Signal(name, column, "frf", unit)
+    unit = unit_by_name(name, unit)
     role = "magnitude" if is_level(unit) else role_of(name, unit)
     return Signal(name, column, "" if role == "frf" else role, unit)
 

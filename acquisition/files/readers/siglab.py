@@ -14,8 +14,8 @@ def siglab(v: Mapping[str, Any]) -> Contents | None:
     """Its FRFs in the units of their channels; None where it is of another program.
 
     `SLm` holds the frequencies (fdxvec), a cell for each reference and response (xcmeas) and the channels (scmeas) with
-    units for each volt (euscale_fac). That these are not yet in its transfer functions (xfer) is from a public file: an
-    accelerometer and a laser at one point agree (0.9 to 1.1) with them, and differ by a factor of 10 000 without.
+    units for each volt (euscale_fac). That these are not yet in its transfer functions (xfer) is from public files: an
+    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven, 0.88 and 1.40 in the others.
     """
     measured = v.get("SLm")
     if not isinstance(measured, Mapping) or not {"fdxvec", "xcmeas", "scmeas"} <= measured.keys():

@@ -54,11 +54,6 @@ class CutRange:
         return min(self.limits.deepest_mm, DEPTH[1] * self.table.tool_diameter_mm)
 
     @property
-    def shallowest_mm(self) -> float:
-        """Least depth (mm) that can be set and would not be asked about."""
-        return max(MM, DEPTH[0] * self.table.tool_diameter_mm)
-
-    @property
     def is_empty(self) -> bool:
         """Whether no speed lies inside."""
         return self.low_rpm > self.high_rpm
@@ -76,10 +71,15 @@ class CutRange:
         """Deepest cut (mm) that tool and drive allow at speeds (rpm)."""
         return np.minimum(self.deepest_mm, 1e3 * drive_limit(self.machine, self.table, speed_rpm))
 
+    def floored(self, depth_mm: float) -> float:
+        """The deepest depth (mm) that can be set, is not deeper and would not be asked about; 0 where there is none."""
+        floored = floored_mm(depth_mm)
+        return floored if floored >= DEPTH[0] * self.table.tool_diameter_mm else 0.0
+
     def holds(self, speed_rpm: float, depth_mm: float) -> bool:
         """Whether a speed (rpm) and a depth (mm) lie inside."""
         is_reached = self.low_rpm <= speed_rpm <= self.high_rpm
-        return is_reached and self.shallowest_mm <= depth_mm <= float(self.depths(np.array([speed_rpm]))[0])
+        return is_reached and depth_mm <= float(self.depths(np.array([speed_rpm]))[0])
 
     def speeds(self, step: float) -> NDArray[np.float64]:
         """Speeds that can be set (rpm), rising, a relative step apart at least."""

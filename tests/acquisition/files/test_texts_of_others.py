@@ -82,10 +82,20 @@ def test_a_level_of_nothing_known_asks_for_its_unit(tmp_path: Path, unit: str) -
     assert is_h(read_frf(path, Description(unit="m/N")))
 
 
+@pytest.mark.parametrize("name", ["Magnitude dB (m/N)", "dB (m/N)", "Mag_dB [m/N]", "FRF dB (m/N)", "Mag (dB) [m/N]"])
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_a_name_says_that_a_column_is_in_db(tmp_path: Path, name: str, unit: float) -> None:
+    """Below 0 or above it: of m/N, or of nm/N."""
+    level = LEVEL - 20 * np.log10(unit)
+    heading = f"Freq (Hz),{name},Phase (deg)\n".replace("m/N", "m/N" if unit == 1 else "nm/N")
+    assert np.all((level < 0) if unit == 1 else (level > 0))
+    assert is_h(read_frf(put(tmp_path / "a.csv", heading + rows(F, level, DEGREES, separator=","))))
+
+
 def test_a_magnitude_below_zero_is_no_magnitude_but_a_level(tmp_path: Path) -> None:
-    text = "Freq (Hz),Magnitude dB (m/N),Phase (deg)\n" + rows(F, LEVEL, DEGREES, separator=",")
+    text = "Freq (Hz),Magnitude (m/N),Phase (deg)\n" + rows(F, LEVEL, DEGREES, separator=",")
     path = put(tmp_path / "a.csv", text)
-    assert "whether Magnitude dB, which falls below 0, is in dB" in complaint(path)
+    assert "whether Magnitude, which falls below 0, is in dB" in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency", "db", "phase [deg]"))))
 
 

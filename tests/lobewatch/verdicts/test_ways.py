@@ -46,7 +46,7 @@ def test_a_range_is_judged_at_its_worst_inside(judged: Any, shop: Shop) -> None:
     assert verdict.limit <= min(alone) * 1.0001
     cut = verdict.draws.cuts[0]
     limit = program_limit(as_program(verdict.program, machine), tool.x, tool.y, [cut]).limit
-    assert limit == pytest.approx(verdict.limit, rel=1e-9)
+    assert limit == pytest.approx(verdict.limit, rel=1e-12)
     assert len({cut.immersion for cut in verdict.draws.cuts}) >= 4
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -139,6 +140,16 @@ def test_the_drive_allows_less_depth_the_faster_it_turns_beyond_its_corner() -> 
     torque = 4 * 0.018 / (4 * math.pi) * (steel.tangential * 0.1e-3 * 2 + steel.tangential_edge * math.pi)
     assert slow == pytest.approx(20 / torque * 1e3)
     assert fast == pytest.approx(4000 / (2 * math.pi * 3000 / 60) / torque * 1e3)
+
+
+def test_no_depth_is_chosen_that_would_be_asked_about_but_one_that_is_asked_for_may_be_judged() -> None:
+    """Below 0.002 and beyond 2 diameters of 18 mm."""
+    read = machine(program(), tool(CARBIDE))
+    reach = CutRange.of(read, read.program[0])
+    shallow = CutRange.of(read, msgspec.structs.replace(read.program[0], tool_diameter_mm=31.0))
+    assert [reach.floored(depth) for depth in (0.04, 0.07, 0.12)] == [0.0, 0.05, 0.1]
+    assert [shallow.floored(depth) for depth in (0.06, 0.07, 0.12)] == [0.0, 0.0, 0.1]
+    assert shallow.holds(shallow.low_rpm, 0.05)
 
 
 def test_a_reference_cut_is_that_of_the_tapped_tool() -> None:

@@ -1,4 +1,4 @@
-"""All machines as text: when each is due."""
+"""All machines as text: when each is due, and how far it has fallen."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from lobewatch.plant.plant import Plant
 from lobewatch.show.plant.describe_plant import plant_text
 from lobewatch.show.plant.plant_rows import plant_rows
+from lobewatch.show.report.fleet import render_fleet
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -24,3 +25,15 @@ def test_days_until_the_next_tap_test_are_whole_and_never_too_many(shop: Shop, d
     shop.tap(0, 1690.0, "y")
     rows = plant_rows(Plant({"m": shop.path}).standings(shop.start + timedelta(days=days)))
     assert f"2026-01-15, {due}\n" in plant_text(rows)
+
+
+@pytest.mark.parametrize(
+    ("fall", "std", "shown"), [(10.0642, 0.0803, "10.064 ± 0.080"), (0.0012, 0.00081, "0.00120 ± 0.00081")]
+)
+def test_a_change_has_the_digits_that_its_error_leaves(shop: Shop, fall: float, std: float, shown: str) -> None:
+    shop.tap(0, 1713.0)
+    (row,) = plant_rows(Plant({"m": shop.path}).standings(shop.start))
+    rows = [{**row, "fall": fall, "fall_std": std}]
+    assert f" {shown} " in plant_text(rows)
+    page = render_fleet(rows, "plant", shop.start)
+    assert f"-{shown} %" in page.replace("\u00a0", " ").replace("\u2060", "")

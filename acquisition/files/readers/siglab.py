@@ -15,7 +15,7 @@ def siglab(v: Mapping[str, Any]) -> Contents | None:
 
     `SLm` holds the frequencies (fdxvec), a cell for each reference and response (xcmeas) and the channels (scmeas) with
     units for each volt (euscale_fac). That these are not yet in its transfer functions (xfer) is from public files: an
-    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven, 0.88 and 1.40 in the others.
+    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md).
     """
     measured = v.get("SLm")
     if not isinstance(measured, Mapping) or not {"fdxvec", "xcmeas", "scmeas"} <= measured.keys():

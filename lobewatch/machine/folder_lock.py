@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
 import msgspec
-from filelock import FileLock, Timeout
+from filelock import lock_descriptor
 
 from acquisition import DataError
 from acquisition.atomic import atomic_write
@@ -57,12 +58,18 @@ class Holder(msgspec.Struct, frozen=True):
         return f"`{self.command}` (process {self.process}, since {self.since.astimezone():%H:%M})"
 
 
+class _Thread(threading.local):
+    """What a thread holds."""
+
+    holds = False
+
+
 class FolderLock:
     """Of one folder; whoever has this object may hold it several times over in one thread."""
 
     def __init__(self, folder: Path) -> None:
         """Not held yet."""
-        self._folder, self._lock = folder, FileLock(folder / LOCK, fallback_to_soft=False)
+        self._folder, self._thread = folder, _Thread()
 
     @contextlib.contextmanager
     def held(self, patience: float) -> Iterator[None]:
@@ -70,29 +77,40 @@ class FolderLock:
 
         OSError where this folder is not there, can only be read, or nothing can be locked there.
         """
-        self._acquire(patience)
-        try:
+        if self._thread.holds:
             yield
-        finally:
-            if self._lock.lock_counter == 1:
+            return
+        with contextlib.ExitStack() as stack:
+            self._acquire(patience, stack)
+            with contextlib.suppress(OSError):  # the lock holds without it
+                atomic_write(self._holder, msgspec.json.encode(Holder.current()), lasting=False)
+            self._thread.holds = True
+            try:
+                yield
+            finally:
+                self._thread.holds = False
                 with contextlib.suppress(OSError):
                     self._holder.unlink(missing_ok=True)
-            self._lock.release()
 
-    def _acquire(self, patience: float) -> None:
-        if not self._folder.is_dir():  # FileLock would make it: below a drive that is away, say
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self._folder))
+    def _acquire(self, patience: float, stack: contextlib.ExitStack) -> None:
+        """Until the stack is closed. A folder that is away, below a drive say, is not made again."""
         try:
-            self._lock.acquire(patience, POLL_TIME)
-        except Timeout as error:
-            holder = self._read_holder() or "another lobewatch"
-            raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done") from error
+            handle = os.open(self._folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+            stack.callback(os.close, handle)
+            self._wait(handle, patience)
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise type(error)(error.errno, error.strerror, str(self._folder)) from error
         except OSError as error:
             cure = READ_ONLY if error.errno in NOT_ALLOWED else NO_LOCKS
             raise OSError(error.errno, f"{error.strerror}: {cure}", str(self._folder)) from error
-        if self._lock.lock_counter == 1:
-            with contextlib.suppress(OSError):  # the lock holds without it
-                atomic_write(self._holder, msgspec.json.encode(Holder.current()), lasting=False)
+
+    def _wait(self, handle: int, patience: float) -> None:
+        deadline = time.monotonic() + patience
+        while not lock_descriptor(handle, blocking=False):
+            if time.monotonic() >= deadline:
+                holder = self._read_holder() or "another lobewatch"
+                raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
+            time.sleep(POLL_TIME)
 
     @property
     def _holder(self) -> Path:

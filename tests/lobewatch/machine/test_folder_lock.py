@@ -6,12 +6,15 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
+from acquisition import DataError
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.folder_lock import HOLDER
 from lobewatch.machine.new_folder import make_machine_folder
@@ -92,6 +95,27 @@ def test_a_folder_that_is_away_is_not_made_again(folder: MachineFolder) -> None:
     away.rename(folder.path)
     with folder.locked():
         assert (folder.path / HOLDER).exists()
+
+
+def test_a_folder_that_goes_away_at_any_moment_is_not_made_again(folder: MachineFolder) -> None:
+    over, away = threading.Event(), folder.path.with_name("away")
+
+    def lock() -> None:
+        while not over.is_set():
+            with suppress(OSError, DataError), MachineFolder(away.with_name("m")).locked():
+                pass
+
+    (thread := threading.Thread(target=lock)).start()
+    try:
+        for _ in range(200):
+            folder.path.rename(away)
+            time.sleep(0.001)
+            assert not folder.path.exists()
+            away.rename(folder.path)
+            time.sleep(0.001)
+    finally:
+        over.set()
+        thread.join()
 
 
 def test_held_twice_it_is_held_until_the_outer_end(folder: MachineFolder) -> None:

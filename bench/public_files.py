@@ -34,15 +34,24 @@ class PublicFile:
     answers: str = ""
     """Options that answer what the file does not say; a word that begins with @ is a path in FOLDER."""
 
+    def words(self, folder: Path) -> list[str]:
+        """The options, word by word."""
+        return [str(folder / word[1:]) if word.startswith("@") else word for word in shlex.split(self.answers)]
+
 
 @dataclass(frozen=True)
 class Reading:
     """What a command has made of a file."""
 
-    frequencies: tuple[float, ...]
-    """Modes that are trusted (Hz)."""
+    modes: tuple[tuple[float, bool], ...]
+    """Frequency (Hz) of each mode, and whether it is trusted."""
     refusal: str
     """Message where it was not read; else empty."""
+
+    @property
+    def trusted(self) -> list[float]:
+        """Frequencies of the modes that are trusted (Hz)."""
+        return [frequency for frequency, is_trusted in self.modes if is_trusted]
 
 
 DYNAMICS = "leekunhwee/Dynamics/Cutting/Stability"
@@ -56,6 +65,8 @@ VIBROMETER = "joaonunovalente/vibrometer-analysis"
 OLD_TESTING = "Vibration-Testing/Vibration-Testing-Matlab"
 SHM = "High-Rate-SHM-Working-Group"
 PLATE_FRF = "MAT_001_FRF_Channel_8"
+PLATE_POINTS = "WangSuhan/Modal-identification-of-plate/20201016"
+DYNAMIC_STRUCTURE = "TimVrtac/Impact-testing-DS/test_DS"
 CHANNELS = '--columns "time [s],acceleration [g],time [s],force [N]"'
 FILES = (
     PublicFile(f"{DYNAMICS}/FrequencyDomain/Milling/General/FRF[XY].frf"),
@@ -85,7 +96,7 @@ FILES = (
     PublicFile(f"{TESTING}/case[12].mat", "--unit m/s^2/N"),
     PublicFile(f"{TESTING}/mckiddat.mat", "--response 1 --unit m/N"),
     PublicFile(f"{TESTING}/testdata.mat", '--columns "time [s]=t,force [N]=xn,acceleration [g]=yn"'),
-    PublicFile("TimVrtac/Impact-testing-DS/test_DS/F?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 20000'),
+    PublicFile(f"{DYNAMIC_STRUCTURE}/F?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 20000'),
     PublicFile(
         "TimVrtac/Impact-testing-v2/series_meas/?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 51200'
     ),
@@ -106,7 +117,7 @@ FILES = (
     PublicFile("vibrationtoolbox/vtoolbox/vtb7_3_?.mat", "--unit m/s^2/N"),
     PublicFile("vibrationtoolbox/vtoolbox/vtb7_2ex.mat", '--columns "force [N]=f,displacement [m]=x" --rate 1000'),
     PublicFile(
-        "WangSuhan/Modal-identification-of-plate/20201016/*.mat",
+        f"{PLATE_POINTS}/*.mat",
         f'--columns "frequency [Hz]={PLATE_FRF}:1,frf={PLATE_FRF}:2" --unit m/s^2/N',
     ),
     PublicFile("torebutlin/pydvma/data/examples/ruler_grid_acc_3.mat", "--response 1 --unit m/s^2/N"),
@@ -136,7 +147,7 @@ def read(file: Path, answers: list[str]) -> Reading:
     if result.exit_code:
         return Reading((), str(result.exception).replace(f"{file}: ", ""))
     modes = json.loads(result.stdout)["modes"]
-    return Reading(tuple(mode["frequency_hz"] for mode in modes if mode["trust"] == "trusted"), "")
+    return Reading(tuple((mode["frequency_hz"], mode["trust"] == "trusted") for mode in modes), "")
 
 
 def row(folder: Path, entry: PublicFile) -> str:
@@ -144,7 +155,7 @@ def row(folder: Path, entry: PublicFile) -> str:
     files = sorted(folder.glob(entry.pattern))
     if not files:
         return ""
-    words = [str(folder / word[1:]) if word.startswith("@") else word for word in shlex.split(entry.answers)]
+    words = entry.words(folder)
     at_once = [read(file, []) for file in files]
     answered = [read(file, words) for file in files] if words else at_once
     first = answered[0]
@@ -156,8 +167,8 @@ def row(folder: Path, entry: PublicFile) -> str:
 
 def found_text(reading: Reading) -> str:
     """The modes in a file that was read."""
-    first = ", ".join(f"{frequency:.5g}" for frequency in reading.frequencies[:MOST_FOUND])
-    return f"{len(reading.frequencies)} trusted: {first} Hz" if first else "no mode trusted"
+    first = ", ".join(f"{frequency:.5g}" for frequency in reading.trusted[:MOST_FOUND])
+    return f"{len(reading.trusted)} trusted: {first} Hz" if first else "no mode trusted"
 
 
 def main() -> None:

@@ -19,8 +19,8 @@ NEAR, OFTEN = 0.005, 0.5
 STRUCTURES = {
     "blade": f"{BLADE}/",
     "plate": PLATE_POINTS,
-    "structure of two plates": DYNAMIC_STRUCTURE,
-    "wing, another day": f"{WING}/first_lab/",
+    "structure of `test_DS`": DYNAMIC_STRUCTURE,
+    "the wing, another day": f"{WING}/first_lab/",
     "tool": f"{SIGNALS}/ExperimentalModalAnalysis/",
     "beam before a vibrometer": f"{VIBROMETER}/*reflection/data/",
 }

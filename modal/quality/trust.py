@@ -7,8 +7,11 @@ from collections.abc import Iterator
 
 from modal.modes.mode import Mode
 
-DOUBTFUL_SHARE, REJECTED_SHARE = 0.05, 0.3
-"""What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode."""
+REJECTED_SHARE = 0.3
+"""What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode; less is in its
+errors."""
+REJECTED_WITHOUT_PEAK = 0.05
+"""The same of a mode without a peak of its own."""
 TURNED = 30.0
 """Phase of the modal constant off real (degrees) beyond which a mode must be known well: what noise and the flanks of
 others make has any phase."""
@@ -26,7 +29,7 @@ MISFIT = 2.0
 """rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
 MISFIT_SHARE = 0.01
 """... from this share of the peak; on the zeta and K of a mode without a peak of its own it bears more."""
-DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "half-power-width", "smoothed-lines")
+DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
 """Remarks that stand for a figure which a mode does not carry."""
 
 
@@ -72,10 +75,10 @@ def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
     never, own_peak = float("inf"), mode.half_power_damping is not None
     share = (mode.misfit_share or 0.0) if (mode.misfit or 1.0) > MISFIT else 0.0
     if own_peak or mode.misfit is None:
-        yield "misfit", share, DOUBTFUL_SHARE, REJECTED_SHARE
+        yield "misfit", share, REJECTED_SHARE, REJECTED_SHARE
         yield "heavy-damping", mode.damping_ratio, HEAVY_DAMPING, HEAVY_DAMPING
     else:
-        yield "misfit", share, MISFIT_SHARE, DOUBTFUL_SHARE
+        yield "misfit", share, MISFIT_SHARE, REJECTED_WITHOUT_PEAK
         yield "heavy-damping", mode.damping_ratio, DOUBTFUL_DAMPING, REJECTED_DAMPING
     is_turned = abs(mode.phase_deg) > TURNED
     yield "uncertain", relative_error(mode), WELL_KNOWN if is_turned else REJECTED_ERROR, REJECTED_ERROR

@@ -35,7 +35,6 @@ def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures
 @pytest.mark.parametrize(
     ("change", "code", "verdict"),
     [
-        ({"misfit": 5.0, "misfit_share": 0.06}, "misfit", Trust.DOUBTFUL),
         ({"misfit": 5.0, "misfit_share": 0.31}, "misfit", Trust.REJECTED),
         ({"misfit": 5.0, "misfit_share": 0.02, "half_power_damping": None}, "misfit", Trust.DOUBTFUL),
         ({"misfit": 5.0, "misfit_share": 0.06, "half_power_damping": None}, "misfit", Trust.REJECTED),
@@ -62,7 +61,8 @@ def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> N
 @pytest.mark.parametrize(
     "change",
     [
-        {"misfit": 5.0, "misfit_share": 0.04},
+        {"misfit": 5.0, "misfit_share": 0.29},
+        {"remarks": (Remark("half-power-width", "", "a text"),)},
         {"damping_ratio": 0.1},
         {"damping_ratio": 0.07, "half_power_damping": None},
         {"coherence": 0.51},

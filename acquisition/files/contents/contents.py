@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
 
@@ -52,6 +52,11 @@ class Signal:
     """Whether the values are shares of a full scale that the file does not name."""
     is_before_window: bool = False
     """Whether it was recorded before the window that the file names."""
+    n_rows: int = 0
+    """Number of rows of the table it is a column of, the first of them its first value; a column of fewer values ends
+    before others do. 0 where it is no column of a table."""
+    flaws: Mapping[int, str] = field(default_factory=dict)
+    """What is wrong with a value that is NaN, as "is empty in line 7", by its place."""
 
 
 @dataclass(frozen=True, eq=False)

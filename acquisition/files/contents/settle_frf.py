@@ -15,6 +15,7 @@ from acquisition.files.contents.heading import ANGLES, is_level
 from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.settle_unit import chosen, frf_unit
 from acquisition.files.contents.units import unit_of
+from acquisition.files.contents.whole_columns import cut_to_shortest, is_beside, refuse_flaws
 from acquisition.frf import Frf, Quantity, from_accelerance
 
 COLUMNS_FRF = '--columns "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
@@ -33,7 +34,12 @@ class Candidate:
 
     def as_columns(self) -> str:
         """Its columns as `--columns` names them."""
-        return ",".join(f"{part.role}={part.name}" for part in (self.signal, self.partner) if part is not None)
+        return ",".join(f"{part.role}={part.name}" for part in self.parts)
+
+    @property
+    def parts(self) -> list[Signal]:
+        """The one or two signals."""
+        return [self.signal] if self.partner is None else [self.signal, self.partner]
 
 
 def candidates(signals: Sequence[Signal]) -> list[Candidate]:
@@ -54,16 +60,21 @@ def settle_frf(contents: Contents, description: Description, ledger: Ledger) -> 
     signal = chosen([candidate.signal for candidate in listed], description.response, "FRFs", ledger)
     n_averages = _averages(contents, description, ledger)
     candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
+    coherence = _coherence_of(contents, listed.index(candidate), candidate.signal)
+    axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == candidate.signal.record]
+    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, ledger)
+    candidate = Candidate(*used[: len(candidate.parts)])
     values = _values(candidate, ledger)
     unit = frf_unit(candidate.signal, description, ledger)
-    frequency = _frequency(contents, candidate, description, ledger)
-    coherence = _coherence(contents, listed.index(candidate), candidate.signal, ledger)
+    frequency = _frequency(contents, candidate, axes, description, ledger)
+    shares = _shares(used[-1] if coherence else None, ledger)
+    refuse_flaws(candidate.parts, ledger, int(frequency is None or frequency[0] == 0))
     if frequency is None or values is None or unit is None or not ledger.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
-    coherence = None if coherence is None else coherence[first:]
+    shares = None if shares is None else shares[first:]
     try:
-        return _frf(frequency[first:], values[first:] * unit[1], coherence, n_averages, FORMS[unit[0]])
+        return _frf(frequency[first:], values[first:] * unit[1], shares, n_averages, FORMS[unit[0]])
     except ValueError as error:
         ledger.faults.append(str(error))
         return None
@@ -144,13 +155,13 @@ def _may_be_axis(signal: Signal, n: int) -> bool:
 
 
 def _frequency(
-    contents: Contents, frf: Candidate, description: Description, ledger: Ledger
+    contents: Contents, frf: Candidate, axes: Sequence[Signal], description: Description, ledger: Ledger
 ) -> NDArray[np.float64] | None:
     """Of an FRF (Hz)."""
-    axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == frf.signal.record]
     axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
     if axis is None:
         return _by_spacing(contents.signals, frf, description, ledger)
+    refuse_flaws([axis], ledger)
     if description.spacing is not None or description.start is not None:
         ledger.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
         return None
@@ -171,14 +182,20 @@ def _ends(axis: Signal, factor: float) -> str:
     return f"{axis.values[0] * factor:.4g} to {axis.values[-1] * factor:.6g} Hz"
 
 
-def _coherence(contents: Contents, number: int, frf: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
-    """That of the FRF of this number; a line where it lies beyond 0 to 1 is trusted with nothing."""
+def _coherence_of(contents: Contents, number: int, frf: Signal) -> Signal | None:
+    """That of the FRF of this number."""
     coherences = [signal for signal in contents.signals if signal.role == "coherence"]
-    same = [signal for signal in coherences if signal.record == frf.record and signal.values.shape == frf.values.shape]
-    if not same or (len(coherences) > 1 and number >= len(coherences)):
+    beside = [signal for signal in coherences if is_beside(signal, frf)]
+    if not beside or (len(coherences) > 1 and number >= len(coherences)):
+        return None
+    return coherences[number] if len(coherences) > 1 and coherences[number] in beside else beside[0]
+
+
+def _shares(signal: Signal | None, ledger: Ledger) -> NDArray[np.float64] | None:
+    """Values of a coherence; a line where it lies beyond 0 to 1 is trusted with nothing."""
+    if signal is None:
         ledger.know("coherence", "none", "file")
         return None
-    signal = coherences[number] if len(coherences) > 1 and coherences[number] in same else same[0]
     values = np.asarray(signal.values.real, dtype=np.float64)
     beyond = ~((values >= 0) & (values <= 1 + 1e-9))
     if np.mean(beyond) > MOST_BEYOND:

@@ -17,6 +17,7 @@ from acquisition.files.contents.named_columns import names_of
 from acquisition.files.contents.sensitivity import in_sensor_units
 from acquisition.files.contents.settle_unit import MOTIONS, chosen, force_unit, response_unit
 from acquisition.files.contents.units import STANDARD_GRAVITY, unit_of
+from acquisition.files.contents.whole_columns import cut_to_shortest, refuse_flaws
 from acquisition.hit import Hit
 from acquisition.hits.hits_in_record import hits_in_record
 
@@ -56,11 +57,12 @@ def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) ->
         return None
     signals = scaled
     forces, responses = _by_kind(signals, description, ledger)
-    rate = rate_of(signals, [*forces, *responses], description, ledger)
     response = chosen(responses, description.response, "responses", ledger) if responses else None
+    rate, used = rate_of(signals, [*forces, *([response] if response else [])], description, ledger)
+    forces, response = (used[:-1], used[-1]) if response else (forces, None)
     force = _force(forces, description, ledger)
     unit = response_unit(response or responses[0], description, ledger) if responses else None
-    _doubt_gravity(responses, ledger)
+    _doubt_gravity([response] if response else responses, ledger)
     if force is None or response is None or unit is None or not ledger.is_clean:
         return None
     try:
@@ -86,7 +88,7 @@ def _force(forces: Sequence[Signal], description: Description, ledger: Ledger) -
 def _by_kind(signals: Sequence[Signal], description: Description, ledger: Ledger) -> tuple[list[Signal], list[Signal]]:
     """Forces and responses; what neither unit nor name tells is asked about."""
     needs_force = not description.without_force
-    forces = [signal for signal in signals if kind_of(signal) == "force"]
+    forces = [signal for signal in signals if needs_force and kind_of(signal) == "force"]
     responses = [signal for signal in signals if kind_of(signal) == "response"]
     unclear = [channel for channel in signals if not kind_of(channel) and channel.role in ("", "real", "magnitude")]
     channels = [channel for channel in signals if channel.role != "time"]
@@ -117,25 +119,32 @@ def kind_of(signal: Signal) -> str:
     return by_quantity or (signal.role if signal.role in ("force", "response") else "")
 
 
-def rate_of(signals: Sequence[Signal], used: Sequence[Signal], description: Description, ledger: Ledger) -> float:
-    """Samples a second (Hz); 0 where it is missing or wrong."""
-    used = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
-    if len({signal.values.size for signal in used}) > 1:
-        ledger.faults.append(f"its channels differ in length: {names_of(used)}")
-        return 0.0
-    rates = [signal.rate for signal in used if signal.rate is not None]
+def rate_of(
+    signals: Sequence[Signal], used: Sequence[Signal], description: Description, ledger: Ledger
+) -> tuple[float, list[Signal]]:
+    """Samples a second (Hz), 0 where that is missing or wrong; and the signals that are used, in one length."""
+    times = [signal for signal in signals if signal.role == "time"]
+    used, times = cut_to_shortest(used, times, ledger)
+    of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
+    if len({signal.values.size for signal in of_one_length}) > 1:
+        ledger.faults.append(f"its channels differ in length: {names_of(of_one_length)}")
+        return 0.0, used
+    rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + SAME_RATE):
         ledger.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
-        return 0.0
-    by_axis = _rate_of_axis(signals, used[0].values.size, ledger)
-    return _agreed(rates[0] if rates else by_axis, description.rate, ledger)
+        return 0.0, used
+    size = of_one_length[0].values.size
+    beside = [time for time in times if time.values.size == size]
+    refuse_flaws([*used, *beside], ledger)
+    by_axis = _rate_of_axis(beside, ledger)
+    return _agreed(rates[0] if rates else by_axis, description.rate, ledger), used
 
 
-def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float | None:
+def _rate_of_axis(times: Sequence[Signal], ledger: Ledger) -> float | None:
     """That of the time columns, which must agree; None where there is none whose unit is known."""
-    times = [signal for signal in signals if signal.role == "time" and signal.values.size == size]
-    if not times:
+    if not times or any(time.flaws for time in times):
         return None
+    size = times[0].values.size
     if size < 8:
         ledger.faults.append(f"{size} samples; at least 8 are needed")
         return None

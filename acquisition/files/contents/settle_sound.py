@@ -48,17 +48,16 @@ def settle_sound(
     meant = [chosen(heard, description.response, "responses", ledger)] if description.response is not None else heard
     settled = [signal for signal in meant if signal is not None]
     factors = [1.0 if is_microphone else _factor(signal, description, ledger) for signal in settled]
-    rate = rate_of(scaled, settled, description, ledger)
+    beside = [turning] if turning is not None and settled else []
+    rate, used = rate_of(scaled, [*settled, *beside], description, ledger)
     if is_microphone and responses:
         ledger.faults.append(f"{responses[0].name} moves; leave --sensor microphone out")
     if not settled or not ledger.is_clean:
         return None
-    speed = None
-    if turning is not None:
-        rate_of(scaled, [*settled, turning], description, ledger)
-        speed = settle_speed(turning, rate, description, ledger) if ledger.is_clean else None
-        if not ledger.is_clean:
-            return None
+    settled, beside = used[: len(settled)], used[len(settled) :]
+    speed = settle_speed(beside[0], rate, description, ledger) if beside else None
+    if not ledger.is_clean:
+        return None
     values = np.stack([signal.values * factor for signal, factor in zip(settled, factors, strict=True)])
     return np.asarray(values if len(settled) > 1 else values[0], dtype=np.float64), rate, speed
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import name_and_unit, role_of
 from acquisition.files.readers.format import Format
+from acquisition.files.readers.numerals import read_columns
 
 MAGIC = b"LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -59,46 +58,25 @@ def _segment(
         raise DataError(f"{place} ({error})") from error
     units = [_word(header.get("Y_Unit_Label", []), i) for i in at]
     names = [_word(lines[end + 1].split(split) if end + 1 < after else [], column) for column in columns]
+    table = lines[end + 2 : after]
+    lengths = [None if after == len(lines) else n for n in samples]
+    cells = [[_word(row.split(split), i) for row in table[:n]] for i, n in zip(columns, lengths, strict=True)]
     signals = list[Signal]()
-    for i, column in enumerate(columns):
+    for i, found in enumerate(read_columns(cells, range(end + 3, after + 1), head.get("Decimal_Separator", ""))):
         if samples[i]:
-            cells = _column(path, lines, (end + 2, after, column, samples[i]), split, _comma(head, lines, end, split))
+            n_there = found.values.size
+            if n_there < samples[i]:
+                raise DataError(f"{path}: {n_there} of {samples[i]} samples are there; the file is cut short")
             name, by_name = name_and_unit(names[i] or f"channel {i + 1}")
             unit = units[i] or by_name
-            rate = 1 / steps[i] if steps[i] > 0 else None
-            signals.append(Signal(name, cells, role_of(name, unit), unit, rate=rate, record=record))
+            rate, role = 1 / steps[i] if steps[i] > 0 else None, role_of(name, unit)
+            signal = Signal(name, found.values, role, unit, rate=rate, record=record)
+            signals.append(replace(signal, n_rows=len(table), flaws=found.flaws))
     return signals
 
 
 def _word(words: Sequence[str], i: int) -> str:
     return words[i].strip() if i < len(words) else ""
-
-
-def _comma(head: Mapping[str, str], lines: Sequence[str], end: int, split: str) -> bool:
-    """Whether the decimal sign is a comma; where the header does not say, as the first row has it."""
-    sign = head.get("Decimal_Separator", "")
-    return sign == "," if sign else split != "," and "," in (lines[end + 2] if end + 2 < len(lines) else "")
-
-
-def _column(
-    path: Path, lines: Sequence[str], place: tuple[int, int, int, int], split: str, comma: bool
-) -> NDArray[np.float64]:
-    """One channel; place: its first line, the line after the last, the column, and how many values it should have."""
-    first, after, column, n = place
-    last = after if after == len(lines) else min(after, first + n)
-    while last > first and not _word(lines[last - 1].split(split), column):
-        last -= 1  # other channels may be longer
-    if last - first < n:
-        raise DataError(f"{path}: {last - first} of {n} samples are there; the file is cut short")
-    values = np.empty(last - first)
-    for i, line in enumerate(lines[first:last]):
-        words = line.split(split)
-        try:
-            values[i] = float(words[column].replace(",", ".") if comma else words[column])
-        except (ValueError, IndexError) as error:
-            text = line.strip()[:60]
-            raise DataError(f"{path}: line {first + i + 1}: {text!r} has no number in column {column + 1}") from error
-    return values
 
 
 def _created(head: Mapping[str, str]) -> datetime | None:

@@ -18,7 +18,7 @@ from acquisition.files.contents.contents import Contents, Role, Signal
 from acquisition.files.contents.heading import role_of
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lines
-from acquisition.files.readers.row_form import RowForm, numbers_of
+from acquisition.files.readers.row_form import RowForm, columns_of
 from acquisition.files.readers.text import text_of
 
 MAGIC = b"Header Size:"
@@ -32,23 +32,26 @@ def read_pulse(path: Path) -> Contents:
     header = _pairs(lines.texts[: blocks[0][0]]) if blocks else {}
     try:
         is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
-        form = RowForm(r"\t", header["decimal symbol"] == ",", (1, 2, 3) if is_complex else (1, 2))
+        form, sign = RowForm("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
     except (KeyError, ValueError) as error:
         raise DataError(f"{path}: its header lacks {error}, or no row follows it; export it anew") from error
     signals = list[Signal]()
     for record, (first, after) in enumerate(blocks):
-        if after - first != n:
+        columns = columns_of(lines[first:after], form, str(path), sign)
+        n_there = min(column.values.size for column in columns)
+        if n_there != n:
             place = f"{path}: line {lines.numbers[after - 1]}"
-            raise DataError(f"{place}: {after - first} of {n} rows are there; the file is cut short")
-        axis, *values = numbers_of(lines[first:after], form, str(path))
-        function = np.asarray(values[0] + 1j * values[1]) if is_complex else values[0]
+            raise DataError(f"{place}: {n_there} of {n} rows are there; the file is cut short")
+        axis, *parts = (column.values for column in columns)
+        function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
+        flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
         name, unit, over = (
             header.get("title", "function"),
             header.get("amplitudeunit", ""),
             header.get("x-axis unit", ""),
         )
-        signals.append(Signal("abscissa", axis, role_of("", over), over, record=record))
-        signals.append(Signal(name, function, _role(header, unit), unit, record=record))
+        signals.append(Signal("abscissa", axis, role_of("", over), over, record=record, flaws=columns[0].flaws))
+        signals.append(Signal(name, function, _role(header, unit), unit, record=record, flaws=flaws))
     return Contents(tuple(signals), created=_created(header))
 
 

@@ -14,24 +14,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import is_level, role_of, unit_by_name
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lines
-from acquisition.files.readers.row_form import (
-    RowForm,
-    begins_with_number,
-    dialect,
-    numbers_of,
-    plain_complex,
-    row_form,
-)
+from acquisition.files.readers.numerals import Column, is_number
+from acquisition.files.readers.row_form import RowForm, begins_with_number, columns_of, dialect, plain_row, row_form
 from acquisition.files.readers.table_heading import Heading, heading_above, heading_behind, is_unit_line
 from acquisition.files.readers.text import is_text, text_of
 
@@ -52,10 +44,11 @@ def read_table(path: Path, skip: int = 0) -> Contents:
     signals, notes = list[Signal](), list[str]()
     for record, table in enumerate(_tables(path, lines)):
         rows, form, heading = _rows(path, table, comments)
-        signals += [replace(s, record=record) for s in signals_of(numbers_of(rows, form, str(path)), heading)]
+        columns = columns_of(rows, form, str(path))
+        signals += _signals(columns, heading, record)
         beside = [word for i, word in enumerate(form.words(rows.texts[-1])) if word and i not in form.columns]
         notes += [f"beside its columns stands {word!r} in the last row" for word in beside]
-    _check_whole(path, keys, rows, text)
+    _check_whole(path, keys, rows, columns, text)
     notes += [f"below its rows stands {line!r}" for line in footer]
     return replace(_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
 
@@ -79,45 +72,52 @@ def _without_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]
 
 def _may_be_row(line: str, form: RowForm) -> bool:
     """Whether it has a digit, and more than one number where it begins with a word."""
-    return bool(_DIGIT.search(line)) and (not _WORD.match(line) or sum(map(form.is_number, form.words(line))) > 1)
+    return bool(_DIGIT.search(line)) and (not _WORD.match(line) or sum(map(is_number, form.words(line))) > 1)
 
 
-def signals_of(values: Sequence[NDArray[Any]], heading: Heading) -> tuple[Signal, ...]:
+def _signals(columns: Sequence[Column], heading: Heading, record: int) -> list[Signal]:
     """Columns with their names, units and what they therefore are; heading: empty where there is none."""
-    named = zip(heading or [("", "")] * len(values), values, strict=True)
-    return tuple(_signal(name or f"column {i}", unit, column) for i, ((name, unit), column) in enumerate(named, 1))
+    n_rows = max((column.values.size for column in columns), default=0)
+    named = zip(heading or [("", "")] * len(columns), columns, strict=True)
+    return [
+        replace(_signal(name or f"column {i}", unit, column), record=record, n_rows=n_rows)
+        for i, ((name, unit), column) in enumerate(named, 1)
+    ]
 
 
-def _signal(name: str, unit: str, column: NDArray[Any]) -> Signal:
+def _signal(name: str, unit: str, column: Column) -> Signal:
     """Complex numbers are an FRF, and real ones none."""
-    if np.iscomplexobj(column):
-        return Signal(name, column, "frf", unit)
+    values, flaws = column.values, column.flaws
+    if np.iscomplexobj(values):
+        return Signal(name, values, "frf", unit, flaws=flaws)
     unit = unit_by_name(name, unit)
     role = "magnitude" if is_level(unit) else role_of(name, unit)
-    return Signal(name, column, "" if role == "frf" else role, unit)
+    return Signal(name, values, "" if role == "frf" else role, unit, flaws=flaws)
 
 
 def _rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowForm, Heading]:
     """The rows, how they are written, and the heading above them, behind the first or among comments."""
     first = _first_row(path, lines)
-    form = row_form([plain_complex(line) for line in lines.texts[first:]])
+    begin = max(first - 1, 0)  # of the row that may have the heading behind it
+    plain = NumberedLines([*map(plain_row, lines.texts[begin:])], lines.numbers[begin:])
+    form = row_form(plain.texts[first - begin :])
     if not form.columns:
         cure = "pass over what stands above them with --skip"
         raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
-    width = len(form.words(plain_complex(lines.texts[first:][:2][-1])))
-    if not form.is_row(plain_complex(lines.texts[first])) and is_unit_line(lines.texts[:first], form, width):
+    width = len(form.words(plain.texts[first - begin :][:2][-1]))
+    if not _begins_in_column(plain.texts[first - begin], form) and is_unit_line(lines.texts[:first], form, width):
         first += 1  # it holds ranges
-    behind = next(((at, named) for at in (first, first - 1) if (named := _behind(lines, at, form))), None)
-    at, heading = behind or (first, [])
-    rows = NumberedLines([plain_complex(line) for line in lines.texts[at:]], lines.numbers[at:])
-    if behind is None:
-        _refuse_broken_row(path, lines[:first], form, width)
-        heading = heading_above([*comments, *lines.texts[:first]], form, width)
-    return rows, form, heading
+    for at in (first, begin):
+        if heading := heading_behind(plain.texts[at - begin], form):
+            return plain[at - begin :], form, heading
+    _refuse_broken_row(path, lines[:first], form, width)
+    return plain[first - begin :], form, heading_above([*comments, *lines.texts[:first]], form, width)
 
 
-def _behind(lines: NumberedLines, at: int, form: RowForm) -> Heading:
-    return heading_behind(plain_complex(lines.texts[at]), form) if at >= 0 else []
+def _begins_in_column(line: str, form: RowForm) -> bool:
+    """Whether the first of the columns holds a number in this line."""
+    words = form.words(line)
+    return form.columns[0] < len(words) and is_number(words[form.columns[0]])
 
 
 def _first_row(path: Path, lines: NumberedLines) -> int:
@@ -134,8 +134,8 @@ def _first_row(path: Path, lines: NumberedLines) -> int:
 
 def _refuse_broken_row(path: Path, above: NumberedLines, form: RowForm, width: int) -> None:
     """DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
-    words = form.words(plain_complex(above.texts[-1])) if above.texts else []
-    numbers = sum(map(form.is_number, words))
+    words = form.words(plain_row(above.texts[-1])) if above.texts else []
+    numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _WORD.match(above.texts[-1])
     if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):
         cure = f"mend it, or pass over what stands above the rows with --skip {above.numbers[-1]}"
@@ -143,16 +143,20 @@ def _refuse_broken_row(path: Path, above: NumberedLines, form: RowForm, width: i
         raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")
 
 
-def _check_whole(path: Path, keys: Mapping[str, str], rows: NumberedLines, text: str) -> None:
-    """DataError where a table that we wrote has other rows than its heading says, or ends within the last of them."""
+def _check_whole(
+    path: Path, keys: Mapping[str, str], rows: NumberedLines, columns: Sequence[Column], text: str
+) -> None:
+    """DataError where the last row has no line end and lacks a number, or our table is not as its heading says."""
+    last, has_end = f"{path}: line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
+    if not has_end and any(column.values.size == len(rows.texts) - 1 for column in columns):
+        raise DataError(f"{last} ends within its row: the file is cut short; export it anew, or take out that line")
     rows_written = keys.get("rows")
     if rows_written is None or keys.get("written by") != "lobewatch":
         return  # of another program, or of our first versions
-    last = f"{path}: line {rows.numbers[-1]}"
     cure = "convert it anew, or take out the line that begins with # rows"
     if rows_written != str(len(rows.texts)):
         raise DataError(f"{last} ends row {len(rows.texts)} of {rows_written}: cut short or altered; {cure}")
-    if not text.endswith(("\n", "\r")):
+    if not has_end:
         raise DataError(f"{last} has no line end, so that its last number may be cut short; {cure}")
 
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from acquisition.files.contents.heading import is_unit, name_and_unit, role_of
 from acquisition.files.contents.units import unit_of
-from acquisition.files.readers.row_form import RowForm
+from acquisition.files.readers.numerals import is_number
+from acquisition.files.readers.row_form import BLANKS, RowForm
 from acquisition.files.readers.text import fields
 
 Heading = list[tuple[str, str]]
@@ -32,7 +33,7 @@ def heading_above(lines: Sequence[str], form: RowForm, width: int) -> Heading:
     lines = [_MARK.sub("", line) for line in lines]
     by_line = [words for line in reversed(lines) if (words := _words(line, form, width))]
     units = next((words for words in by_line if _are_units(words)), [])
-    named = [words for words in by_line if any(map(_LETTER.search, words)) and not any(map(form.is_number, words))]
+    named = [words for words in by_line if any(map(_LETTER.search, words)) and not any(map(is_number, words))]
     names = [words for words in named if words is not units] or [[""] * len(units)]
     in_turn = _words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
     if in_turn and all(in_turn[::2]) and is_unit(in_turn[1]):
@@ -48,12 +49,8 @@ def _known(words: Sequence[str]) -> int:
 def heading_behind(row: str, form: RowForm) -> Heading:
     """Behind the numbers of a row: a name and a unit for each column, or names alone; else empty."""
     width = len(form.columns)
-    words = re.split(r"\s+" if form.separator in (r"\s+", "\t") else form.separator, row.strip(), maxsplit=width)
-    if (
-        len(words) <= width
-        or not all(map(form.is_number, words[:width]))
-        or form.is_number((words[width].split() or [""])[0])
-    ):
+    words = re.split(r"\s+" if form.separator in (BLANKS, "\t") else form.separator, row.strip(), maxsplit=width)
+    if len(words) <= width or not all(map(is_number, words[:width])) or is_number((words[width].split() or [""])[0]):
         return []
     names = [word for word in re.split(r"\s*\t\s*|\s*;\s*|\s+", words[width].strip()) if word]
     if len(names) == 2 * width:

@@ -18,11 +18,13 @@ HEAD = 65536
 
 
 def text_of(path: Path) -> str:
-    """UTF-8, UTF-16 with its mark, else Latin-1, in which every byte is a character."""
-    content = path.read_bytes()
-    if content.startswith(_WIDE):
-        return content.decode("utf-16", errors="replace")
-    return decoded(content)
+    """UTF-8, UTF-16 with its mark or without, else Latin-1, in which every byte is a character."""
+    return _text(path.read_bytes())
+
+
+def _text(content: bytes) -> str:
+    encoding = _wide_encoding(content[:HEAD])
+    return content.decode(encoding, errors="replace") if encoding else decoded(content)
 
 
 def decoded(content: bytes) -> str:
@@ -33,6 +35,19 @@ def decoded(content: bytes) -> str:
         return content.decode("latin-1")
 
 
+def _wide_encoding(head: bytes) -> str:
+    """UTF-16, by its mark, or as of two bytes the same one is zero in most characters and never the other; else empty.
+
+    Numbers, blanks and separators are such characters, in whatever language the words between them are.
+    """
+    if head.startswith(_WIDE):
+        return "utf-16"
+    zeros = [head[parity::2].count(0) for parity in (0, 1)]
+    if min(zeros) == 0 and 4 * max(zeros) > len(head):
+        return "utf-16-le" if zeros[1] else "utf-16-be"
+    return ""
+
+
 def fields(line: str, separator: str) -> list[str]:
     """The words of a line; within quotes a separator is none, but in a line that stands in quotes as a whole."""
     words = [word.strip() for word in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
@@ -41,7 +56,7 @@ def fields(line: str, separator: str) -> list[str]:
 
 def is_text(head: bytes) -> bool:
     """Whether these first bytes can be those of a text."""
-    return head.startswith(_WIDE) or b"\x00" not in head
+    return b"\x00" not in head or bool(_wide_encoding(head))
 
 
 def is_prose(path: Path) -> bool:
@@ -54,5 +69,5 @@ def is_prose(path: Path) -> bool:
             head = file.read(HEAD)
     except OSError:
         return False
-    text = head.decode("utf-16", errors="ignore") if head.startswith(_WIDE) else decoded(head)
+    text = _text(head)
     return bool(text.strip()) and is_text(head) and _TWO_NUMBERS.search(text) is None

@@ -157,7 +157,7 @@ def test_a_time_axis_is_judged_as_a_whole(tmp_path: Path, form: str) -> None:
 def test_a_time_axis_that_is_not_even_is_refused(tmp_path: Path, spoil: Callable[..., np.ndarray]) -> None:
     time, force, response = hit_signals(2000)
     path = put(tmp_path / "hit.txt", "time_s\tforce_N\tacc_g\n" + rows(spoil(time), force, response, form="%.12g"))
-    with pytest.raises(DataError, match=r"uneven|does not rise|no row of finite numbers"):
+    with pytest.raises(DataError, match=r"uneven|does not rise|time holds 'nan' in line 11,"):
         read_hits(path)
 
 
@@ -180,9 +180,9 @@ def test_mixed_units_and_damaged_numbers_are_refused(tmp_path: Path) -> None:
     assert "Real is in 'um/N', Imag in 'm/N'; they must be the same" in complaint(mixed)
     volts = put(tmp_path / "b.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + rows(F, H.real, H.imag, separator=","))
     assert "the sensitivity of the sensor, as its FRF is in V/N" in complaint(volts)
-    for spoilt in (F[::-1], np.where(F == 9, F - 1, F), np.where(F == 9, np.nan, F)):
+    for spoilt in (F[::-1], np.where(F == 9, F - 1, F)):
         path = put(tmp_path / "c.csv", "Freq (Hz),Real (m/N),Imag\n" + rows(spoilt, H.real, H.imag, separator=","))
         assert "frequency must be finite, >= 0 Hz and strictly rising" in complaint(path)
     word = put(tmp_path / "d.csv", "Freq (Hz),Real (m/N),Imag\n1,2,3\n2,overflow,3\n3,4,5\n")
-    with pytest.raises(DataError, match=r"d\.csv: line 3: '2,overflow,3' is no row of numbers"):
+    with pytest.raises(DataError, match=r"d\.csv: Real holds 'overflow' in line 3, which is no number"):
         read_recording(word)

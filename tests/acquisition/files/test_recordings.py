@@ -110,11 +110,14 @@ def write(path: Path, text: str) -> Path:
     [
         ("", "the file is empty"),
         ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
-        ("time_s,force_N,acc_g\n0,1,x\n", "line 2: '0,1,x' is no row of numbers"),
-        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n", "line 3: 2 numbers where other rows have 3"),
+        (
+            "time_s,force_N,acc_g\n0,1,x\n",
+            "acc holds 'x' in line 2, which is no number; mend it there, or leave acc out of --columns",
+        ),
+        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n0.2,1,2\n", "line 3: 2 numbers where other rows have 3"),
         ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),
         ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples; at least 8 are needed"),
-        ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "not finite"),
+        ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "Imag holds 'nan' in line 2"),
         (
             "\x00\x01\x02garbage",
             r"of no format that is known here; export it as one of these: tap file of lobewatch \(\.h5\), univ",
@@ -132,7 +135,7 @@ def test_nan_in_a_hit_is_refused_with_the_file(tmp_path: Path) -> None:
     broken = FORCE.copy()
     broken[77] = np.nan
     path = table(tmp_path / "nan.csv", "time_s,force_N,acc_g", TIME, broken, ACCELERATION)
-    with pytest.raises(DataError, match=r"nan\.csv.*force is not finite at 1 samples, first at sample 77"):
+    with pytest.raises(DataError, match=r"nan\.csv.*force holds 'nan' in line 79"):
         read_hits(path)
 
 
@@ -145,7 +148,7 @@ def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
     with pytest.raises(DataError, match="line 13: the segment's header lacks"):
         read_hits(write(tmp_path / "bad.lvm", "\n".join(line.replace("Delta_X", "Delta") for line in lines)))
     garbled = [*lines[:5000], "\tabc\t1,0", *lines[5001:]]
-    with pytest.raises(DataError, match="line 5001: 'abc"):
+    with pytest.raises(DataError, match="holds 'abc' in line 5001"):
         read_hits(write(tmp_path / "garbled.lvm", "\n".join(garbled)))
 
 

@@ -1,0 +1,185 @@
+"""Numbers as people write them: decimal point or comma, thousands apart, and what stands in place of a number.
+
+What a comma or a point is for, a number tells in which it can be one thing only: `0,5` and `1,2e-6` have a decimal
+comma, `1,234.5` and `1,234,567` commas between thousands; `1,234` alone may be either.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Use = Literal["decimal", "thousands", "doubtful"]
+"""What a sign in a number is for."""
+
+_OTHER = {",": ".", ".": ","}
+_EXPONENT = r"(?:[eEdD][+-]?\d+)?"
+_GROUPED = {
+    sign: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{sign}]\d{{3}})+(?:[{other}]\d*)?") for sign, other in _OTHER.items()
+}
+_DECIMAL = {
+    sign: re.compile(
+        rf"\(?[+-]?(?:\d*|[1-9]\d{{0,2}}(?:[ {other}]\d{{3}})+)[{sign}]\d+{_EXPONENT}(?:[+-][\d.,]+{_EXPONENT}j)?\)?"
+    )
+    for sign, other in _OTHER.items()
+}
+_WITH_BLANKS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?: \d{{3}})+(?:[.,]\d*)?{_EXPONENT}")
+_NARROW = re.compile(r"(?<![\w.,])([1-9]\d{0,2})((?:[\u00a0\u2009\u202f'\u2019]\d{3})+)(?!\d)")
+_IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
+_MISSING = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QNAN|SNAN)0*", re.IGNORECASE)
+"""In place of a number, as spreadsheets and older C libraries write it."""
+
+
+@dataclass(frozen=True)
+class Numerals:
+    """How the numbers of a file are written."""
+
+    comma: Use = "decimal"
+    """What a comma is for."""
+    point: Use = "decimal"
+    """What a point is for."""
+
+    @property
+    def no_decimals(self) -> str:
+        """Those of both signs that are no decimal sign, or perhaps none."""
+        return "".join(sign for sign, use in ((",", self.comma), (".", self.point)) if use != "decimal")
+
+    def number(self, word: str) -> complex:
+        """A word as a number, real where it is; ValueError, as the end of a sentence, where it is none or in doubt."""
+        plain = word.replace(" ", "") if " " in word and _WITH_BLANKS.fullmatch(word) else word
+        for sign, use in ((",", self.comma), (".", self.point)):
+            if use != "decimal" and sign in plain:
+                plain = _in_one(plain, sign, use)
+        try:
+            return _parsed(plain.replace(",", "."))
+        except ValueError:
+            raise ValueError("which is no number") from None
+
+
+PLAIN = Numerals()
+"""A decimal point or comma, and nothing between thousands."""
+
+
+def _in_one(word: str, sign: str, use: Use) -> str:
+    """A number without what stands between its thousands; ValueError where that is not known, or elsewhere."""
+    if not _GROUPED[sign].fullmatch(word):
+        raise ValueError("which is no number")
+    if use == "doubtful":
+        raise ValueError(f"which may be {word.replace(sign, '.')} or {word.replace(sign, '')}")
+    return word.replace(sign, "")
+
+
+def _numerals_of(columns: Sequence[Sequence[str]]) -> list[Numerals]:
+    """How the numbers of each column are written: as one of its own tells, else as those of the others do, if alike."""
+    commas, points = ([_use_in(sign, column) for column in columns] for sign in _OTHER)
+    comma, point = _agreed(commas), _agreed(points)
+    if point == "doubtful" and not {"decimal", "doubtful"} & {*commas}:
+        point = "decimal"
+    return [Numerals(*uses) for uses in zip(_settled(commas, comma), _settled(points, point), strict=True)]
+
+
+def _use_in(sign: str, words: Sequence[str]) -> Use | None:
+    """What a sign is for in these words; None where no number has one."""
+    if sign not in "".join(words):
+        return None
+    uses = (use for word in words if sign in word if (use := _use(sign, word)) is not None)
+    first = next(uses, None)
+    return next((use for use in uses if use != "doubtful"), first) if first == "doubtful" else first
+
+
+def _agreed(uses: Sequence[Use | None]) -> Use:
+    """What a sign is for in all columns that tell; in doubt where none does, or one other than another."""
+    certain = {use for use in uses if use in ("decimal", "thousands")}
+    return certain.pop() if len(certain) == 1 else "doubtful"
+
+
+def _settled(uses: Sequence[Use | None], agreed: Use) -> list[Use]:
+    return [agreed if use == "doubtful" else use or "decimal" for use in uses]
+
+
+def _use(sign: str, word: str) -> Use | None:
+    if _GROUPED[sign].fullmatch(word):
+        return "thousands" if word.count(sign) > 1 or _OTHER[sign] in word else "doubtful"
+    return "decimal" if _DECIMAL[sign].fullmatch(word) else None
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number, however that is written."""
+    try:
+        PLAIN.number(word)
+    except ValueError:
+        return any(_use(sign, word) for sign in _OTHER)
+    return True
+
+
+def _parsed(plain: str) -> complex:
+    """A number with a decimal point; ValueError where it is none."""
+    try:
+        return float(plain)
+    except ValueError:
+        if _MISSING.fullmatch(plain):
+            return math.nan
+        return complex(plain) if _IMAGINARY.fullmatch(plain) else float(re.sub("[dD]", "e", plain))
+
+
+def without_narrow_blanks(line: str) -> str:
+    """A line whose thousands are not apart by a blank that does not break, a thin one, or an apostrophe."""
+    return _NARROW.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), line)
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The numbers of a column, up to its last cell that is not empty."""
+
+    values: NDArray[Any]
+    """Numbers, complex where one is, NaN where a cell holds none; shape (n,)."""
+    flaws: Mapping[int, str]
+    """What is wrong with a cell that holds none, as "is empty in line 7", by its place in the column."""
+
+
+def read_columns(columns: Sequence[Sequence[str]], lines: Sequence[int], decimal_sign: str = "") -> list[Column]:
+    """The numbers in the cells of each column, each cell in a line of its own.
+
+    decimal_sign: a comma or a point where the file says it; the other one stands between thousands then.
+    """
+    by_sign = {",": Numerals("decimal", "thousands"), ".": Numerals("thousands", "decimal")}
+    written = [by_sign[decimal_sign]] * len(columns) if decimal_sign in by_sign else _numerals_of(columns)
+    return [_column(cells, lines, numerals) for cells, numerals in zip(columns, written, strict=True)]
+
+
+def _column(cells: Sequence[str], lines: Sequence[int], numerals: Numerals) -> Column:
+    n = len(cells)
+    while n and not cells[n - 1]:
+        n -= 1
+    at_once = _at_once(cells[:n], numerals)
+    if at_once is not None:
+        return Column(at_once, {})
+    values, flaws = list[complex](), dict[int, str]()
+    for i, (cell, line) in enumerate(zip(cells[:n], lines, strict=False)):
+        try:
+            values.append(numerals.number(cell))
+            fault = "which is no number" if math.isnan(values[-1].real) else ""
+        except ValueError as error:
+            values.append(math.nan)
+            fault = str(error)
+        if fault:
+            flaws[i] = f"holds {cell!r} in line {line}, {fault}" if cell else f"is empty in line {line}"
+    return Column(np.array(values), flaws)
+
+
+def _at_once(cells: Sequence[str], numerals: Numerals) -> NDArray[np.float64] | None:
+    """The numbers of cells, many times as fast; None where one is complex, missing, or has thousands."""
+    text = "\n".join(cells)
+    if any(sign in text for sign in numerals.no_decimals):
+        return None
+    try:
+        values = np.array([*map(float, text.replace(",", ".").split("\n") if "," in text else cells)])
+    except ValueError:
+        return None
+    return None if np.isnan(values).any() else values

@@ -1,0 +1,292 @@
+"""Cells of a table: empty ones, channels that end early, thousands apart, and text in UTF-16 without its mark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
+
+from acquisition import DataError, Description, Fact, look, read_frf, read_hits
+from acquisition.files.read_sound import read_sound
+
+HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
+HIT = [f"{t:.9g} {f:.9g} {a:.9g} 20".split() for t, f, a in zip(TIME, FORCE, RESPONSE, strict=True)]
+
+
+def cells_of(separator: str, *changed: tuple[int, int, str], ends: Sequence[int] = (400, 400, 400, 400)) -> str:
+    """The hit and a temperature, some cells (row, column, text) changed, each column up to its end."""
+    cells = [[cell if i < end else "" for cell, end in zip(row, ends, strict=True)] for i, row in enumerate(HIT)]
+    for row, column, text in changed:
+        cells[row][column] = text
+    return HEAD.format(separator) + "".join(separator.join(row) + "\n" for row in cells)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize(("column", "name"), [(0, "Time"), (1, "Force"), (2, "Acc")])
+def test_a_gap_in_a_column_that_is_used_is_refused_with_its_place(
+    tmp_path: Path, separator: str, column: int, name: str
+) -> None:
+    path = put(tmp_path / "a.csv", cells_of(separator, (40, column, "")))
+    assert complaint(path).startswith(f"{name} is empty in line 42; mend it there, or leave {name} out of --columns")
+
+
+@pytest.mark.parametrize("text", ["", "overflow", "1,234"])
+def test_a_gap_in_a_column_that_is_not_used_does_not_matter(tmp_path: Path, text: str) -> None:
+    path = put(tmp_path / "a.csv", cells_of(";", (40, 3, text), (0, 3, text)))
+    (hit,) = read_hits(path)
+    assert hit.force == pytest.approx(FORCE, abs=1e-7)
+    assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-7)
+
+
+def test_time_with_a_gap_is_left_out_and_the_rate_said(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.csv", cells_of(",", (40, 0, "")))
+    said = Description(columns=("-", "force [N]", "acceleration [m/s^2]", "-"), rate=4000)
+    assert read_hits(path, said)[0].force == pytest.approx(FORCE, abs=1e-7)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("ends", [(400, 300, 400, 400), (400, 400, 60, 400), (333, 350, 400, 10), (400, 301, 300, 40)])
+@pytest.mark.parametrize("is_filled_up", [True, False])
+def test_columns_are_cut_to_the_shortest_that_is_used(
+    tmp_path: Path, separator: str, ends: tuple[int, ...], *, is_filled_up: bool
+) -> None:
+    lines = cells_of(separator, ends=ends).splitlines()
+    text = "".join((line if is_filled_up else line.rstrip(separator)) + "\n" for line in lines)
+    found = look(put(tmp_path / "a.csv", text)).checked()
+    (hit,), n = found.hits, min(ends[:3])
+    name = ("Time", "Force", "Acc")[ends.index(n)]
+    assert Fact("rows", f"{n} of {max(ends[:3])}, as {name} ends there", "default") in found.facts
+    assert hit.force == pytest.approx(FORCE[:n], abs=1e-7)
+    assert hit.acceleration == pytest.approx(RESPONSE[:n], abs=1e-7)
+    assert hit.sample_rate == pytest.approx(4000)
+
+
+def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
+    text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
+    path = put(tmp_path / "a.csv", text)
+    assert complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (--response 1)"
+    assert read_hits(path, Description(response=1))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
+    assert "Acc y is empty in line 9" in complaint(path, response=2)
+
+
+def test_a_force_that_is_not_used_may_have_gaps(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.csv", cells_of(",", (7, 1, ""), ends=(400, 20, 400, 400)))
+    assert read_hits(path, Description(without_force=True))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
+
+
+def test_of_several_time_columns_that_of_another_channel_may_end_early(tmp_path: Path) -> None:
+    lines = [f"{t},{f},{t},{a},{t if i < 100 else ''},{1 if i < 100 else ''}\n" for i, (t, f, a, _) in enumerate(HIT)]
+    head = "Time (s),Force (N),Time 2 (s),Acc (g),Time 3 (s),Acc y (g)\n"
+    path = put(tmp_path / "a.csv", head + "".join(lines))
+    assert read_hits(path, Description(response=1))[0].force == pytest.approx(FORCE, abs=1e-7)
+    assert read_hits(path, Description(response=2))[0].force == pytest.approx(FORCE[:100], abs=1e-7)
+
+
+def test_a_row_that_ends_early_above_one_that_does_not_has_lost_a_number(tmp_path: Path) -> None:
+    lines = cells_of(",").splitlines(keepends=True)
+    lines[50] = "0.01,3,20\n"
+    with pytest.raises(DataError, match="line 51: 3 numbers where other rows have 4"):
+        read_hits(put(tmp_path / "a.csv", "".join(lines)))
+
+
+def test_of_columns_between_blanks_none_can_end_early(tmp_path: Path) -> None:
+    lines = [
+        "Time(s) Force(N) Acc(g) Temp\n",
+        *(" ".join(row[: 4 if i < 300 else 3]) + "\n" for i, row in enumerate(HIT)),
+    ]
+    with pytest.raises(DataError, match="line 302: 3 numbers where other rows have 4"):
+        read_hits(put(tmp_path / "a.txt", "".join(lines)))
+
+
+@pytest.mark.parametrize("end", ["9.9e-2", "9.9e-2,1", "9.9e-2,1,", "9.9e-2,1,2"])
+def test_a_file_that_ends_within_its_last_row_is_cut_short(tmp_path: Path, end: str) -> None:
+    with pytest.raises(DataError, match="line 402 ends within its row: the file is cut short"):
+        read_hits(put(tmp_path / "a.csv", cells_of(",") + end))
+
+
+def test_an_frf_is_cut_where_its_coherence_ends_and_refused_for_a_gap(tmp_path: Path) -> None:
+    lines = [row + "\n" for row in rows(F, H.real, H.imag, 0.9 + 0 * F, separator=",").split()]
+    head = "Freq (Hz),Real (m/N),Imag (m/N),Coherence\n"
+    ended = [row.replace(",0.9", ",") if i >= 40 else row for i, row in enumerate(lines)]
+    found = look(put(tmp_path / "a.csv", head + "".join(ended))).checked()
+    assert found.frf is not None
+    assert found.frf.frequency.tolist() == F[:40].tolist()
+    assert found.frf.receptance == pytest.approx(H[:40], rel=1e-9)
+    assert Fact("rows", "40 of 59, as Coherence ends there", "default") in found.facts
+    lines[9] = lines[9].replace(f"{H[9].imag:.12g}", "")
+    assert "Imag is empty in line 11" in complaint(put(tmp_path / "b.csv", head + "".join(lines)))
+
+
+def test_a_cell_may_be_empty_at_0_hz_alone(tmp_path: Path) -> None:
+    text = "Freq (Hz),Real (m/N),Imag (m/N),Coherence\n{},,,\n" + rows(F, H.real, H.imag, 0.9 + 0 * F, separator=",")
+    assert is_h(read_frf(put(tmp_path / "a.csv", text.format(0))))
+    assert "Real is empty in line 2" in complaint(put(tmp_path / "b.csv", text.format(0.5)))
+
+
+LVM = """LabVIEW Measurement
+Separator\tTab
+Decimal_Separator\t{sign}
+X_Columns\tOne
+***End_of_Header***
+\t
+Channels\t3
+Samples\t400\t390\t400
+Y_Unit_Label\tN\tm/s^2\tg
+Delta_X\t0.00025\t0.00025\t0.00025
+***End_of_Header***
+X_Value\tForce\tAcc\tAcc y\tComment
+"""
+
+
+@pytest.mark.parametrize(("sign", "other"), [(",", "."), (".", ",")])
+def test_lvm_with_gaps_and_thousands_apart(tmp_path: Path, sign: str, other: str) -> None:
+    def numeral(value: float) -> str:
+        return f"{1e4 * value:,.6f}".translate(str.maketrans({",": other, ".": sign}))
+
+    cells = [["", numeral(f), numeral(a), "7"] for f, a in zip(FORCE, RESPONSE, strict=True)]
+    for i in range(390, 400):
+        cells[i][2] = ""
+    cells[20][3] = ""
+    path = put(tmp_path / "a.lvm", LVM.format(sign=sign) + "".join("\t".join(row) + "\n" for row in cells))
+    (hit,) = read_hits(path, Description(response=1))
+    assert hit.force == pytest.approx(1e4 * FORCE[:390], abs=1e-5)
+    assert hit.acceleration == pytest.approx(1e4 * RESPONSE[:390], abs=1e-5)
+    assert "Acc y is empty in line 33" in complaint(path, response=2)
+
+
+def test_a_cut_is_heard_to_where_its_sensor_ends(tmp_path: Path) -> None:
+    lines = [f"{t},{a if i < 300 else ''},{3000 if i < 350 else ''}\n" for i, (t, _, a, _) in enumerate(HIT)]
+    path = put(tmp_path / "a.csv", "Time (s),Acc (m/s^2),Speed (rpm)\n" + "".join(lines))
+    sound = read_sound(path)
+    assert sound.acceleration == pytest.approx(RESPONSE[:300], abs=1e-7)
+    path.write_text(path.read_text().replace(f"\n{HIT[9][0]},{HIT[9][2]},", f"\n{HIT[9][0]},,"))
+    with pytest.raises(DataError, match="Acc is empty in line 11"):
+        read_sound(path)
+
+
+THOUSANDS = {
+    ".": [",", " ", "\u00a0", "\u2009", "\u202f", "'", "\u2019"],
+    ",": [".", " ", "\u00a0", "\u2009", "\u202f"],
+}
+
+
+def numeral(value: float, decimal: str, thousands: str) -> str:
+    return f"{value:,.7f}".translate(str.maketrans({",": thousands, ".": decimal}))
+
+
+@st.composite
+def grouped_tables(draw: st.DrawFn) -> tuple[str, np.ndarray, str]:
+    """A hit in some layout with thousands apart, its force, and how the text is encoded."""
+    decimal = draw(st.sampled_from([".", ","]))
+    thousands = draw(st.sampled_from(THOUSANDS[decimal]))
+    separator = draw(st.sampled_from(["\t", ";", ","]))
+    quote = '"' if separator == "," or draw(st.booleans()) else ""
+    force = FORCE * draw(st.floats(11, 1e5)) * draw(st.sampled_from([1, -1]))
+    table = [[numeral(x, decimal, thousands) for x in row] for row in zip(TIME, force, RESPONSE, strict=True)]
+    body = "".join(separator.join(f"{quote}{cell}{quote}" for cell in row) + "\n" for row in table)
+    return f"Time (s){separator}Force (N){separator}Acc (g)\n{body}", force, draw(st.sampled_from(ENCODINGS))
+
+
+ENCODINGS = ["utf-8", "utf-8-sig", "utf-16-le", "utf-16-be", "utf-16"]
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(grouped_tables())
+def test_thousands_apart_in_any_layout_are_read_as_they_were_written(
+    tmp_path: Path, table: tuple[str, np.ndarray, str]
+) -> None:
+    text, force, encoding = table
+    path = tmp_path / "a.csv"
+    path.write_bytes(text.encode(encoding))
+    (hit,) = read_hits(path)
+    assert hit.force == pytest.approx(force, abs=1e-6)
+    assert hit.sample_rate == pytest.approx(4000)
+
+
+@pytest.mark.parametrize(("decimal", "thousands"), [(".", ","), (",", ".")])
+def test_thousands_apart_between_blanks(tmp_path: Path, decimal: str, thousands: str) -> None:
+    cells = [
+        " ".join(numeral(x, decimal, thousands) for x in row) for row in zip(TIME, 50 * FORCE, RESPONSE, strict=True)
+    ]
+    path = put(tmp_path / "a.txt", "Time(s) Force(N) Acc(g)\n" + "\n".join(cells) + "\n")
+    assert read_hits(path)[0].force == pytest.approx(50 * FORCE, abs=1e-6)
+
+
+def doubtful(decimal: str, force: str, *others: str) -> str:
+    """A hit whose forces are all written so, but for some; its time and acceleration with this decimal sign."""
+    forces = [*others, *[force] * (len(HIT) - len(others))]
+    lines = [f"{t};{cell};{a}".replace(".", decimal) for (t, _, a, _), cell in zip(HIT, ["@"] * len(HIT), strict=True)]
+    return "Time (s);Force (N);Acc (g)\n" + "".join(
+        line.replace("@", cell) + "\n" for line, cell in zip(lines, forces, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("decimal", "force", "message"),
+    [
+        (".", "1,234", "Force holds '1,234' in line 2, which may be 1.234 or 1234"),
+        (".", "-12,345", "Force holds '-12,345' in line 2, which may be -12.345 or -12345"),
+        (",", "1.234", "Force holds '1.234' in line 2, which may be 1.234 or 1234"),
+    ],
+)
+def test_a_number_that_may_be_another_is_refused_where_it_is_used(
+    tmp_path: Path, decimal: str, force: str, message: str
+) -> None:
+    path = put(tmp_path / "a.csv", doubtful(decimal, force))
+    assert complaint(path).startswith(message)
+    assert complaint(put(tmp_path / "b.csv", doubtful(decimal, force, "7"))).startswith(
+        message.replace("line 2", "line 3")
+    )
+    said = Description(columns=("time [s]", "-", "acceleration [g]"), without_force=True)
+    assert read_hits(path, said)[0].acceleration == pytest.approx(9.80665 * RESPONSE, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("decimal", "force", "other", "value"),
+    [
+        (",", "1,234", "7", 1.234),
+        (".", "1.234", "7", 1.234),
+        (".", "1,234", "2,345.5", 1234.0),
+        (".", "1,234", "2,345,678", 1234.0),
+        (",", "1.234", "2.345,5", 1234.0),
+        (".", "1,234", "0,5", 1.234),
+        (",", "1,234.5", "7", 1234.5),
+        (".", "1.234,5", "7", 1234.5),
+    ],
+)
+def test_what_another_number_shows_is_not_in_doubt(
+    tmp_path: Path, decimal: str, force: str, other: str, value: float
+) -> None:
+    path = put(tmp_path / "a.csv", doubtful(decimal, force, other))
+    assert read_hits(path)[0].force[1:] == pytest.approx(value, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("decimal", "force", "other", "message"),
+    [
+        (",", "1,234.5", "0,5", "Force holds '1,234.5' in line 3, which is no number"),
+        (".", "0,5", "1,234,567", "Force holds '0,5' in line 3, which is no number"),
+        (".", "1,234", "7", "Force holds '1,234' in line 3, which may be 1.234 or 1234"),
+    ],
+)
+def test_columns_that_contradict_themselves_or_each_other_are_refused(
+    tmp_path: Path, decimal: str, force: str, other: str, message: str
+) -> None:
+    text = doubtful(decimal, force, other).splitlines()
+    beside = [";Temp;More", *(";0,5;1,234.5" for _ in HIT)]
+    path = put(tmp_path / "a.csv", "".join(f"{a}{b}\n" for a, b in zip(text, beside, strict=True)))
+    assert complaint(path).startswith(message)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("heading", ["Freq (Hz)\tReal (m/N)\tImag (m/N)\n", "频率(Hz)\t实部(m/N)\t虚部(m/N)\n", ""])
+def test_utf_16_without_its_mark(tmp_path: Path, encoding: str, heading: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes((heading + rows(F, H.real, H.imag)).encode(encoding))
+    said = Description() if heading else Description(columns=("frequency [Hz]", "real [m/N]", "imag"))
+    assert is_h(read_frf(path, said))

@@ -2,6 +2,7 @@
 
 from .bands.extract import extract
 from .bands.extraction import Extraction, FittedBand
+from .bands.find_resonances import ConjugateError
 from .bands.survey import candidates, survey
 from .cut_edges import cut_edges
 from .edit_modes import edit_modes
@@ -28,6 +29,7 @@ from .remove_window import remove_window, with_windowed_noise
 __all__ = [
     "Believed",
     "CommonDelay",
+    "ConjugateError",
     "Extraction",
     "FittedBand",
     "Followed",

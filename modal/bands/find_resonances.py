@@ -41,6 +41,10 @@ LEAST_BESIDE = 0.02
 """... and from this share of the height of its neighbour; a real peak is a linear mode to a percent or so."""
 
 
+class ConjugateError(ValueError):
+    """An FRF whose phase rises through its resonances, as that of the complex conjugate of response over force does."""
+
+
 @dataclass(frozen=True)
 class Resonance:
     """One peak of the mobility."""
@@ -69,8 +73,7 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     mobility, so that a wide mode is found in noise that hides it from single lines. Two modes with no dip between
     them are one peak, and a mode much narrower than the line spacing is none.
 
-    Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one whose phase rises through its
-    resonances.
+    Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
     _check(frf)
     frf = without_drift(frf)
@@ -126,7 +129,7 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
     rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if LEAST_TURN < p.turn < MOST_TURN)
     phase_step = np.imag(frf.accelerance[1:] * frf.accelerance[:-1].conj())
     if rising > falling and np.sum(phase_step) > 0:
-        raise ValueError(
+        raise ConjugateError(
             "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
             "complex conjugate of response over force: give Frf the conjugate of receptance (on the command line: "
             "--conjugate)"

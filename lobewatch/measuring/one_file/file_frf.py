@@ -21,6 +21,7 @@ from acquisition import (
     read_frf,
 )
 from lobewatch.measuring.one_file.windows import Window, about_own_window, also_asked, window_ringing_hits
+from modal import ConjugateError, pick_peaks
 
 ACCEPTABLE = (
     HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
@@ -47,16 +48,17 @@ class FileFrf:
 
 
 def read_file_frf(
-    path: Path, accept: Collection[str], description: Description, window: Window | None = None
+    path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
 ) -> FileFrf:
     """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `modes_of_file`.
 
-    window: as it is said, so that what is missing of it is asked for with all else.
+    window, conjugate: as they are said, so that what is missing of them is asked for with all else.
     """
     accepted, averages, description = _accepted(accept), description.averages, replace(description, averages=None)
     recording = look(path, description)
     if recording.complaint:
-        raise DataError(f"{path}: {recording.complaint}{also_asked(recording.window, window)}")
+        phase = "" if conjugate else _about_phase(path, description)
+        raise DataError(f"{path}: {recording.complaint}{also_asked(recording.window, window)}{phase}")
     if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_with_averages(path, recording.frf, averages), facts=facts, named_window=recording.window)
@@ -64,6 +66,20 @@ def read_file_frf(
         raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
     frf = _average(path, recording.hits, accepted, description)
     return replace(frf, facts=recording.facts, named_window=recording.window)
+
+
+def _about_phase(path: Path, description: Description) -> str:
+    """What is wrong with the phase of an FRF that only its unit or its number is missing of; empty where nothing is."""
+    unit, response = description.unit or "m/N", description.response or 1
+    frf = look(path, replace(description, unit=unit, response=response)).frf
+    try:
+        if frf is not None:
+            pick_peaks(frf)
+    except ConjugateError as error:
+        return f"; {error}"
+    except ValueError:
+        return ""
+    return ""
 
 
 def _average(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:

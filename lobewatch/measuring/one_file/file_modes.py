@@ -103,7 +103,7 @@ def modes_of_file(
     >>> [f"{mode.frequency:.1f} Hz, K = {mode.stiffness / 1e6:.1f} N/um" for mode in read.fitted]
     ['500.0 Hz, K = 20.0 N/um']
     """
-    file_frf = read_file_frf(path, accept, description or Description(), window)
+    file_frf = read_file_frf(path, accept, description or Description(), window, conjugate=conjugate)
     if file_frf.frf is None:
         if window is not None or conjugate:
             raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")

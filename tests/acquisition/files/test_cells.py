@@ -18,6 +18,10 @@ HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
 HIT = [f"{t:.9g} {f:.9g} {a:.9g} 20".split() for t, f, a in zip(TIME, FORCE, RESPONSE, strict=True)]
 
 
+def numeral(value: float, decimal: str, thousands: str) -> str:
+    return f"{value:,.7f}".translate(str.maketrans(",.", thousands + decimal))
+
+
 def cells_of(separator: str, *changed: tuple[int, int, str], ends: Sequence[int] = (400, 400, 400, 400)) -> str:
     """The hit and a temperature, some cells (row, column, text) changed, each column up to its end."""
     cells = [[cell if i < end else "" for cell, end in zip(row, ends, strict=True)] for i, row in enumerate(HIT)]
@@ -145,10 +149,10 @@ X_Value\tForce\tAcc\tAcc y\tComment
 
 @pytest.mark.parametrize(("sign", "other"), [(",", "."), (".", ",")])
 def test_lvm_with_gaps_and_thousands_apart(tmp_path: Path, sign: str, other: str) -> None:
-    def numeral(value: float) -> str:
-        return f"{1e4 * value:,.6f}".translate(str.maketrans({",": other, ".": sign}))
-
-    cells = [["", numeral(f), numeral(a), "7"] for f, a in zip(FORCE, RESPONSE, strict=True)]
+    cells = [
+        ["", numeral(1e4 * f, sign, other), numeral(1e4 * a, sign, other), "7"]
+        for f, a in zip(FORCE, RESPONSE, strict=True)
+    ]
     for i in range(390, 400):
         cells[i][2] = ""
     cells[20][3] = ""
@@ -173,10 +177,6 @@ THOUSANDS = {
     ".": [",", " ", "\u00a0", "\u2009", "\u202f", "'", "\u2019"],
     ",": [".", " ", "\u00a0", "\u2009", "\u202f"],
 }
-
-
-def numeral(value: float, decimal: str, thousands: str) -> str:
-    return f"{value:,.7f}".translate(str.maketrans({",": thousands, ".": decimal}))
 
 
 @st.composite

@@ -142,7 +142,14 @@ def test_command_corrects_an_exponential_window_and_draws(
     np.savetxt(file, table * [1, 1, -1], header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     assert command(monkeypatch, str(file)) == 2
     assert "--conjugate" in capsys.readouterr().err
-    assert command(monkeypatch, str(file), "--conjugate", "--json") == 0
+    np.savetxt(file, table * [1, 1, -1], header="Freq(Hz) Real Imag", comments="")
+    assert command(monkeypatch, str(file)) == 2
+    first = capsys.readouterr().err
+    assert "the unit of Real (--unit, such as m/N" in first
+    assert "--conjugate" in first
+    assert command(monkeypatch, str(file), "--conjugate") == 2
+    assert "phase" not in capsys.readouterr().err
+    assert command(monkeypatch, str(file), "--unit", "m/N", "--conjugate", "--json") == 0
     assert json.loads(capsys.readouterr().out)["modes"][1]["damping_ratio"] == pytest.approx(plain["damping_ratio"])
     assert command(monkeypatch, str(file), "--conjugate", "--window", "-1", "--hit-at", "0") == 2
     assert "time_constant=-1.0 s" in capsys.readouterr().err

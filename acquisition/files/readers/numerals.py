@@ -19,18 +19,19 @@ Use = Literal["decimal", "thousands", "doubtful"]
 """What a sign in a number is for."""
 
 _OTHER = {",": ".", ".": ","}
+_BLANK = " \u00a0\u2009\u202f'\u2019"
+"""Blanks that stand between thousands, some of which do not break or are thin, and apostrophes."""
 _EXPONENT = r"(?:[eEdD][+-]?\d+)?"
 _GROUPED = {
     sign: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{sign}]\d{{3}})+(?:[{other}]\d*)?") for sign, other in _OTHER.items()
 }
 _DECIMAL = {
     sign: re.compile(
-        rf"\(?[+-]?(?:\d*|[1-9]\d{{0,2}}(?:[ {other}]\d{{3}})+)[{sign}]\d+{_EXPONENT}(?:[+-][\d.,]+{_EXPONENT}j)?\)?"
+        rf"\(?[+-]?(?:\d*|[1-9]\d{{0,2}}(?:[{_BLANK}{other}]\d{{3}})+)[{sign}]\d+{_EXPONENT}(?:[+-][\d.,]+{_EXPONENT}j)?\)?"
     )
     for sign, other in _OTHER.items()
 }
-_WITH_BLANKS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?: \d{{3}})+(?:[.,]\d*)?{_EXPONENT}")
-_NARROW = re.compile(r"(?<![\w.,])([1-9]\d{0,2})((?:[\u00a0\u2009\u202f'\u2019]\d{3})+)(?!\d)")
+_WITH_BLANKS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{_BLANK}]\d{{3}})+(?:[.,]\d*)?{_EXPONENT}")
 _IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
 _MISSING = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QNAN|SNAN)0*", re.IGNORECASE)
 """In place of a number, as spreadsheets and older C libraries write it."""
@@ -52,7 +53,7 @@ class Numerals:
 
     def number(self, word: str) -> complex:
         """A word as a number, real where it is; ValueError, as the end of a sentence, where it is none or in doubt."""
-        plain = word.replace(" ", "") if " " in word and _WITH_BLANKS.fullmatch(word) else word
+        plain = re.sub(f"[{_BLANK}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
         for sign, use in ((",", self.comma), (".", self.point)):
             if use != "decimal" and sign in plain:
                 plain = _in_one(plain, sign, use)
@@ -126,11 +127,6 @@ def _parsed(plain: str) -> complex:
         if _MISSING.fullmatch(plain):
             return math.nan
         return complex(plain) if _IMAGINARY.fullmatch(plain) else float(re.sub("[dD]", "e", plain))
-
-
-def without_narrow_blanks(line: str) -> str:
-    """A line whose thousands are not apart by a blank that does not break, a thin one, or an apostrophe."""
-    return _NARROW.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), line)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from acquisition.files.contents.heading import is_level, role_of, unit_by_name
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lines
 from acquisition.files.readers.numerals import Column, is_number
-from acquisition.files.readers.row_form import RowForm, begins_with_number, columns_of, dialect, plain_row, row_form
+from acquisition.files.readers.row_form import RowForm, begins_with_number, columns_of, dialect, plain_complex, row_form
 from acquisition.files.readers.table_heading import Heading, heading_above, heading_behind, is_unit_line
 from acquisition.files.readers.text import is_text, text_of
 
@@ -99,7 +99,7 @@ def _rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[Nu
     """The rows, how they are written, and the heading above them, behind the first or among comments."""
     first = _first_row(path, lines)
     begin = max(first - 1, 0)  # of the row that may have the heading behind it
-    plain = NumberedLines([*map(plain_row, lines.texts[begin:])], lines.numbers[begin:])
+    plain = NumberedLines([*map(plain_complex, lines.texts[begin:])], lines.numbers[begin:])
     form = row_form(plain.texts[first - begin :])
     if not form.columns:
         cure = "pass over what stands above them with --skip"
@@ -134,7 +134,7 @@ def _first_row(path: Path, lines: NumberedLines) -> int:
 
 def _refuse_broken_row(path: Path, above: NumberedLines, form: RowForm, width: int) -> None:
     """DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
-    words = form.words(plain_row(above.texts[-1])) if above.texts else []
+    words = form.words(plain_complex(above.texts[-1])) if above.texts else []
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _WORD.match(above.texts[-1])
     if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):

@@ -9,17 +9,18 @@ from dataclasses import dataclass, replace
 
 from acquisition.errors import DataError
 from acquisition.files.readers.numbered_lines import NumberedLines
-from acquisition.files.readers.numerals import Column, is_number, read_columns, without_narrow_blanks
+from acquisition.files.readers.numerals import Column, is_number, read_columns
 from acquisition.files.readers.text import fields
 
 SAMPLE = 200
 """Rows that tell which words are columns."""
 FEW = 3
 """Rows below which a word that is no number is no column of words, but a mistake."""
-SHORT = 8
-"""Rows that a column has at least which ends before half of the table: a hit has no fewer samples, notes have."""
-BLANKS = r"\s+"
-"""Separator of words that stand apart by blanks: none of them can be empty."""
+SOME = 8
+"""Rows, at least, of a column that ends before half of the table, as a hit has no fewer samples and notes have; and of
+those at the end that stop before the last column, as fewer may have lost a number."""
+BLANKS = "[ \t]+"
+"""Separator of words that stand apart by blanks: none of them can be empty. Others stand within numbers."""
 _POSITIVE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _PAIR = re.compile(rf"\(\s*([+-]?{_POSITIVE})\s*,\s*([+-]?{_POSITIVE})\s*\)")
 _EITHER = _POSITIVE.replace(r"\.", "[.,]")
@@ -46,10 +47,8 @@ class RowForm:
         return [word.strip().strip('"') for word in re.split(self.separator, line)]
 
 
-def plain_row(line: str) -> str:
-    """A line with its complex numbers, `(1,2)` or `1 + 2i`, as Python writes them, and no narrow blanks in numbers."""
-    if "'" in line or not line.isascii():
-        line = without_narrow_blanks(line)
+def plain_complex(line: str) -> str:
+    """A line with its complex numbers, `(1,2)` or `1 + 2i`, as Python writes them."""
     if "(" in line:
         line = _PAIR.sub(lambda match: f"{match[1]}{'' if match[2][0] in '+-' else '+'}{match[2]}j", line)
     return _SUM.sub(r"\1\2\3j", line) if "i" in line or "j" in line else line
@@ -57,7 +56,7 @@ def plain_row(line: str) -> str:
 
 def begins_with_number(line: str) -> bool:
     """Whether a line may be a row, by itself."""
-    line = plain_row(line)
+    line = plain_complex(line)
     word, *others = [*filter(None, dialect([line]).words(line)), ""]
     if _TIMESTAMP.match(word):
         return any(map(is_number, others))
@@ -70,7 +69,7 @@ def dialect(rows: Sequence[str]) -> RowForm:
         if separator in rows[0].strip():
             return RowForm(separator)
     with_comma = next((row for row in rows if "," in row), "")
-    words = with_comma.split()
+    words = re.split(BLANKS, with_comma.strip())
     may_be_blanks = not with_comma or (len(words) > 1 and all(map(_is_whole, words)))
     return RowForm(BLANKS if may_be_blanks else ",")
 
@@ -83,7 +82,7 @@ def _is_whole(word: str) -> bool:
 def row_form(rows: Sequence[str]) -> RowForm:
     """How rows are written; the first one may have a heading behind it, and does not tell."""
     form = dialect(rows[1:] or rows)
-    begin, below = rows[:SHORT], rows[SHORT:]
+    begin, below = rows[:SOME], rows[SOME:]
     sample = [form.words(row) for row in (*begin, *below[:: max(len(below) // SAMPLE, 1)])]
     if len(rows) < FEW:
         return replace(form, columns=tuple(range(len(_trimmed(sample[0])))))
@@ -94,7 +93,7 @@ def row_form(rows: Sequence[str]) -> RowForm:
 def _is_column(words: Sequence[str]) -> bool:
     """Whether most words are numbers, or most of those above the last that is, if they are no notes beside the rows."""
     filled = [i for i, word in enumerate(words, 1) if is_number(word)]
-    return 2 * len(filled) > len(words) or (len(filled) >= SHORT and 2 * len(filled) > filled[-1])
+    return 2 * len(filled) > len(words) or (len(filled) >= SOME and 2 * len(filled) > filled[-1])
 
 
 def _trimmed(words: Sequence[str]) -> Sequence[str]:
@@ -120,7 +119,7 @@ def _cells_at_once(form: RowForm, rows: Sequence[str]) -> list[list[str]] | None
     separator, n = (None if form.separator == BLANKS else form.separator), len(form.columns)
     text = (separator or " ").join(rows)
     widths = {len(row.split()) for row in rows} if separator is None else {row.count(separator) + 1 for row in rows}
-    if widths != {n} or '"' in text:
+    if widths != {n} or '"' in text or (separator is None and not text.isascii()):
         return None
     words = text.split(separator)
     words = [*map(str.strip, words)] if separator and " " in text else words
@@ -128,11 +127,12 @@ def _cells_at_once(form: RowForm, rows: Sequence[str]) -> list[list[str]] | None
 
 
 def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: RowForm, place: str) -> None:
-    """DataError for a row that goes on behind the last column, or ends before it though one below does not."""
+    """DataError for a row that goes on behind the last column, or stops before it unless some at the end all do."""
     last, width = form.columns[-1], len(form.columns)
     n_whole = max((i for i, row in enumerate(words, 1) if len(row) > last), default=0)
+    may_stop = form.separator != BLANKS and len(words) - n_whole >= SOME
     for i, row in enumerate(words):
-        is_short = len(row) <= last and (i < n_whole or form.separator == BLANKS)
+        is_short = len(row) <= last and not (may_stop and i >= n_whole)
         goes_on = any(map(is_number, row[last + 1 : last + 2])) and sum(map(is_number, row)) != width
         if is_short or goes_on:
             n = sum(map(is_number, row))

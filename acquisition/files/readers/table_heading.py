@@ -71,8 +71,8 @@ def is_unit_line(lines: Sequence[str], form: RowForm, width: int) -> bool:
 def _words(line: str, form: RowForm, width: int) -> list[str]:
     """A word for each column, whatever separates them; empty where there are more or fewer."""
     joined = _UNTIL_BRACKET.sub("", line)
-    for separator in (form.separator, "\t", ";", ",", r"\s{2,}", r"\s+"):
-        text = joined if separator.startswith(r"\s") else line
+    for separator in (form.separator, "\t", ";", ",", "[ \t]{2,}", BLANKS):
+        text = line if separator in ",;\t" else joined
         words = [word.strip() for word in _split(text.strip(" \r\n"), separator)]
         if len(words) == width:
             return [words[i] for i in form.columns]

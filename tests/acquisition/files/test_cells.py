@@ -107,9 +107,17 @@ def test_of_columns_between_blanks_none_can_end_early(tmp_path: Path) -> None:
         read_hits(put(tmp_path / "a.txt", "".join(lines)))
 
 
-@pytest.mark.parametrize("end", ["9.9e-2", "9.9e-2,1", "9.9e-2,1,", "9.9e-2,1,2"])
+@pytest.mark.parametrize("n_short", [1, 7])
+def test_of_a_few_rows_that_stop_early_each_may_have_lost_a_number(tmp_path: Path, n_short: int) -> None:
+    lines = cells_of(",").splitlines(keepends=True)
+    lines[-n_short:] = ["0.0995,3,20\n"] * n_short
+    with pytest.raises(DataError, match=f"line {402 - n_short}: 3 numbers where other rows have 4"):
+        read_hits(put(tmp_path / "a.csv", "".join(lines)))
+
+
+@pytest.mark.parametrize("end", ["9.9e-2", "9.9e-2,1", "9.9e-2,1,", "9.9e-2,1,2", "9.9e-2,1,2,"])
 def test_a_file_that_ends_within_its_last_row_is_cut_short(tmp_path: Path, end: str) -> None:
-    with pytest.raises(DataError, match="line 402 ends within its row: the file is cut short"):
+    with pytest.raises(DataError, match=r"line 402: \d numbers where|line 402 ends within its row: .* cut short"):
         read_hits(put(tmp_path / "a.csv", cells_of(",") + end))
 
 
@@ -185,7 +193,7 @@ def grouped_tables(draw: st.DrawFn) -> tuple[str, np.ndarray, str]:
     decimal = draw(st.sampled_from([".", ","]))
     thousands = draw(st.sampled_from(THOUSANDS[decimal]))
     separator = draw(st.sampled_from(["\t", ";", ","]))
-    quote = '"' if separator == "," or draw(st.booleans()) else ""
+    quote = '"' if (separator == "," and "," in (decimal, thousands)) or draw(st.booleans()) else ""
     force = FORCE * draw(st.floats(11, 1e5)) * draw(st.sampled_from([1, -1]))
     table = [[numeral(x, decimal, thousands) for x in row] for row in zip(TIME, force, RESPONSE, strict=True)]
     body = "".join(separator.join(f"{quote}{cell}{quote}" for cell in row) + "\n" for row in table)

@@ -131,7 +131,7 @@ FILES = (
     ),
     PublicFile("KuanHsienn/Vibrometer-Plotter/*.uff"),
     PublicFile(f"{SHM}/Dataset-7-forced-vibration-and-shock/data/testset-B/*/*/*.lvm"),
-    PublicFile(f"{SHM}/Dataset-11-*/Data/*/*.lvm", '--columns "time [s],force [N],acceleration [g],-"'),
+    PublicFile(f"{SHM}/Dataset-11-*/Data/*/*.lvm", '--skip 1 --columns "time [s]=1,force [N]=2,acceleration [g]=3"'),
     PublicFile(f"{SHM}/Dataset-5-Extended-Impact-Testing/data/dataset-1/data-1/*/acc_*.txt"),
     PublicFile("OWI-Lab/sdypy_io_tdms/tests/static/good/*.tdms"),
     PublicFile("adamreeve/npTDMS/nptdms/test/data/raw1.tdms"),

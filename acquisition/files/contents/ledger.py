@@ -35,6 +35,12 @@ class Ledger:
         """A fact."""
         self.facts.append(Fact(name, value, origin))
 
+    def add(self, other: Ledger) -> None:
+        """All that another one holds."""
+        self.facts += other.facts
+        self.missing += other.missing
+        self.faults += other.faults
+
     def ask(self, fact: str, option: str) -> None:
         """Something is missing."""
         self.missing.append(f"{fact} ({option})")

@@ -37,8 +37,7 @@ def settle_hits(contents: Contents, description: Description, ledger: Ledger) ->
         of_one = Ledger()
         hit = _hit([signal for signal in contents.signals if signal.record == record], description, of_one)
         if not of_one.is_clean or hit is None:
-            ledger.missing += of_one.missing
-            ledger.faults += of_one.faults
+            ledger.add(replace(of_one, facts=[]))
             return []
         ledger.facts += of_one.facts if not hits else []
         parts = hits_in_record(hit)
@@ -57,8 +56,10 @@ def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) ->
         return None
     signals = scaled
     forces, responses = _by_kind(signals, description, ledger)
-    response = chosen(responses, description.response, "responses", ledger) if responses else None
+    choice = Ledger()
+    response = chosen(responses, description.response, "responses", choice) if responses else None
     rate, used = rate_of(signals, [*forces, *([response] if response else [])], description, ledger)
+    ledger.add(choice)
     forces, response = (used[:-1], used[-1]) if response else (forces, None)
     force = _force(forces, description, ledger)
     unit = response_unit(response or responses[0], description, ledger) if responses else None

@@ -136,7 +136,7 @@ def test_one_bad_file_costs_only_itself_where_it_may(shop: Shop, folder: Path) -
     options = ("--date-pattern", "%Y%m%d")
     with pytest.raises(DataError, match="2 of 5 files cannot be used; nothing is stored; --keep-going") as refused:
         run("replay", shop.path, folder, *options)
-    assert "line 3: '2,x,3' is no row of numbers" in str(refused.value)
+    assert "Real holds 'x' in line 3, which is no number" in str(refused.value)
     assert "the file is empty" in str(refused.value)
     assert taps(shop) == []
     with pytest.raises(DataError, match="2 of 5 files cannot be used; the others are stored"):
@@ -192,7 +192,7 @@ def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> No
     with shop.folder.locked():
         stored = store_recordings(shop.folder, files, said, keep_going=True)
     assert (len(stored.fresh), [*stored.refused]) == (200, [bad])
-    assert "line 3: '2,x,3' is no row of numbers" in stored.refused[bad]
+    assert "Real holds 'x' in line 3, which is no number" in stored.refused[bad]
     assert len(taps(shop)) == 200
 
 

@@ -73,7 +73,11 @@ def test_a_replay_on_a_cluster_finds_the_same_though_a_worker_is_killed(cluster:
     assert killer.killed
     assert len(found[0]) == 8
     assert found[0] == found[1]
-    assert refused[0] == refused[1] == {files[4]: "line 3: '2,x,3' is no row of numbers"}
+    assert (
+        refused[0]
+        == refused[1]
+        == {files[4]: "Real holds 'x' in line 3, which is no number; mend it there, or leave Real out of --columns"}
+    )
 
 
 def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCluster, tmp_path: Path) -> None:

@@ -75,6 +75,15 @@ def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
     assert isinstance(search.verified(24000.0, search.reach.floored(less)), Setting)
 
 
+def test_one_look_at_a_depth_at_which_draws_chatter_in_a_cut_passed_over_says_how_deep_is_safe() -> None:
+    """Of the directions of feed those are looked at first in which the middle is near its limit."""
+    search = search_of(71, 0.4388)
+    less = search.verified(15600.0, 1.25)
+    assert isinstance(less, float)
+    assert 0.95 < less < 1.05
+    assert isinstance(search.verified(15600.0, search.reach.floored(less)), Setting)
+
+
 def test_no_depth_is_named_that_is_so_small_that_it_would_be_asked_about() -> None:
     table, tool = search_of(934).table, search_of(934).assembly
     named = robust_pockets(table, tool, MACHINE)

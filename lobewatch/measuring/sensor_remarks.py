@@ -11,6 +11,8 @@ from modal import Extraction, Mode, Trust, mass_loading, trust_of, with_mass_dou
 
 USUAL_MASS = 0.010
 """Mass of an accelerometer that nobody named (kg): it is asked for where this one would matter."""
+FIRST_ORDER = 0.1
+"""Fall of a frequency up to which first order tells what a mass does to the stiffness; chosen."""
 RESONANCES = {"magnet": 7000.0, "hand": 2000.0}
 """Resonance of an accelerometer (Hz) that is fixed so, about; with stud, glue or wax it lies beyond 20 kHz.
 
@@ -79,7 +81,9 @@ def _about_unknown_mass(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
     felt = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
     if felt:
         mode, loading = min(felt, key=lambda pair: pair[1].frequency)
-        changes = f"the frequency by {100 * loading.frequency:+.1f} % and stiffness by {100 * loading.stiffness:+.0f} %"
+        fall = 1 - (1 - 2 * loading.frequency) ** -0.5  # also where the modal mass is far below 10 g
+        stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < FIRST_ORDER else ""
+        changes = f"the frequency by {-100 * fall:.1f} %{stiffness}"
         text = f"an accelerometer of {1e3 * USUAL_MASS:g} g would change {changes}, more than its interval"
         cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or --sensor-mass for a file"
         yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", f"{text}: its mass is not known", cure)

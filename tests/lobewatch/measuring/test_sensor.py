@@ -66,6 +66,16 @@ def test_nobody_named_it_asks_where_ten_grams_matter() -> None:
     assert codes(fit(measured(modes=[Mode(150.0, 0.03, 3e8)]), 'mounting = "glue"')) == []
 
 
+@pytest.mark.parametrize(("stiffness", "fall", "also"), [(3e7, -1.4, " and stiffness by +0 %"), (4e4, -79.2, "")])
+def test_what_ten_grams_would_do_is_said_however_light_the_structure_is(
+    stiffness: float, fall: float, also: str
+) -> None:
+    """f / sqrt(1 + m / M) of M = K / w^2 = 0.338 kg and 0.45 g."""
+    tap = fit(measured(0.0, modes=[Mode(1500.0, 0.03, stiffness)]), 'mounting = "glue"')
+    (asked,) = tap.remarks
+    assert f"would change the frequency by {fall} %{also}, more than its interval" in asked.text
+
+
 def test_of_a_response_beside_the_hammer_nothing_is_taken_off() -> None:
     against = measured(0.0, sign=-1.0)
     tap = fit(against, "sensor_mass_g = 10", 'mounting = "glue"')

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -128,12 +129,13 @@ def _cells_at_once(form: RowForm, rows: Sequence[str]) -> list[list[str]] | None
 
 def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: RowForm, place: str) -> None:
     """DataError for a row that goes on behind the last column, or stops before it unless some at the end all do."""
-    last, width = form.columns[-1], len(form.columns)
+    last, width, usual = form.columns[-1], len(form.columns), statistics.mode(map(len, words))
     n_whole = max((i for i, row in enumerate(words, 1) if len(row) > last), default=0)
     may_stop = form.separator != BLANKS and len(words) - n_whole >= SOME
     for i, row in enumerate(words):
         is_short = len(row) <= last and not (may_stop and i >= n_whole)
-        goes_on = any(map(is_number, row[last + 1 : last + 2])) and sum(map(is_number, row)) != width
+        goes_on = len(row) > usual and any(map(is_number, row[last + 1 : last + 2]))
+        goes_on = goes_on and sum(map(is_number, row)) != width
         if is_short or goes_on:
             n = sum(map(is_number, row))
             cure = "" if i else f"; pass over it with --skip {rows.numbers[0]}, and name the columns with --columns"

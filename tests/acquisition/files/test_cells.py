@@ -70,6 +70,20 @@ def test_columns_are_cut_to_the_shortest_that_is_used(
     assert hit.sample_rate == pytest.approx(4000)
 
 
+@pytest.mark.parametrize("n", [1, 3, 5])
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_numbers_beside_the_first_rows_are_notes_where_all_rows_have_as_many_cells(
+    tmp_path: Path, separator: str, n: int
+) -> None:
+    path = put(tmp_path / "a.csv", cells_of(separator, ends=(400, 400, 400, n)))
+    (hit,) = read_hits(path)
+    assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-7)
+    longer = path.read_text().splitlines()
+    longer[n] += f"{separator}5"
+    with pytest.raises(DataError, match=f"line {n + 1}: 5 numbers where other rows have 3"):
+        look(put(tmp_path / "b.csv", "\n".join(longer) + "\n"))
+
+
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
     text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
     path = put(tmp_path / "a.csv", text)

@@ -83,7 +83,7 @@ def _about_unknown_mass(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
         mode, loading = min(felt, key=lambda pair: pair[1].frequency)
         fall = 1 - (1 - 2 * loading.frequency) ** -0.5  # also where the modal mass is far below 10 g
         stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < FIRST_ORDER else ""
-        changes = f"the frequency by {-100 * fall:.1f} %{stiffness}"
+        changes = f"the frequency by {-100 * fall:.2g} %{stiffness}"
         text = f"an accelerometer of {1e3 * USUAL_MASS:g} g would change {changes}, more than its interval"
         cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or --sensor-mass for a file"
         yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", f"{text}: its mass is not known", cure)

@@ -281,9 +281,7 @@ class SettingSearch:
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
             self.chattered.update(places[:REMEMBERED].tolist())
-            calm = min(deepest_calm(near[places[:FEW]], depth), judgement.lowest)
-            if calm >= depth:  # they chatter in a cut that is not near
-                calm = deepest_calm(program.draws[places[:FEW]], depth)
+            calm = min(deepest_calm(program.draws[places[:FEW]], depth), judgement.lowest)
             return min(1e3 * calm, LESS * depth_mm, depth_mm - MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
         window = window_rpm(near, hardest, speed, depth, self.reach)

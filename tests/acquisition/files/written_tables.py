@@ -14,6 +14,13 @@ TIME = np.arange(400) / 4000
 FORCE = np.where(np.abs(TIME - 0.005) < 2e-3, 100 * np.cos(np.pi * (TIME - 0.005) / 4e-3) ** 2, 0.0)
 RESPONSE = np.where(TIME > 0.005, np.exp(-200 * (TIME - 0.005)) * np.sin(2000 * TIME), 0.0)
 
+HIT = [f"{t:.9g} {f:.9g} {a:.9g} 20".split() for t, f, a in zip(TIME, FORCE, RESPONSE, strict=True)]
+"""The hit and a temperature, cell by cell."""
+
+
+def numeral(value: float, decimal: str, thousands: str) -> str:
+    return f"{value:,.7f}".translate(str.maketrans(",.", thousands + decimal))
+
 
 def rows(*columns: np.ndarray, form: str = "%.12g", separator: str = "\t", end: str = "\n") -> str:
     return "".join(separator.join(form % value for value in row) + end for row in zip(*columns, strict=True))

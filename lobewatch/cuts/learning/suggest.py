@@ -71,11 +71,11 @@ def suggest(
     """The next test cut; None where nothing more is to be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
-    are not believed. One of those that lies within the grid is made again, once, and so is one whose word is doubtful
-    enough while another is left. Else, with more than one left, a cut is worth what it gains itself and what the best
-    next one is then expected to gain; the best so far counts as its chance to be right says. A diagram by zero order
-    proposes; what is chosen was judged by semi-discretisation. programmed: depth of the program (m); the first cut is
-    about as deep, or chatters hardly.
+    are not believed. One of those that lies within the grid is made again, once, but for a stable one with the last
+    cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut is
+    worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its chance
+    to be right says. A diagram by zero order proposes; what is chosen was judged by semi-discretisation. programmed:
+    depth of the program (m); the first cut is about as deep, or chatters hardly.
     """
     best, few = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.drawn(DRAWS)
     draws, chart = few.draws, LimitCharts.of(few.draws, grid)
@@ -99,8 +99,11 @@ def suggest(
 def _asked_again(
     few: Posterior, cuts: Sequence[CutEvidence], left: int, doubted: Collection[CutEvidence]
 ) -> CutEvidence | None:
-    """The cut whose word is to be asked for again; None where all are sure enough, or were asked for."""
-    again = cut_again(cuts, doubted)
+    """The cut whose word is to be asked for again; None where all are sure enough, or were asked for.
+
+    The last cut makes none again whose word "stable" is not believed: that would gain nothing.
+    """
+    again = cut_again(cuts, [cut for cut in doubted if cut.chatters or left > 1])
     if again is not None or left <= 1:
         return again
     once = [cut for cut in cuts if cut in few.cuts and cut_again(cuts, [cut])]

@@ -68,6 +68,16 @@ def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_c
     assert abs(math.log(following.speed_rpm / speed)) >= 0.01
 
 
+def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: Mill) -> None:
+    """Stable far deeper than all that chatters: with one cut left a chance to be right about it gains nothing."""
+    speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
+    cuts = [CutEvidence(mill.cut, speed, depth, "chatter", id=f"c{k}") for k, depth in enumerate((4e-3, 3e-3))]
+    odd = CutEvidence(mill.cut, speed, 8e-3, "stable", id="c2")
+    learnt = mill.prior.learn_from_all([*cuts, odd])
+    found = {left: suggest(learnt, mill.grid, [*cuts, odd], left, [odd]) for left in (2, 1)}
+    assert {left: cut.repeats for left, cut in found.items() if cut} == {2: "c2", 1: ""}
+
+
 def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:
     """As deep 1.5 % faster was stable: more likely right than wrong, and worth a cut."""
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])

@@ -2,8 +2,9 @@
 
     python bench/repeating_modes.py FOLDER
 
-FOLDER as for public_files.py. A mode repeats where half of the FRFs of its structure have it within 0.5 %. Prints the
-table of docs/modal.md; what is not in FOLDER is skipped.
+FOLDER as for public_files.py. A mode repeats where half of the FRFs of its structure have it within 0.5 %. Each file is
+read by itself, and then beside the others that are read with the same options. Prints the table of docs/modal.md; what
+is not in FOLDER is skipped.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from public_files import BLADE, DYNAMIC_STRUCTURE, FILES, PLATE_POINTS, SIGNALS,
 
 NEAR, OFTEN = 0.005, 0.5
 """Relative distance within which two modes may be the same; share of the FRFs that have a mode which repeats."""
+FEWEST = 2
+"""Other files beside which one is read."""
 STRUCTURES = {
     "blade": f"{BLADE}/",
     "plate": PLATE_POINTS,
@@ -27,11 +30,22 @@ STRUCTURES = {
 """What was measured, and how the patterns of its files begin."""
 
 
-def readings(folder: Path, begin: str) -> list[Reading]:
-    """What is read of a structure."""
-    entries = [entry for entry in FILES if entry.pattern.startswith(begin)]
-    files = [(file, entry.words(folder)) for entry in entries for file in sorted(folder.glob(entry.pattern))]
-    return [reading for file, words in files if not (reading := read(file, words)).refusal]
+def readings(folder: Path, begin: str) -> tuple[list[Reading], list[Reading]]:
+    """What is read of a structure: each file by itself, and beside the others that are read alike."""
+    alone, looked = [], []
+    for entry in FILES:
+        if entry.pattern.startswith(begin):
+            words = entry.words(folder)
+            told = {
+                file: reading
+                for file in sorted(folder.glob(entry.pattern))
+                if not (reading := read(file, words)).refusal
+            }
+            for file, reading in told.items():
+                others = [word for other in told if other != file for word in ("--beside", str(other))]
+                alone.append(reading)
+                looked.append(read(file, words + others) if len(told) > FEWEST else reading)
+    return alone, looked
 
 
 def repeats(frequency: float, structure: list[Reading]) -> bool:
@@ -40,24 +54,30 @@ def repeats(frequency: float, structure: list[Reading]) -> bool:
     return float(np.mean(has)) >= OFTEN
 
 
-def row(name: str, structure: list[Reading]) -> str:
-    """Of the table."""
+def shares(structure: list[Reading], alone: list[Reading]) -> list[str]:
+    """How many are trusted of those that repeat, and of the others."""
     told: dict[bool, list[bool]] = {True: [], False: []}
     for reading in structure:
         for frequency, trusted in reading.modes:
-            told[repeats(frequency, structure)].append(trusted)
-    shares = [f"{np.mean(trusted):.2f} of {len(trusted)}" if trusted else "none" for trusted in told.values()]
-    return f"| {name} | {len(structure)} | {' | '.join(shares)} |"
+            told[repeats(frequency, alone)].append(trusted)
+    return [f"{np.mean(trusted):.2f} of {len(trusted)}" if trusted else "none" for trusted in told.values()]
+
+
+def row(name: str, alone: list[Reading], looked: list[Reading]) -> str:
+    """Of the table."""
+    return f"| {name} | {len(alone)} | {' | '.join([*shares(alone, alone), *shares(looked, alone)])} |"
 
 
 def main() -> None:
     """Print the table."""
     if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
         sys.exit("give the folder of the public files: python bench/repeating_modes.py FOLDER")
-    print("| structure | FRFs | trusted of those that repeat | trusted of the others |\n|---|---|---|---|")
+    heads = "trusted of those that repeat | of the others | beside the others | of the others"
+    print(f"| structure | FRFs | {heads} |\n|---|---|---|---|---|---|")
     for name, begin in STRUCTURES.items():
-        if structure := readings(Path(sys.argv[1]), begin):
-            print(row(name, structure), flush=True)
+        alone, looked = readings(Path(sys.argv[1]), begin)
+        if alone:
+            print(row(name, alone, looked), flush=True)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from .mode_indicator import mode_indicator
 from .modes.common_decay import common_decay
 from .modes.common_delay import CommonDelay, common_delay
 from .modes.follow import Followed, follow
+from .modes.found_again import found_again
 from .modes.mac import mac
 from .modes.mode import Mode
 from .modes.mode_edits import ModeEdits, parse_edits
@@ -51,6 +52,7 @@ __all__ = [
     "fit_modes",
     "fit_points",
     "follow",
+    "found_again",
     "mac",
     "mass_loading",
     "mode_indicator",

@@ -56,6 +56,14 @@ def modes(
     sensor_mass: Annotated[
         float | None, typer.Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
     ] = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Another measurement of the same structure: a file, the number of another response of FILE, or where "
+            "FILE is a machine folder another tap test; given twice or more. What most of them have, too, is less in "
+            "doubt."
+        ),
+    ] = None,
     add: Add = None,
     drop: Drop = None,
     fix: Fix = None,
@@ -83,23 +91,27 @@ def modes(
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
       lobewatch modes decays.csv --hammer none
       lobewatch modes h.mat --response 2 --unit g/N
+      lobewatch modes point1.uff --beside point2.uff --beside point3.uff
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.chosen_modes import choice_of, modes_of_tap
     from lobewatch.machine.settings.sensor_loading import SensorLoading
-    from lobewatch.measuring import Window, modes_of_file
+    from lobewatch.measuring import Window, found_beside, modes_of_file, places_beside
     from lobewatch.notify.telling import telling
     from lobewatch.show.spindle.describe_modes import file_modes_json, file_modes_texts
     from modal import parse_edits
 
+    if beside is not None and len(beside) == 1:
+        raise ValueError(f"--beside {beside[0]}: one other tells nothing, its modes may be near by chance; name two")
     edits = parse_edits(add, drop, fix)
     taken_off = Window.said(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
         refuse_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), choice_of(edits, by_fit)
+        measured = [modes_of_tap(logbook, name) for name in beside or ()]
         with nullcontext() if choice is None else telling(logbook):
             file_modes = modes_of_tap(logbook, tap, choice)
     elif by_fit or file.is_dir():
@@ -108,8 +120,13 @@ def modes(
     else:
         said = file_options.description(averages=averages, without_force=hammer == "none")
         sensor = SensorLoading.of(sensor_mass)
-        how = partial(modes_of_file, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor)
-        file_modes = how(file, band, description=said, by_hand=edits)
+        how = partial(
+            modes_of_file, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
+        )
+        file_modes = how(file, description=said, by_hand=edits)
+        measured = [how(path, description=known) for path, known in places_beside(beside or (), file, said)]
+    if beside:
+        file_modes = found_beside(file_modes, beside, measured)
     if figure is not None:
         from lobewatch.show.figures.mode_figures import modes_figure
         from lobewatch.show.figures.style import save_figure

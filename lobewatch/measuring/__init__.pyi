@@ -12,6 +12,7 @@ from .model import (
     model_summary,
 )
 from .model_calibration import ModelCalibration, calibrate_model
+from .one_file.beside import found_beside, places_beside
 from .one_file.file_modes import FileModes, modes_of_file, remarks_on_all
 from .one_file.windows import Window
 
@@ -26,10 +27,12 @@ __all__ = [
     "Window",
     "calibrate_model",
     "first_critical_speed",
+    "found_beside",
     "measure",
     "model_frf",
     "model_state",
     "model_summary",
     "modes_of_file",
+    "places_beside",
     "remarks_on_all",
 ]

@@ -76,6 +76,9 @@ class Mode:
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
     shape: NDArray[np.float64] | None = None
     """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
+    found_again: tuple[int, int] | None = None
+    """Number of other FRFs of the same structure that have it too, and number of those looked at; None where nobody
+    looked (`found_again`)."""
     relative_peak: float | None = None
     """Its peak of receptance over the highest of the same free decays, had all been excited alike; None where the
     force was measured and K tells."""

@@ -17,6 +17,11 @@ TURNED = 30.0
 others make has any phase."""
 WELL_KNOWN, REJECTED_ERROR = 0.1, 1 / 3
 """Relative standard error of damping ratio or stiffness, the larger one: of a turned mode, and of any."""
+REJECTED_ERROR_AGAIN = 0.5
+"""The same of a mode that is found again, turned or not."""
+FEWEST_OTHERS, AGAIN = 2, 0.75
+"""Other FRFs of the structure, and their share that has a mode, from which it is found again: one alone has a mode
+within 0.5 % by chance in one case of five."""
 DOUBTFUL_DAMPING, REJECTED_DAMPING = 0.08, 0.15
 """Damping ratio of a mode without a peak of its own; machine structures have 0.005 to 0.08."""
 HEAVY_DAMPING = 0.3
@@ -30,7 +35,9 @@ MISFIT = 2.0
 MISFIT_SHARE = 0.01
 """... from this share of the peak; on the zeta and K of a mode without a peak of its own it bears more."""
 DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
-"""Remarks that stand for a figure which a mode does not carry."""
+"""Remarks that stand for a figure which a mode does not carry; those of ..."""
+ALIKE_CODES = ("smoothed-lines",)
+"""... what is alike in all FRFs of a structure, so that to find it again says nothing."""
 
 
 class Trust(enum.StrEnum):
@@ -66,22 +73,33 @@ def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
         if value > doubtful:
             yield code, Trust.REJECTED if value > rejected else Trust.DOUBTFUL
     for remark in mode.remarks:
-        if remark.code in DOUBTFUL_CODES:
+        if remark.code in (ALIKE_CODES if is_found_again(mode) else DOUBTFUL_CODES):
             yield remark.code, Trust.DOUBTFUL
+
+
+def is_found_again(mode: Mode) -> bool:
+    """Whether so many other FRFs of the structure have it that it is no chance.
+
+    >>> is_found_again(Mode(500.0, 0.02, 2e7, found_again=(3, 4))), is_found_again(Mode(500.0, 0.02, 2e7))
+    (True, False)
+    """
+    found, of = mode.found_again or (0, 0)
+    return of >= FEWEST_OTHERS and found >= AGAIN * of
 
 
 def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
     """Code, value, and the limits above which it makes a mode doubtful and rejected."""
-    never, own_peak = float("inf"), mode.half_power_damping is not None
+    never, again = float("inf"), is_found_again(mode)
     share = (mode.misfit_share or 0.0) if (mode.misfit or 1.0) > MISFIT else 0.0
-    if own_peak or mode.misfit is None:
+    if again or mode.half_power_damping is not None or mode.misfit is None:
         yield "misfit", share, REJECTED_SHARE, REJECTED_SHARE
         yield "heavy-damping", mode.damping_ratio, HEAVY_DAMPING, HEAVY_DAMPING
     else:
         yield "misfit", share, MISFIT_SHARE, REJECTED_WITHOUT_PEAK
         yield "heavy-damping", mode.damping_ratio, DOUBTFUL_DAMPING, REJECTED_DAMPING
-    is_turned = abs(mode.phase_deg) > TURNED
-    yield "uncertain", relative_error(mode), WELL_KNOWN if is_turned else REJECTED_ERROR, REJECTED_ERROR
+    largest = REJECTED_ERROR_AGAIN if again else REJECTED_ERROR
+    is_turned = abs(mode.phase_deg) > TURNED and not again
+    yield "uncertain", relative_error(mode), WELL_KNOWN if is_turned else largest, largest
     if mode.coherence is not None:
         yield "low-coherence", 1 - mode.coherence, 1 - LEAST_COHERENCE, never
     if mode.edge_distance is not None:

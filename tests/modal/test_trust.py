@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import Remark
-from modal import Mode, Trust, fit_modes, synthesize, trust_of, trust_rules
+from modal import Mode, Trust, fit_modes, found_again, synthesize, trust_of, trust_rules
 
 GOOD = Mode(
     1722.0,
@@ -74,6 +74,47 @@ def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> N
 )
 def test_less_than_a_limit_is_no_reason(change: dict[str, Any]) -> None:
     assert trust_of(replace(GOOD, **change)) is Trust.TRUSTED
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"misfit": 5.0, "misfit_share": 0.29, "half_power_damping": None},
+        {"damping_ratio": 0.29, "half_power_damping": None},
+        {"covariance": 1.6 * UNCERTAIN, "phase_deg": 89.0},
+        {"covariance": 2.2 * UNCERTAIN},
+        {"remarks": (Remark("several-modes", "", "a text"), Remark("bent-by-neighbour", "", "a text"))},
+    ],
+)
+def test_what_three_quarters_of_two_or_more_others_have_is_trusted_all_the_same(change: dict[str, Any]) -> None:
+    mode = replace(GOOD, **change)
+    verdicts = {found: trust_of(replace(mode, found_again=found)) for found in [(2, 2), (3, 4), (1, 1), (1, 2), (2, 3)]}
+    trusted = [found for found, verdict in verdicts.items() if verdict is Trust.TRUSTED]
+    assert trusted == [(2, 2), (3, 4)]
+    assert verdicts[2, 3] is trust_of(mode)
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"misfit": 5.0, "misfit_share": 0.31}, "misfit"),
+        ({"damping_ratio": 0.31}, "heavy-damping"),
+        ({"covariance": 3 * UNCERTAIN}, "uncertain"),
+        ({"coherence": 0.49}, "low-coherence"),
+        ({"edge_distance": 0.9}, "cut-by-edge"),
+        ({"left_ringing": 0.051}, "still-ringing"),
+        ({"remarks": (Remark("smoothed-lines", "", "a text"),)}, "smoothed-lines"),
+    ],
+)
+def test_what_is_wrong_in_all_measurements_alike_or_hardly_known_stays_in_doubt(
+    change: dict[str, Any], code: str
+) -> None:
+    assert [rule for rule, _ in trust_rules(replace(GOOD, found_again=(4, 4), **change))] == [code]
+
+
+def test_a_mode_is_found_again_within_half_a_percent() -> None:
+    others = [[Mode(GOOD.frequency * factor, 0.01, 1e6)] for factor in (1.0049, 0.9951, 1.0051)]
+    assert [mode.found_again for mode in found_again([GOOD, Mode(400.0, 0.02, 2e7)], [*others, []])] == [(2, 4), (0, 4)]
 
 
 def test_the_worst_rule_decides() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -32,4 +33,22 @@ def test_a_mode_of_half_of_the_points_repeats(
     monkeypatch.setattr(sys, "argv", ["repeating_modes.py", str(tmp_path)])
     repeating_modes.main()
     *_, row = capsys.readouterr().out.splitlines()
-    assert row == "| tool | 5 | 1.00 of 3 | 1.00 of 3 |"
+    assert row == "| tool | 5 | 1.00 of 3 | 1.00 of 3 | 1.00 of 3 | 1.00 of 3 |"
+
+
+@pytest.mark.parametrize(("count", "beside"), [(2, "0.00"), (3, "1.00")])
+def test_each_file_is_read_beside_all_others_where_there_are_two(
+    count: int, beside: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def read(file: Path, words: list[str]) -> public_files.Reading:
+        others = {Path(word).name for flag, word in pairwise(words) if flag == "--beside"}
+        return public_files.Reading(((150.0, len(others - {file.name}) == 2),), "")
+
+    folder = tmp_path / public_files.SIGNALS / "ExperimentalModalAnalysis"
+    monkeypatch.setattr(repeating_modes, "read", read)
+    monkeypatch.setattr(sys, "argv", ["repeating_modes.py", str(tmp_path)])
+    for place in range(count):
+        put(folder / f"Point_{place}.txt", 150.0)
+    repeating_modes.main()
+    *_, row = capsys.readouterr().out.splitlines()
+    assert row == f"| tool | {count} | 0.00 of {count} | none | {beside} of {count} | none |"

@@ -24,6 +24,8 @@ LEAST_PHASE = 1.0
 """Phase of a modal constant worth a column (degrees)."""
 HIGH_CORRELATION = 0.5
 """Correlation of errors that a person should know."""
+AGAIN = "again: how many of the other measurements have it within 0.5 %"
+"""Line below a table with that column."""
 ORIGINS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
 """Words for where a fact on a file is from."""
 NOT_IN_FILE = "option", "default"
@@ -54,6 +56,7 @@ def mode_json(mode: Mode) -> dict[str, Any]:
         "misfit": mode.misfit,
         "misfit_share": mode.misfit_share,
         "trust": trust_of(mode),
+        "found_again": mode.found_again,
         "half_power_damping_ratio": mode.half_power_damping,
         "remarks": [asdict(remark) for remark in mode.remarks],
         "method": mode.method,
@@ -72,16 +75,21 @@ def _is_by_hand(mode: Mode) -> bool:
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
-    """Modes, a line each, value ± standard error, the phase where there is any, and a mark where one is doubtful."""
+    """Modes, a line each, value ± standard error, the phase where there is any, how many other FRFs have it where some
+    were looked at, and a mark where one is doubtful."""
     with_phase = any(abs(mode.phase_deg) > LEAST_PHASE for mode in modes)
-    rows = table("f_n (Hz)", "zeta (%)", "K (N/um)", *(["phase (deg)"] if with_phase else []), "<")
+    with_others = any(mode.found_again for mode in modes)
+    headings = [*(["phase (deg)"] if with_phase else []), *(["again"] if with_others else [])]
+    rows = table("f_n (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         cells = [
             "not known" if math.isnan(value) else plus_minus(value, std, scale, percent=scale == 1e6 and not with_phase)
             for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
         ]
-        rows.add_row(*cells, *([_phase(mode)] if with_phase else []), MARKS[trust_of(mode)])
+        again = "" if mode.found_again is None else "{} of {}".format(*mode.found_again)
+        more = [*([_phase(mode)] if with_phase else []), *([again] if with_others else [])]
+        rows.add_row(*cells, *more, MARKS[trust_of(mode)])
     return rows
 
 
@@ -90,10 +98,11 @@ def _phase(mode: Mode) -> str:
 
 
 def mode_lines(modes: Sequence[Mode]) -> list[str]:
-    """Lines below a table of modes: where ± comes from, and correlated errors."""
+    """Lines below a table of modes: where ± comes from, what is found again, and correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
     how = "jackknife" if all(mode.has_stiffness for mode in modes) else "by how each moves the fit"
     lines = [f"± is the standard error over the {hits} hits ({how}, {hits - 1} degrees of freedom)"] if hits else []
+    lines += [AGAIN] if any(mode.found_again for mode in modes) else []
     for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
         of = [(mode.correlation[i, j], mode.frequency) for mode in modes]
         high = [f"{value:+.2f} ({at:.0f} Hz)" for value, at in of if abs(value) > HIGH_CORRELATION]
@@ -127,7 +136,10 @@ def summary(modes: Sequence[Mode], *, everything: bool) -> str:
     """How many modes are trusted, doubtful and rejected, in a line."""
     count = Counter(trust_of(mode) for mode in modes)
     counts = ", ".join(f"{count[trust]} {trust}" for trust in ORDER)
-    return counts + (" (--all shows each, with every remark)" if modes and not everything else "")
+    looked = not count[Trust.DOUBTFUL] or any(mode.found_again for mode in modes)
+    hints = [] if looked else ["--beside looks for them in other measurements"]
+    hints = hints if everything or not modes else ["--all shows each, with every remark", *hints]
+    return counts + (f" ({'; '.join(hints)})" if hints else "")
 
 
 def reasons(modes: Sequence[Mode]) -> list[str]:

@@ -23,6 +23,8 @@ from acquisition.verdicts.average_good import average_good
 Result = TypeVar("Result")
 NOTHING = Description()
 """A person who says nothing."""
+DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
+"""Decimal signs of a text by what a person calls them."""
 
 
 def look(path: Path | str, said: Description = NOTHING) -> Recording:
@@ -44,9 +46,9 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     """
     path = Path(path)
     file_format = format_of(path)
-    held = contents_of(file_format, path, said.skip)
+    held = contents_of(file_format, path, said)
     if isinstance(held, Contents):
-        contents = held if said.force is None else joined(held, _force_contents(said.force, said.skip), said.force)
+        contents = held if said.force is None else joined(held, _force_contents(said.force, said), said.force)
         return _guarded(file_format, path, lambda: understood(path, file_format.title, contents, said))
     about = file_format.recorded_as(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
@@ -56,19 +58,22 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     return recording if about is None else _labelled(recording, about)
 
 
-def contents_of(file_format: Format, path: Path, skip: int | None) -> Contents | list[Hit] | Frf:
-    """What a file of this format holds behind its first lines; DataError for one that has none to pass over."""
-    read_from = file_format.read_from
-    if not skip:
+def contents_of(file_format: Format, path: Path, said: Description) -> Contents | list[Hit] | Frf:
+    """What a file of this format holds, behind the lines that are passed over of a text; DataError where it is none."""
+    read_from, option = file_format.read_from, f"--skip {said.skip}" if said.skip else f"--decimal {said.decimal}"
+    if not said.skip and not said.decimal:
         return _guarded(file_format, path, lambda: file_format.read(path))
     if read_from is None:
-        raise DataError(f"{path}: --skip {skip}: a {file_format.title} has no lines to pass over; leave the option out")
-    return _guarded(file_format, path, lambda: read_from(path, skip))
+        raise DataError(f"{path}: {option}: a {file_format.title} is no text of lines; leave the option out")
+    if said.decimal not in DECIMAL_SIGNS:
+        raise DataError(f"{path}: {option}: is no decimal sign; give comma or point")
+    sign = DECIMAL_SIGNS[said.decimal]
+    return _guarded(file_format, path, lambda: read_from(path, said.skip or 0, sign))
 
 
-def _force_contents(path: Path, skip: int | None) -> Contents:
+def _force_contents(path: Path, said: Description) -> Contents:
     file_format = format_of(path)
-    held = contents_of(file_format, path, skip if file_format.read_from else None)
+    held = contents_of(file_format, path, said if file_format.read_from else NOTHING)
     if not isinstance(held, Contents):
         raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
     return held

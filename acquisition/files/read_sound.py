@@ -24,7 +24,7 @@ def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
     if is_cut_file(path):
         return read_cut_signal(path)[0]
     file_format = format_of(path)
-    contents = contents_of(file_format, path, said.skip)
+    contents = contents_of(file_format, path, said)
     if not isinstance(contents, Contents):
         raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
     ledger = Ledger()

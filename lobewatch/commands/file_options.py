@@ -38,6 +38,10 @@ class FileOptions:
     """Unit of the force."""
     skip: Annotated[int | None, typer.Option(min=1, help="Lines of a text that are passed over above its rows.")] = None
     """Number of lines above the rows."""
+    decimal: Annotated[
+        str, typer.Option(help="Decimal sign of a text where its numbers leave that in doubt: comma or point.")
+    ] = ""
+    """Decimal sign."""
     spacing: Annotated[
         float | None, typer.Option(help="Hz from line to line of an FRF that the file holds without its frequencies.")
     ] = None

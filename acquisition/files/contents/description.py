@@ -28,6 +28,8 @@ class Description:
     """Unit of the force (N, lbf)."""
     skip: int | None = None
     """Number of lines above the rows of a text that are passed over."""
+    decimal: str = ""
+    """Decimal sign of the numbers of a text, "comma" or "point"; the other one stands between thousands."""
     spacing: float | None = None
     """Spacing of the lines of an FRF that the file holds without its frequencies (Hz)."""
     start: float | None = None

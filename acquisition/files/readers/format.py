@@ -36,5 +36,6 @@ class Format:
     """Function that reads when, where and by whom it was recorded, beside its Contents; None where it says nothing."""
     read_frf: Callable[[Path], Frf] | None = None
     """Function that reads the FRF it holds beside its hits; None where that is to be estimated from them."""
-    read_from: Callable[[Path, int], Contents] | None = None
-    """Function that reads it behind some first lines; None where it is not a text of lines."""
+    read_from: Callable[[Path, int, str], Contents] | None = None
+    """Function that reads it behind some first lines, with a decimal sign (empty where nobody says it); None where it
+    is not a text of lines."""

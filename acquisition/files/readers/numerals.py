@@ -72,7 +72,8 @@ def _in_one(word: str, sign: str, use: Use) -> str:
     if not _GROUPED[sign].fullmatch(word):
         raise ValueError("which is no number")
     if use == "doubtful":
-        raise ValueError(f"which may be {word.replace(sign, '.')} or {word.replace(sign, '')}")
+        either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
+        raise ValueError(f"which may be {either} (--decimal comma or --decimal point)")
     return word.replace(sign, "")
 
 

@@ -34,8 +34,11 @@ BEGIN = 3
 """Lines in a row that begin with a number where the rows of a table begin."""
 
 
-def read_table(path: Path, skip: int = 0) -> Contents:
-    """The columns of a text file behind its first `skip` lines; DataError with the line where it is no table."""
+def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
+    """The columns of a text file behind its first `skip` lines; DataError with the line where it is no table.
+
+    decimal_sign: a comma or a point; empty: what the numbers show.
+    """
     text = text_of(path)
     lines, comments = numbered_lines(text, skip)
     lines, footer = _without_footer(lines)
@@ -44,7 +47,7 @@ def read_table(path: Path, skip: int = 0) -> Contents:
     signals, notes = list[Signal](), list[str]()
     for record, table in enumerate(_tables(path, lines)):
         rows, form, heading = _rows(path, table, comments)
-        columns = columns_of(rows, form, str(path))
+        columns = columns_of(rows, form, str(path), decimal_sign)
         signals += _signals(columns, heading, record)
         beside = [word for i, word in enumerate(form.words(rows.texts[-1])) if word and i not in form.columns]
         notes += [f"beside its columns stands {word!r} in the last row" for word in beside]

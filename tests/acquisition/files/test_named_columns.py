@@ -20,7 +20,7 @@ def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(skip=4)))
     npy = tmp_path / "a.npy"
     np.save(npy, H)
-    with pytest.raises(DataError, match="--skip 4: a NumPy file has no lines to pass over; leave the option out"):
+    with pytest.raises(DataError, match="--skip 4: a NumPy file is no text of lines; leave the option out"):
         look(npy, Description(skip=4))
 
 

@@ -13,15 +13,16 @@ from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import name_and_unit, role_of
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numerals import read_columns
+from acquisition.files.readers.text import text_in, text_of
 
-MAGIC = b"LabVIEW Measurement"
+MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 
 def read_lvm(path: Path) -> Contents:
     """The channels of every segment; DataError with the place where it fails."""
-    text = path.read_text(encoding="latin-1")
+    text = text_of(path)
     lines = text.splitlines()
     ends = [i for i, line in enumerate(lines) if line.startswith(_END)]
     if len(ends) < 2:
@@ -89,7 +90,7 @@ def _created(head: Mapping[str, str]) -> datetime | None:
 
 
 def _is_lvm(head: bytes, _path: Path) -> bool:
-    return head.startswith(MAGIC)
+    return text_in(head).startswith(MAGIC)
 
 
 LVM = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm)

@@ -19,9 +19,9 @@ from acquisition.files.contents.heading import role_of
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.numbered_lines import NumberedLines, numbered_lines
 from acquisition.files.readers.row_form import RowForm, columns_of
-from acquisition.files.readers.text import text_of
+from acquisition.files.readers.text import text_in, text_of
 
-MAGIC = b"Header Size:"
+MAGIC = "Header Size:"
 _DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), ("M", "%m"), ("dd", "%d"), ("d", "%d"))
 
 
@@ -88,7 +88,7 @@ def _created(header: Mapping[str, str]) -> datetime | None:
 
 
 def _is_pulse(head: bytes, _path: Path) -> bool:
-    return head.startswith(MAGIC)
+    return text_in(head).startswith(MAGIC)
 
 
 PULSE = Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse)

@@ -19,10 +19,11 @@ HEAD = 65536
 
 def text_of(path: Path) -> str:
     """UTF-8, UTF-16 with its mark or without, else Latin-1, in which every byte is a character."""
-    return _text(path.read_bytes())
+    return text_in(path.read_bytes())
 
 
-def _text(content: bytes) -> str:
+def text_in(content: bytes) -> str:
+    """The same of the bytes of a file, or of its first ones."""
     encoding = _wide_encoding(content[:HEAD])
     return content.decode(encoding, errors="replace") if encoding else decoded(content)
 
@@ -69,5 +70,5 @@ def is_prose(path: Path) -> bool:
             head = file.read(HEAD)
     except OSError:
         return False
-    text = _text(head)
+    text = text_in(head)
     return bool(text.strip()) and is_text(head) and _TWO_NUMBERS.search(text) is None

@@ -127,6 +127,16 @@ def test_text_of_pulse(tmp_path: Path, sign: str) -> None:
         look(put(path, pulse({key: HEADER[key] for key in ("Decimal Symbol", "Data Type")}, BLOCK)))
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16", "utf-8"])
+def test_text_of_pulse_in_another_encoding(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes(pulse(HEADER, BLOCK).encode(encoding))
+    recording = look(path).checked()
+    assert recording.title == "B&K PULSE text"
+    assert recording.frf is not None
+    assert is_h(recording.frf)
+
+
 def test_another_function_of_pulse_is_named_and_no_frf(tmp_path: Path) -> None:
     header = HEADER | {"Data Type": "Real", "Function": "Autospectrum", "Title": "Autospectrum(Acc)"}
     path = put(tmp_path / "a.txt", pulse(header, rows(np.arange(1.0, 60.0), F, F)))

@@ -139,6 +139,15 @@ def test_nan_in_a_hit_is_refused_with_the_file(tmp_path: Path) -> None:
         read_hits(path)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16", "utf-8"])
+def test_an_lvm_that_was_saved_in_another_encoding_is_the_same(beam: Path, tmp_path: Path, encoding: str) -> None:
+    again = tmp_path / "again.lvm"
+    again.write_bytes(beam.read_text("latin-1").encode(encoding))
+    (first,), (second,) = read_hits(beam), read_hits(again)
+    np.testing.assert_array_equal(first.acceleration, second.acceleration)
+    np.testing.assert_array_equal(first.force, second.force)
+
+
 def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
     lines = beam.read_text(encoding="latin-1").splitlines()
     with pytest.raises(DataError, match="9977 of 50030 samples are there; the file is cut short"):

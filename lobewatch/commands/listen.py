@@ -24,6 +24,10 @@ def listen(
         float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    power: Annotated[
+        float | None,
+        typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
+    ] = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
@@ -69,7 +73,7 @@ def listen(
     from lobewatch.tap.listening.hear_cut import checked_sensor, checked_tacho, cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
-    setting = choose_cut(logbook.machine, program, cut, speed, depth)
+    setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
     if not dry_run:
         logbook.folder.refuse_damage()
     if screen and file is not None:

@@ -22,6 +22,10 @@ def observe(
     stable: Annotated[bool, typer.Option("--stable", help="It ran quietly.")] = False,
     chatter: Annotated[bool, typer.Option("--chatter", help="It chattered.")] = False,
     frequency: Annotated[float | None, typer.Option(help="What it chattered at, Hz, where somebody knows.")] = None,
+    power: Annotated[
+        float | None,
+        typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
+    ] = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -33,6 +37,7 @@ def observe(
 
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
       lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
+      lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable --power 1.4
     """
     from lobewatch.logbook import Logbook
     from lobewatch.machine.additions.keep_cut import keep_cut
@@ -44,7 +49,7 @@ def observe(
     if stable == chatter:
         raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
     logbook = Logbook.open(machine)
-    setting = cut_setting(logbook.machine, program, speed, depth)
+    setting = cut_setting(logbook.machine, program, speed, depth, power)
     heard = observe_cut(setting, "stable" if stable else "chatter", frequency, date)
     remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting_cuts(heard, logbook.cuts))]
     with telling(logbook):

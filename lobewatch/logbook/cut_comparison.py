@@ -21,6 +21,7 @@ from lobewatch.machine.additions.keep_cut import keep_cut, software
 from lobewatch.machine.additions.observe_cut import cutting_time
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.settings.cut_power import CutPower
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tool.assembly import Assembly
 
@@ -54,6 +55,11 @@ class CutComparison:
         return self.heard.speed_rpm if np.isfinite(self.heard.speed_rpm) else self.setting.speed_rpm
 
     @property
+    def power(self) -> CutPower | None:
+        """Power of the cut at that speed; None where nobody has read it."""
+        return None if self.setting.power is None else self.setting.power.at(self.speed_rpm)
+
+    @property
     def lobe(self) -> int | None:
         """Whole waves of chatter between two teeth; None without chatter."""
         chatter = self.heard.chatter
@@ -77,8 +83,7 @@ class CutComparison:
         return HeardCut(
             "",
             at,
-            **self.setting.heard_cut_fields,
-            speed_rpm=self.speed_rpm,
+            **self.setting.heard_cut_fields(self.speed_rpm),
             word=self.heard.word,
             chatter_frequency_hz=None if chatter is None else chatter.frequency,
             chatter_frequency_std_hz=None if chatter is None else chatter.error,

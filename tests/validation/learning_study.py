@@ -21,9 +21,11 @@ from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, milling_system, rows_of
 from lobewatch.cuts.learning.contradicting import contradictions
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.force_by_power import ForceByPower, force_by_power
 from lobewatch.cuts.learning.grid import Grid, speeds_between
 from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.learning.suggest import suggest
+from lobewatch.machine.settings.cut_power import PowerReading
 from lobewatch.verdicts.doubt import Doubt, Span
 from modal import Mode
 
@@ -45,6 +47,11 @@ NOISE = 0.002
 TANGENTIAL, RATIO = 8e8, 0.3
 """Kt (Pa) and Kr/Kt as machine.toml has them."""
 CUT = Cut(TEETH, 1.0, "down", TANGENTIAL, RATIO * TANGENTIAL)
+DIAMETER, EDGE = 0.016, 2e4
+"""Diameter of the tool (m) and Kte (N/m) as machine.toml has them."""
+SHOWN, DULL, READ, CHATTERING = (0.85, 1.2), (0.5, 1.5), 0.05, (0.75, 1.0)
+"""Power that the drive shows over that of all cuts, Kte over Kt over what machine.toml says, error of each reading, and
+power of a cut that chatters over that of a stable one."""
 
 
 @dataclass
@@ -56,6 +63,8 @@ class ForeignTruth:
     """Test cut that is written down as what it was not, from 1; 0 for none."""
     seed: int = 7
     """Seed of the truths: 7 for those that rules were chosen on, another for those they are measured on."""
+    reads_power: bool = False
+    """Whether the power of each cut is read."""
     cuts: list[CutEvidence] = field(default_factory=list)
     """Test cuts as they were written down."""
     truly_stable: list[bool] = field(default_factory=list)
@@ -81,6 +90,9 @@ class ForeignTruth:
         best = int(np.argmax(self.speeds * depths))
         self.optimum = float(self.speeds[best]), float(depths[best])
         self.learnt = self._before()
+        self.display = np.random.default_rng((35, self.seed, self.number))
+        self.shown = self.display.uniform(*SHOWN)
+        self.edge = EDGE * self.tangential / TANGENTIAL * self.display.uniform(*DULL)
 
     def _before(self) -> Posterior:
         """What is known before the first cut."""
@@ -119,9 +131,25 @@ class ForeignTruth:
             frequency = self.random.uniform(0.8, 1.3) * self.x[0][0] if truly and self.number % 2 else math.nan
         word: Literal["stable", "chatter"] = "stable" if truly != wrong else "chatter"
         name = f"c{len(self.cuts) + 1}"
-        self.cuts.append(CutEvidence(CUT, speed_rpm, depth, word, frequency, id=name))
+        power = self._power(speed_rpm, depth, truly, word == "chatter") if self.reads_power else None
+        self.cuts.append(CutEvidence(CUT, speed_rpm, depth, word, frequency, id=name, power=power))
         self.learnt = self.learnt.learn_from(self.cuts[-1])
         self.truly_stable.append(truly)
+
+    def _power(self, speed_rpm: float, depth: float, truly_stable: bool, chatters: bool) -> ForceByPower:
+        """What the power that is read says: Kt times the chips removed in a second, and the edges on half of a turn."""
+        teeth = TEETH * speed_rpm / 60
+        watts = teeth * depth * DIAMETER * (self.tangential * FEED + self.edge * math.pi / 2)
+        watts *= self.shown * (1 + READ * self.display.standard_normal())
+        watts *= 1.0 if truly_stable else self.display.uniform(*CHATTERING)
+        reading = PowerReading(watts, CUT, depth, DIAMETER, FEED, EDGE)
+        return force_by_power(reading.at(speed_rpm), CUT, chatters)
+
+    @property
+    def knows_force(self) -> bool:
+        """Whether the 95 % interval of Kt holds the truth."""
+        interval = self.learnt.intervals["tangential"]
+        return interval.low <= self.tangential / TANGENTIAL <= interval.high
 
     @property
     def reached(self) -> float:

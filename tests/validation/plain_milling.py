@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from milling_steps import Case, Floats
 
 
-def plain_motion(case: Case, steps: int, periods: int) -> Floats:
-    """Displacement along the feed in feeds per tooth, shape (periods, steps), from rest in a part cut at rest.
+class PlainCut(NamedTuple):
+    """What happens step by step, shape (periods, steps) each."""
+
+    motion: Floats
+    """Displacement along the feed in feeds per tooth."""
+    chips: Floats
+    """Sum of the chips of all teeth in feeds per tooth."""
+    touching: Floats
+    """Number of teeth that cut."""
+
+
+def plain_cut(case: Case, steps: int, periods: int) -> PlainCut:
+    """A cut from rest in a part cut at rest.
 
     Machine axes throughout; every pass leaves its mark on the part. Semi-implicit Euler.
     """
@@ -19,15 +31,18 @@ def plain_motion(case: Case, steps: int, periods: int) -> Floats:
     feed = np.array([math.cos(case.feed_angle), math.sin(case.feed_angle)])
     outward, force, part = _round(case, steps, feed)
     q, v, path = np.zeros(f.size), np.zeros(f.size), np.empty((periods * steps, 2))
+    chips, touching = np.empty(len(path)), np.empty(len(path))
     for i in range(len(path)):
         at = (i + steps * np.arange(case.teeth)) % len(part)
         path[i] = to_tip @ q
         reach = outward[at] @ (path[i] + feed * (i / steps))
         chip = np.maximum(reach - part[at], 0)
         part[at] = np.maximum(part[at], reach)
+        inside = np.any(force[at], axis=1)
+        chips[i], touching[i] = np.sum(chip[inside]), np.sum(chip[inside] > 0)
         v += step * (w**2 / k * (to_tip.T @ (chip @ force[at])) - 2 * zeta * w * v - w**2 * q)
         q += step * v
-    return np.asarray((path @ feed).reshape(periods, steps))
+    return PlainCut(*(record.reshape(periods, steps) for record in (path @ feed, chips, touching)))
 
 
 def _round(case: Case, steps: int, feed: Floats) -> tuple[Floats, Floats, Floats]:

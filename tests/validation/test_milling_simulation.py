@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from milling_simulation import Case, chatters, judge
 from milling_steps import Floats, Stepper
-from plain_milling import plain_motion
+from plain_milling import plain_cut
 from random_milling import RandomMilling, random_case
 
 from lobes import Cut, Program, program_limit, spectral_radius
@@ -144,7 +144,7 @@ def pushed(case: Case) -> Floats:
     ids=["turned back", "low immersion", "turned", "slot"],
 )
 def test_chatter_with_loss_of_contact_is_as_large_as_in_a_plain_simulation(case: Case, size: float) -> None:
-    assert spread(plain_motion(case, 400, 180)[-80:]) == pytest.approx(size, rel=0.02)
+    assert spread(plain_cut(case, 400, 180).motion[-80:]) == pytest.approx(size, rel=0.02)
     assert spread(pushed(case)) == pytest.approx(size, rel=0.02)
 
 

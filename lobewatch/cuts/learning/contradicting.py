@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import FREQUENCY, log_likelihood, misheard
+from lobewatch.cuts.learning.likelihood import FREQUENCY, log_likelihood, misheard, power_distance
 from lobewatch.cuts.learning.posterior import USUAL, NewEvidence, Posterior
 
 WRONG = 0.5
@@ -19,7 +19,8 @@ WRONG = 0.5
 DRAWS = 300
 """Number of draws that are asked what they say of a cut."""
 AWAY = 4.0
-"""Distance from all frequencies predicted (standard deviations) at which chatter is that of something else; chosen."""
+"""Distance (standard deviations) from all frequencies predicted at which chatter is that of something else, and from
+the Kt that was known at which a power is not believed; chosen."""
 NONE = 0.005
 """Share of the weight by the other cuts that counts as nothing; chosen."""
 
@@ -33,11 +34,13 @@ class Contradiction(StrEnum):
     """It chatters where most spindles that explain the other cuts are stable."""
     STABLE = "stable"
     """It is stable where most of them chatter."""
+    POWER = "power"
+    """Its power says another Kt than the cuts before it."""
 
 
 @dataclass(frozen=True)
 class ContradictingCut:
-    """A cut whose word is not believed, or whose frequency is of no mode."""
+    """A cut whose word or power is not believed, or whose frequency is of no mode."""
 
     cut: CutEvidence
     """The cut."""
@@ -65,6 +68,16 @@ def contradiction(evidence: NewEvidence) -> ContradictingCut | None:
     if wrong <= WRONG:
         return None
     return ContradictingCut(cut, Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE, wrong)
+
+
+def contradicts_by_power(evidence: NewEvidence) -> bool:
+    """Whether the power of a cut says another Kt than all that was known before."""
+    cut, before = evidence.cut, evidence.before
+    if cut.power is None:
+        return False
+    distance, variance = power_distance(cut, before.draws.force(cut.material), before.cuts)
+    mean = np.sum(before.weights * distance)
+    return bool(abs(mean) > AWAY * np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance))
 
 
 def contradictions(learnt: Posterior) -> tuple[ContradictingCut, ...]:
@@ -106,6 +119,10 @@ def _contradiction_remark(contradicting: ContradictingCut) -> Remark:
         Contradiction.STABLE: (
             f"stable {at}, {wrong}: a slip, another depth or speed than told?",
             "cut it again, or take it out with lobewatch exclude",
+        ),
+        Contradiction.POWER: (
+            f"its power {at} says another Kt than what was known before: misread, another feed or depth, worn edges?",
+            "read the power again; what it sounded like counts",
         ),
     }[contradicting.why]
     return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

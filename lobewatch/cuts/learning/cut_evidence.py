@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from lobes import Cut
+from lobewatch.cuts.learning.force_by_power import ForceByPower
 from lobewatch.machine.journal.heard_cut import CutWord
 
 AGED = 0.02
@@ -38,6 +39,8 @@ class CutEvidence:
     """Natural frequency at rest when it was made, over that of now."""
     id: str = ""
     """Number of the cut in the journal."""
+    power: ForceByPower | None = None
+    """Kt by its power; None where nobody has read it."""
 
     @property
     def weight(self) -> float:

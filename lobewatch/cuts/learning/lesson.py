@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lobewatch.cuts.learning.contradicting import ContradictingCut, contradictions
+from lobewatch.cuts.learning.contradicting import (
+    ContradictingCut,
+    Contradiction,
+    contradictions,
+    contradicts_by_power,
+)
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.force_by_power import force_by_power
 from lobewatch.cuts.learning.grid import STEP, Grid, zero_order_trust
 from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.learning.suggest import Suggestion, suggest
@@ -34,14 +40,14 @@ class Lesson:
     learnt: Posterior
     """Spindle and coefficients as known with the cuts."""
     contradicting: tuple[ContradictingCut, ...]
-    """Cuts that are not believed."""
+    """Cuts that are not believed; of some it is their power alone, without which they were learnt from."""
     own_cuts: tuple[CutEvidence, ...]
     """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
 
     @property
     def doubted(self) -> tuple[CutEvidence, ...]:
-        """Cuts that are not believed."""
-        return tuple(contradiction.cut for contradiction in self.contradicting)
+        """Cuts whose word is not believed."""
+        return tuple(odd.cut for odd in self.contradicting if odd.why is not Contradiction.POWER)
 
     @property
     def believed(self) -> tuple[CutEvidence, ...]:
@@ -70,12 +76,17 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 
 def learn_program(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:
     """Learn from the cuts of a machine; those of other tools say nothing of this one."""
-    evidence = tool_evidence(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
-    learnt = start.learn_from_all(evidence)
+    learnt, odd_powers = start, []
+    for cut in tool_evidence(cuts, table, assembly, machine):
+        evidence = learnt.predict(cut)
+        if contradicts_by_power(evidence):
+            odd_powers.append(ContradictingCut(cut, Contradiction.POWER))
+            evidence = replace(evidence, cut=replace(cut, power=None))
+        learnt = evidence.learn()
     shape = geometry(machine.build_cut(table))
-    own_cuts = tuple(cut for cut in evidence if cut.material == 0 and geometry(cut.cut) == shape)
-    return Lesson(table, start, learnt, contradictions(learnt), own_cuts)
+    own_cuts = tuple(cut for cut in learnt.cuts if cut.material == 0 and geometry(cut.cut) == shape)
+    return Lesson(table, start, learnt, (*contradictions(learnt), *odd_powers), own_cuts)
 
 
 def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut], most: int) -> NextCut:
@@ -130,6 +141,7 @@ def _evidence(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
         speed_found=cut.by != "ear",
         moved=_moved(cut, assembly),
         id=cut.id,
+        power=None if cut.power is None else force_by_power(cut.power, cut.cut, cut.chatters),
     )
 
 

@@ -96,6 +96,37 @@ def misheard(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvi
     return np.asarray(wrong / (right + wrong))
 
 
+def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> tuple[Floats, float]:
+    """Logarithm of Kt by power over that of each spindle, less what readings before it say of the error that all share,
+    shape (r,), and its variance.
+
+    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e standard
+    normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance. ValueError for a
+    cut without power.
+    """
+    if cut.power is None:
+        raise ValueError(f"cut {cut.id} has no power; ask for one that has")
+    shared, precision = np.zeros(force.shape), 1.0
+    for other in before:
+        if other.power is not None and other.material == cut.material:
+            shared += np.log(other.power.force / force) * other.power.common / other.power.own**2
+            precision += (other.power.common / other.power.own) ** 2
+    distance = np.log(cut.power.force / force) - cut.power.common * shared / precision
+    return distance, cut.power.own**2 + cut.power.common**2 / precision
+
+
+def power_log_likelihood(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> Floats:
+    """Logarithm of the likelihood of its power over the largest that it can be, shape (r,); 0 where nobody has read it.
+
+    Arguments as of `power_distance`. A natural frequency that has moved since says nothing of Kt: an old one counts
+    whole.
+    """
+    if cut.power is None:
+        return np.zeros(force.shape)
+    distance, variance = power_distance(cut, force, before)
+    return np.asarray(-(distance**2) / (2 * variance))
+
+
 def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence]) -> tuple[Floats, Floats]:
     """Likelihood of what was written down with its word right, and with it wrong."""
     truths: tuple[Floats, Floats] = prediction.chatters, 1 - prediction.chatters

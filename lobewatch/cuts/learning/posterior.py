@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from lobes import MillingRows
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood, most_likely, predict_cut
+from lobewatch.cuts.learning.likelihood import (
+    CutPrediction,
+    log_likelihood,
+    most_likely,
+    power_log_likelihood,
+    predict_cut,
+)
 from lobewatch.cuts.learning.priors import Draws, draw_prior
 from lobewatch.verdicts.doubt import Doubt
 
@@ -139,7 +145,9 @@ class NewEvidence:
 
     def learn(self) -> Posterior:
         """What is known with it."""
-        log_weight = self.before.log_weight + _log_likelihood(self.cut, self.prediction, self.before.cuts)
+        log_weight = self.before.log_weight + _log_likelihood(
+            self.cut, self.before.draws, self.prediction, self.before.cuts
+        )
         learnt = replace(self.before, log_weight=log_weight, cuts=(*self.before.cuts, self.cut))
         return _refresh(learnt) if learnt.size < ENOUGH else learnt
 
@@ -152,10 +160,11 @@ def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) 
     return Posterior(draw_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
 
 
-def _log_likelihood(cut: CutEvidence, prediction: CutPrediction, before: Sequence[CutEvidence]) -> Floats:
-    """Logarithm of the likelihood of one cut after those before it; an old one counts less, the more the frequency has
-    moved since."""
-    return cut.weight * log_likelihood(cut, prediction, [other for other in before if cut.is_again(other)])
+def _log_likelihood(cut: CutEvidence, draws: Draws, prediction: CutPrediction, before: Sequence[CutEvidence]) -> Floats:
+    """Logarithm of the likelihood of one cut after those before it; the word of an old one counts less, the more the
+    frequency has moved since."""
+    word = log_likelihood(cut, prediction, [other for other in before if cut.is_again(other)])
+    return cut.weight * word + power_log_likelihood(cut, draws.force(cut.material), before)
 
 
 def _weights(log_weight: Floats) -> Floats:
@@ -194,7 +203,8 @@ def _joint(draws: Draws, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            value[asked] += _log_likelihood(cut, predict_cut(cut, draws[asked]), cuts[:k])
+            left = draws[asked]
+            value[asked] += _log_likelihood(cut, left, predict_cut(cut, left), cuts[:k])
     return value
 
 

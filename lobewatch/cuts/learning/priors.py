@@ -84,6 +84,13 @@ class Draws:
                 values |= {f"damping_{side}": sides[:, axis, 0], f"stiffness_{side}": sides[:, axis, 1]}
         return values
 
+    def force(self, material: int) -> Floats:
+        """Factors of Kt of a material, shape (r,)."""
+        first, doubted = self._first(material), self.doubt.tangential
+        at_speed, normal = self.normal[:, first : first + 2].T
+        force = doubted.low + (doubted.high - doubted.low) * scipy.special.ndtr(normal)
+        return np.asarray(FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * force)
+
     def rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._sides()[:, self.at_rest.axes[self.at_rest.direction]]
@@ -122,11 +129,9 @@ class Draws:
 
     def _coefficients(self, material: int, tangential: float, radial: float) -> tuple[Floats, Floats]:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""
-        first, doubted = self._first(material), self.doubt.tangential
-        at_speed, normal, direction = self.normal[:, first : first + OF_MATERIAL].T
-        force = doubted.low + (doubted.high - doubted.low) * scipy.special.ndtr(normal)
+        direction = self.normal[:, self._first(material) + OF_MATERIAL - 1]
         ratio = _wide_ratio(scipy.special.ndtr(direction), self.doubt.ratio, radial / tangential)
-        return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * force, np.maximum(ratio, 0.0)
+        return self.force(material), np.maximum(ratio, 0.0)
 
 
 def draw_prior(middle: MillingRows, doubt: Doubt, count: int, seed: int = 0) -> Draws:

@@ -32,8 +32,7 @@ def observe_cut(
     return HeardCut(
         "",
         when,
-        **setting.heard_cut_fields,
-        speed_rpm=setting.speed_rpm,
+        **setting.heard_cut_fields(setting.speed_rpm),
         word=word,
         chatter_frequency_hz=frequency,
         by="ear",

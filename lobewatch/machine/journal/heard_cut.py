@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal, get_args
 
 from lobes import Cut
+from lobewatch.machine.settings.cut_power import CutPower
 
 CutWord = Literal["stable", "chatter", "flip", "cannot tell"]
 """Word on the sound of a cut; flip: chatter whose period is two teeth."""
@@ -72,6 +73,8 @@ class HeardCut:
     """Code of the reason why the word cannot be told; empty where it can."""
     recording: RecordingFile | None = None
     """Recording of its sound; None for what was heard by ear."""
+    power: CutPower | None = None
+    """Power of the cut; None where nobody has read it."""
     excluded: str = ""
     """Reason why a person has taken it out; empty where it counts; lines of their own."""
 
@@ -106,8 +109,10 @@ def cut_of_line(line: Mapping[str, Any], excluded: str = "") -> HeardCut:
     """Test cut of the line that `HeardCut.line` has made."""
     fields = {name: line[name] for name in HeardCut.__dataclass_fields__ if name in line}
     fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
-    recording = line.get("recording")
-    return HeardCut(**fields | {"recording": RecordingFile(**recording) if recording else None, "excluded": excluded})
+    recording, power = line.get("recording"), line.get("power")
+    fields |= {"recording": RecordingFile(**recording) if recording else None}
+    fields |= {"power": CutPower(**power) if power else None}
+    return HeardCut(**fields | {"excluded": excluded})
 
 
 def cuts_of(entries: Sequence[Mapping[str, Any]], excluded: Mapping[str, str]) -> tuple[HeardCut, ...]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from lobes import Cut
+from lobewatch.machine.settings.cut_power import PowerReading, power_reading
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine
 
@@ -34,15 +35,16 @@ class CutSetting:
     """Spindle speed as it is set (rpm)."""
     depth: float
     """Axial depth of cut (m)."""
+    power: PowerReading | None = None
+    """Power that the drive shows in it; None where nobody has read it."""
 
     @property
     def tooth_frequency(self) -> float:
         """Times a second that the cut repeats (Hz): teeth a second where they are evenly spaced."""
         return self.cut.repeats * self.speed_rpm / 60
 
-    @property
-    def heard_cut_fields(self) -> dict[str, Any]:
-        """Fields of a `HeardCut` that follow from it."""
+    def heard_cut_fields(self, speed_rpm: float) -> dict[str, Any]:
+        """Fields of a `HeardCut` that follow from it and from the speed that was turned (rpm)."""
         feed = self.table.feed_per_tooth_mm
         return {
             "program": self.program,
@@ -52,14 +54,18 @@ class CutSetting:
             "feed": self.feed,
             "feed_per_tooth": None if feed is None else feed / 1e3,
             "commanded_rpm": self.speed_rpm,
+            "speed_rpm": speed_rpm,
             "depth": self.depth,
+            "power": None if self.power is None else self.power.at(speed_rpm),
         }
 
 
-def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+def cut_setting(
+    machine: Machine, program: str, speed_rpm: float | None, depth_mm: float | None, power_kw: float | None = None
+) -> CutSetting:
     """Setting of a program or "reference cut" at a speed and a depth; None: those of the program.
 
-    ValueError for a name, speed or depth that is none.
+    power_kw: what the drive shows in it, more than in air. ValueError for a name, speed, depth or power that is none.
     """
     table = _table(machine, program)
     for option, value, unit in (("--speed", speed_rpm, "rpm"), ("--depth", depth_mm, "mm")):
@@ -75,11 +81,21 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
         raise ValueError(f"--depth {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
     tool = preset.tool if preset else machine.tap.tool
     name = preset.name if preset else None
-    material = machine.coefficients(table).material
-    return CutSetting(table, material, name, tool, machine.build_cut(table), table.feed, float(speed), depth / 1e3)
+    known, cut = machine.coefficients(table), machine.build_cut(table)
+    setting = CutSetting(table, known.material, name, tool, cut, table.feed, float(speed), depth / 1e3)
+    if power_kw is None:
+        return setting
+    return replace(setting, power=power_reading(power_kw, table, known, cut, machine.drive, speed, setting.depth))
 
 
-def choose_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+def choose_cut(
+    machine: Machine,
+    program: str,
+    cut: str,
+    speed_rpm: float | None,
+    depth_mm: float | None,
+    power_kw: float | None = None,
+) -> CutSetting:
     """Setting of a program, or of a cut with speed and depth of its own; ValueError where it is not one of both."""
     if bool(program) == bool(cut):
         names = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
@@ -89,7 +105,7 @@ def choose_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None
     if cut and (speed_rpm is None or depth_mm is None):
         missing = "--speed" if speed_rpm is None else "--depth"
         raise ValueError(f"--cut {cut}: {missing} is missing; give speed and depth, or --program with those of its own")
-    return cut_setting(machine, program or cut, speed_rpm, depth_mm)
+    return cut_setting(machine, program or cut, speed_rpm, depth_mm, power_kw)
 
 
 def _table(machine: Machine, name: str) -> CutTable:

@@ -9,6 +9,7 @@ from typing import Any
 from lobewatch.cuts.listening.measured_speed import is_multiple
 from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS
 from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.show.programs.describe_power import power_json, power_text
 
 WHY: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
@@ -122,6 +123,8 @@ def listened_texts(comparison: CutComparison) -> list[str]:
         texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
     if comparison.sensor == "microphone":
         texts.append(DEAF)
+    if comparison.power is not None:
+        texts.append(power_text(comparison.power, comparison.setting.cut))
     return texts + _expected(comparison)
 
 
@@ -171,6 +174,7 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "energy_ratio": heard.ratio,
         "lobe": comparison.lobe,
         "side_bands_hz": [] if chatter is None else sorted(chatter.lines.frequency.tolist()),
+        **power_json(comparison.power),
         "predicted": None if expected is None else ("stable" if expected.stable else "chatter"),
         "predicted_frequency_hz": None if expected is None else expected.frequency,
         "predicted_apart_hz": comparison.apart,

@@ -10,6 +10,7 @@ from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.machine.additions.observe_cut import contradicting_cuts
 from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.show.programs.describe_power import power_json, power_text
 
 
 def cut_text(cut: HeardCut) -> str:
@@ -18,9 +19,10 @@ def cut_text(cut: HeardCut) -> str:
 
 
 def cut_words(cut: HeardCut) -> str:
-    """Name, speed and depth of a test cut, and what it sounded like."""
+    """Name, speed and depth of a test cut, what it sounded like, and its power."""
     named = cut.program or "reference cut"
-    return f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard_text(cut)}, by {cut.by}"
+    words = f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard_text(cut)}, by {cut.by}"
+    return words if cut.power is None else f"{words}; {power_text(cut.power, cut.cut)}"
 
 
 def heard_text(cut: HeardCut) -> str:
@@ -47,6 +49,7 @@ def cut_json(cut: HeardCut) -> dict[str, Any]:
         "chatter_frequency_hz": cut.chatter_frequency_hz,
         "chatter_frequency_hz_std": cut.chatter_frequency_std_hz,
         "by": cut.by,
+        **power_json(cut.power),
         "reason": cut.reason,
         "recording": None if cut.recording is None else cut.recording.file,
         "excluded": cut.excluded,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from milling_steps import Case
 from numpy.typing import NDArray
-from plain_milling import plain_motion
+from plain_milling import plain_cut
 
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, simulate_cut, simulate_cuts
 from lobes import Cut, spectral_radius, stability_boundary
@@ -164,7 +164,7 @@ def test_chatter_with_loss_of_contact_is_as_large_as_in_a_plain_simulation(
     """The tooth leaves the cut and comes back to what was left several tooth periods ago."""
     made = cut_of(cut, speed_rpm, depth)
     case = Case(X, Y, 0.0, cut.teeth, cut.immersion, cut.direction, cut.tangential, cut.radial, 0.0, speed_rpm, depth)
-    plain = np.ravel(plain_motion(case, STEPS, 120)[-80:]) * made.feed_per_tooth
+    plain = np.ravel(plain_cut(case, STEPS, 120).motion[-80:]) * made.feed_per_tooth
     motion = simulate_cut(made, STEADY)
     assert displacement(middle(motion, 0.25)[0], 1 / motion.sample_rate) == pytest.approx(
         displacement(plain, made.tooth_period / STEPS, already=True), rel=0.04

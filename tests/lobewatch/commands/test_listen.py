@@ -62,6 +62,27 @@ def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) ->
     assert "chatter at 1712" in picture.read_text("utf-8")
 
 
+def test_the_power_of_a_cut_says_a_kt_at_the_speed_that_was_heard(shop: Shop, tmp_path: Path) -> None:
+    """0.64 % faster than set: as much less Kt. A power that cannot be is refused before anything is heard."""
+    shop.run(("A", 12000, 1.5), more="feed_per_tooth_mm = 0.1")
+    place = ("--program", "A", "--file", recording(tmp_path / "cut.csv"))
+    told = json.loads(run(shop, *place, "--power", 4.0, "--json").stdout)
+    observed = CliRunner().invoke(
+        app,
+        ["observe", str(shop.path), "--program", "A", "--speed", f"{told['speed_rpm']}", "--stable", "--power", "4.0"],
+    )
+    assert observed.exit_code == 0
+    heard, by_ear = shop.logbook.cuts
+    assert heard.power == by_ear.power
+    assert told["power_kw"] == 4.0
+    assert told["tangential_by_power_n_per_mm2"] == pytest.approx(heard.power.tangential / 1e6)
+    text = run(shop, *place, "--power", 4.0, "--dry-run").stdout
+    assert f"4 kW say Kt {heard.power.tangential / 1e6:.0f} N/mm2, machine.toml 1400" in text
+    wrong = run(shop, *place, "--power", 4000)
+    assert "--power 4000: with the Kt of 1400 N/mm2" in str(wrong.exception)
+    assert len(shop.logbook.files.cuts) == 2
+
+
 def test_a_quiet_cut_is_stable_and_nothing_is_kept_without_wish(shop: Shop, tmp_path: Path) -> None:
     file = recording(tmp_path / "cut.csv")
     result = run(shop, "--cut", "reference cut", "--speed", 12000, "--depth", 1, "--file", file, "--dry-run")

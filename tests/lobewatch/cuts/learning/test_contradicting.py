@@ -83,12 +83,15 @@ def test_each_contradiction_is_said_with_its_cause(mill: Mill) -> None:
         ContradictingCut(CHATTER, Contradiction.FREQUENCY),
         ContradictingCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS, 0.871),
         ContradictingCut(STABLE, Contradiction.STABLE, 0.6),
+        ContradictingCut(STABLE, Contradiction.POWER),
     ]
     remarks = list(contradiction_remarks(mill.prior, odd, "A"))
     assert [(remark.code, remark.about) for remark in remarks] == [
-        ("cut-unexplained", "c8"), ("cut-unexplained", "c8"), ("cut-unexplained", "c7"),
+        ("cut-unexplained", "c8"), ("cut-unexplained", "c8"), ("cut-unexplained", "c7"), ("cut-unexplained", "c7"),
     ]  # fmt: skip
     texts = [str(remark) for remark in remarks]
     assert "chatters at 1750 Hz at 12000 rpm, 3 mm, where no mode is" in texts[0]
     assert "chatter at 12000 rpm, 3 mm, by the other cuts wrong with 87 %" in texts[1]
     assert "stable at 12000 rpm, 3 mm, by the other cuts wrong with 60 %" in texts[2]
+    assert "its power at 12000 rpm" in texts[3]
+    assert "says another Kt than what was known before" in texts[3]

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from lobewatch.cuts.learning.contradicting import Contradiction
 from lobewatch.cuts.learning.lesson import learn_program
 from lobewatch.cuts.learning.suggest import best_removal_rate
 from lobewatch.machine.additions.observe_cut import observe_cut
@@ -44,3 +45,27 @@ def test_a_cut_of_a_material_by_another_of_its_names_is_one_of_the_program(shop:
     table = next(program for program in machine.program if program.name == "A")
     lesson = learn_program(table, shop.logbook.assembly(table.tool), machine, [heard])
     assert (heard.coefficients, [cut.id for cut in lesson.own_cuts]) == ("42CrMo4", ["c1"])
+
+
+def test_a_power_that_is_not_believed_is_said_and_the_word_of_its_cut_counts(shop: Shop) -> None:
+    """1.4 kW are as much as machine.toml expects at 1 mm."""
+    shop.edit("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
+    shop.tap_both()
+    machine = shop.folder.machine
+    cuts = [
+        replace(
+            observe_cut(cut_setting(machine, "A", speed, 1.0, power), "stable", at=shop.start + timedelta(days=1)),
+            id=f"c{number}",
+        )
+        for number, (speed, power) in enumerate(((12900, 2.9), (12800, 2.9), (12700, 7.0)), 1)
+    ]
+    table = next(program for program in machine.program if program.name == "A")
+    tool = shop.logbook.assembly(table.tool)
+    lesson = learn_program(table, tool, machine, cuts)
+    (odd,) = lesson.contradicting
+    assert (odd.cut.id, odd.why) == ("c3", Contradiction.POWER)
+    assert [cut.id for cut in lesson.believed] == [cut.id for cut in lesson.own_cuts] == ["c1", "c2", "c3"]
+    assert lesson.doubted == ()
+    without = learn_program(table, tool, machine, [*cuts[:2], replace(cuts[2], power=None)])
+    assert without.contradicting == ()
+    assert without.learnt.intervals == lesson.learnt.intervals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from lobewatch.machine.additions.keep_cut import keep_cut
 from lobewatch.machine.additions.observe_cut import observe_cut
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import verify
-from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.journal.heard_cut import HeardCut, cut_of_line
 from lobewatch.machine.settings.cut_setting import cut_setting, find_named
 from lobewatch.show.history.describe_cut import untapped_remarks
 
@@ -71,6 +71,85 @@ def test_a_cut_keeps_what_it_was_cut_with_when_the_machine_file_changes(shop: Sh
     assert run(shop, "observe", "--program", "A", "--stable").exit_code == 0
     shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 2800")
     assert shop.logbook.cuts[0].cut.tangential == 1400e6
+
+
+FEED = ("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
+"""Change of machine.toml after which power says a Kt."""
+
+
+def test_the_power_of_a_cut_stands_in_its_line_with_the_kt_that_it_says(shop: Shop) -> None:
+    """Of a slot at 12 900 rpm, 1.5 mm deep: Kt 1400 N/mm2 on 215 revolutions a second, and edges of 42 N/mm."""
+    shop.edit(*FEED)
+    rate = 4 * 215 * 1.5e-3 * 0.02
+    watts = rate * (1.1 * 1.4e9 * 1e-4 + 42e3 * np.pi / 2)
+    result = run(shop, "observe", "--program", "A", "--stable", "--power", watts / 1e3)
+    assert f"; {watts / 1e3:.4g} kW say Kt 1540 N/mm2, machine.toml 1400" in result.stdout
+    (cut,) = shop.logbook.cuts
+    assert cut.power is not None
+    assert (cut.power.watts, cut.power.tangential) == pytest.approx((watts, 1.54e9))
+    assert cut.power.edge_share == pytest.approx(42e3 * np.pi / 2 / 1.54e5)
+    assert not cut.power.edge_known
+    line = json.loads((shop.path / "journal.jsonl").read_bytes().splitlines()[-1])
+    assert line["power"] == asdict(cut.power)
+    shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 2800")
+    assert shop.logbook.cuts == (cut,)
+    (listed,) = json.loads(run(shop, "history", "--json").stdout)["cuts"]
+    assert listed["power_kw"] == pytest.approx(watts / 1e3)
+    assert listed["tangential_by_power_n_per_mm2"] == pytest.approx(1540)
+    assert "kW say Kt 1540 N/mm2" in run(shop, "history").stdout
+
+
+def test_a_line_from_before_there_was_any_power_is_read_as_it_was(shop: Shop) -> None:
+    cut = replace(heard(shop), id="c1")
+    line = {name: value for name, value in cut.line.items() if name != "power"}
+    assert cut_of_line(line) == cut_of_line(cut.line) == cut
+
+
+def test_a_kte_that_is_known_is_taken_off(shop: Shop) -> None:
+    shop.edit(*FEED)
+    shop.edit("tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed", 'material = "own"\nspeed')
+    own = "tangential_n_per_mm2 = 700\nradial_n_per_mm2 = 200\ntangential_edge_n_per_mm = 10"
+    shop.edit("[reference_cut]", f'[[material]]\nname = "own"\n{own}\n\n[reference_cut]')
+    setting = cut_setting(shop.folder.machine, "A", 12000, 1.0, 4 * 200 * 1e-3 * 0.02 * (8e4 + 1e4 * np.pi / 2) / 1e3)
+    power = observe_cut(setting, "stable").power
+    assert power is not None
+    assert power.edge_known
+    assert power.tangential == pytest.approx(8e8)
+
+
+@pytest.mark.parametrize(
+    ("power", "said"),
+    [
+        ("0", "--power 0: is not above 0"),
+        ("nan", "--power nan: is not above 0"),
+        ("5300", "--power 5300: is more than power_kw=15 of [drive]"),
+        ("14.9", "--power 14.9: with the Kt of 700 N/mm2 in machine.toml 1.3 to 8.1 kW are to be expected"),
+        ("0.6", "--power 0.6: with the Kt of 700 N/mm2"),
+    ],
+)
+def test_a_power_that_cannot_be_is_refused_and_not_kept(shop: Shop, power: str, said: str) -> None:
+    shop.edit(*FEED)
+    shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 700")
+    shop.edit("[reference_cut]", "[drive]\npower_kw = 15\n\n[reference_cut]")
+    result = run(shop, "observe", "--program", "A", "--stable", "--power", power)
+    assert said in str(result.exception)
+    assert shop.logbook.cuts == ()
+
+
+@pytest.mark.parametrize(
+    ("radial", "more", "said"),
+    [
+        ("20", "", "says nothing without feed_per_tooth_mm; write it into machine.toml"),
+        ("[5, 20]", "feed_per_tooth_mm = 0.1", "whose radial depth changes on its way"),
+        ("10", "feed_per_tooth_mm = 0.1\ncorner_radius_mm = 12", "whose radial depth changes on its way"),
+    ],
+)
+def test_a_power_that_says_nothing_of_kt_is_refused(shop: Shop, radial: str, more: str, said: str) -> None:
+    shop.run(("A", 12900, 1.5), more=more)
+    shop.edit("radial_depth_mm = 20\ndirection", f"radial_depth_mm = {radial}\ndirection")
+    result = run(shop, "observe", "--program", "A", "--stable", "--power", "3.0")
+    assert said in str(result.exception)
+    assert shop.logbook.cuts == ()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,105 @@
+"""What the power that a drive shows in a cut says of its cutting coefficient."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lobes import Coefficients, Cut, mean_torque, tangential_by_power
+from lobewatch.machine.settings.cut_tables import CutTable, Drive
+
+EDGE_LENGTH = 3e-5
+"""Kte over Kt (m) where none is published; in the middle of those that are, 0.012 to 0.041 mm."""
+FARTHEST = 4.0
+"""Kt by power over that of machine.toml, or the other way round, from which on it is no such power; chosen: W in place
+of kW are 1000 times as much, per cent of load ten times or more."""
+
+
+@dataclass(frozen=True)
+class CutPower:
+    """Power of a cut, and what it says."""
+
+    watts: float
+    """Power that the drive showed in the cut, less that at the same speed in air (W)."""
+    tangential: float
+    """Tangential cutting coefficient Kt that it says (Pa)."""
+    edge_share: float
+    """Power that the edges took for themselves, over that of the chips (-)."""
+    edge_known: bool
+    """Whether a Kte is known; else it was taken for `EDGE_LENGTH` times Kt."""
+
+
+@dataclass(frozen=True)
+class PowerReading:
+    """Power that a drive shows, and what was cut there as far as it follows from that."""
+
+    watts: float
+    """Power (W)."""
+    cut: Cut
+    """Cut with the coefficients of machine.toml."""
+    depth: float
+    """Axial depth (m)."""
+    diameter: float
+    """Diameter of the tool (m)."""
+    feed_per_tooth: float
+    """Feed per tooth (m)."""
+    tangential_edge: float
+    """Edge coefficient Kte (N/m); NaN where none is known."""
+
+    @property
+    def edge(self) -> float:
+        """Edge coefficient Kte that is reckoned with (N/m)."""
+        return self.tangential_edge if self.edge_known else EDGE_LENGTH * self.cut.tangential
+
+    @property
+    def edge_known(self) -> bool:
+        """Whether a Kte is known."""
+        return math.isfinite(self.tangential_edge)
+
+    def at(self, speed_rpm: float) -> CutPower:
+        """What it says at the speed that was turned (rpm)."""
+        place = (self.depth, self.diameter, self.feed_per_tooth)
+        tangential = tangential_by_power(self.cut, self.watts, speed_rpm, *place, self.edge)
+        chips = self.expected(speed_rpm, tangential, edge=0.0)
+        return CutPower(self.watts, tangential, self.watts / chips - 1, self.edge_known)
+
+    def expected(self, speed_rpm: float, tangential: float, edge: float) -> float:
+        """Power (W) of the same cut with another Kt (Pa) and Kte (N/m)."""
+        cut = replace(self.cut, tangential=tangential)
+        return float(
+            2 * np.pi * speed_rpm / 60 * mean_torque(cut, self.depth, self.diameter, self.feed_per_tooth, edge)
+        )
+
+
+def power_reading(
+    power_kw: float, table: CutTable, known: Coefficients, cut: Cut, drive: Drive, speed_rpm: float, depth: float
+) -> PowerReading:
+    """A power as a person has read it off; depth in m. ValueError where it says nothing of Kt, and for what is none."""
+    if not (math.isfinite(power_kw) and power_kw > 0):
+        raise ValueError(f"--power {power_kw:g}: is not above 0; give what the drive shows more than in air, in kW")
+    if table.feed_per_tooth_mm is None:
+        raise ValueError(f"--power {power_kw:g}: says nothing without feed_per_tooth_mm; write it into machine.toml")
+    if len(table.immersions) > 1:
+        raise ValueError(
+            f"--power {power_kw:g}: of a cut whose radial depth changes on its way nobody knows at which it was; "
+            "leave it out, or read it in a cut with one radial depth"
+        )
+    if power_kw > drive.power_kw:
+        raise ValueError(f"--power {power_kw:g}: is more than power_kw={drive.power_kw:g} of [drive]; give kW")
+    reading = PowerReading(
+        1e3 * power_kw,
+        cut,
+        depth,
+        table.tool_diameter_mm / 1e3,
+        table.feed_per_tooth_mm / 1e3,
+        known.tangential_edge,
+    )
+    ends = [reading.expected(speed_rpm, cut.tangential * by, reading.edge) / 1e3 for by in (1 / FARTHEST, FARTHEST)]
+    if not ends[0] <= power_kw <= ends[1]:
+        raise ValueError(
+            f"--power {power_kw:g}: with the Kt of {cut.tangential / 1e6:.0f} N/mm2 in machine.toml "
+            f"{ends[0]:.2g} to {ends[1]:.2g} kW are to be expected; give kW, less what is shown in air"
+        )
+    return reading

@@ -1,0 +1,107 @@
+"""What the power of cuts teaches, against integration by brute force over the error that all readings share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lobewatch.cuts.learning.contradicting import contradicts_by_power
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.force_by_power import ForceByPower, force_by_power
+from lobewatch.cuts.learning.likelihood import power_distance, power_log_likelihood
+from lobewatch.machine.settings.cut_power import CutPower
+from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
+
+FORCES = np.array([0.7, 0.9, 1.0, 1.15, 1.6])
+"""Kt of a few spindles over that of the table."""
+READINGS = [ForceByPower(1.25, 0.14, 0.05), ForceByPower(1.1, 0.2, 0.13), ForceByPower(1.3, 0.14, 0.06)]
+
+
+def cut(power: ForceByPower | None, material: int = 0) -> CutEvidence:
+    """A stable cut so shallow that its word says nothing."""
+    return CutEvidence(SLOT, 12000, 1e-5, "stable", material=material, power=power)
+
+
+def one_after_another(cuts: list[CutEvidence]) -> np.ndarray:
+    parts = [power_log_likelihood(each, FORCES, cuts[:k]) for k, each in enumerate(cuts)]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+def by_brute_force(readings: list[ForceByPower]) -> np.ndarray:
+    """Logarithm of the integral over e of N(e; 0, 1) times N(log K_i; log K + common_i e, own_i) of all readings."""
+    e = np.linspace(-12, 12, 24001)
+    log = np.tile(-(e**2) / 2, (len(FORCES), 1))
+    for reading in readings:
+        off = np.log(reading.force / FORCES)[:, np.newaxis] - reading.common * e
+        log -= (off / reading.own) ** 2 / 2
+    return np.asarray(np.log(np.sum(np.exp(log), axis=1)))
+
+
+def test_the_error_that_all_readings_share_is_integrated_out() -> None:
+    for count in (1, 2, 3):
+        step, brute = one_after_another([cut(one) for one in READINGS[:count]]), by_brute_force(READINGS[:count])
+        assert step - step[2] == pytest.approx(brute - brute[2], abs=1e-6)
+
+
+def test_no_spindle_is_likelier_than_one_of_the_kt_that_is_read() -> None:
+    assert np.all(one_after_another([cut(one) for one in READINGS]) <= 0)
+    assert power_log_likelihood(cut(ForceByPower(1.3, 0.1, 0.05)), np.array([1.3]), [])[0] == 0
+
+
+def test_cuts_without_power_and_of_another_material_say_nothing() -> None:
+    first = cut(READINGS[0])
+    assert np.all(power_log_likelihood(cut(None), FORCES, [first]) == 0)
+    alone = power_log_likelihood(first, FORCES, [])
+    others = [cut(None), cut(READINGS[1], material=1)]
+    assert np.array_equal(power_log_likelihood(first, FORCES, others), alone)
+    with pytest.raises(ValueError, match="has no power"):
+        power_distance(cut(None), FORCES, [])
+
+
+@pytest.mark.parametrize("force", [0.7, 1.6])
+def test_kt_moves_towards_what_is_read_and_no_closer_than_the_error_that_all_readings_share(
+    mill: Mill, force: float
+) -> None:
+    before = mill.prior.intervals["tangential"]
+    read = [replace(cut(ForceByPower(force, 0.13, 0.05)), depth=1e-5 * (1 + k)) for k in range(4)]
+    one, four = (mill.prior.learn_from_all(read[:count]).intervals["tangential"] for count in (1, 4))
+    assert abs(one.mean - force) < abs(before.mean - force) / 3
+    assert (one.mean - before.mean) * (force - before.mean) > 0
+    assert one.std < before.std / 2
+    assert 0.1 * force < four.std <= 1.1 * one.std
+
+
+def test_an_old_reading_counts_whole(mill: Mill) -> None:
+    read = cut(READINGS[0])
+    now, old = (mill.prior.learn_from(replace(read, moved=moved)).intervals["tangential"] for moved in (1.0, 1.08))
+    assert now.mean == pytest.approx(old.mean, rel=1e-3)
+
+
+def test_edges_make_the_error_larger_and_more_so_where_their_force_is_not_known() -> None:
+    """Edges take 0.4 times what chips take: 10 % of both are 14 % of the chips, 30 or 50 % of edges 12 or 20 %."""
+    none, known, unknown = (
+        force_by_power(CutPower(1500.0, 1.75e9, share, is_known), SLOT, chatters=False)
+        for share, is_known in ((0.0, True), (0.4, True), (0.4, False))
+    )
+    assert (none.force, none.common, none.own) == pytest.approx((1.25, 0.10, 0.05))
+    assert (known.force, known.common, known.own) == pytest.approx((1.25, math.hypot(0.14, 0.12), 0.07))
+    assert unknown.common == pytest.approx(math.hypot(0.14, 0.2))
+
+
+def test_a_cut_that_chatters_reads_low_and_scatters() -> None:
+    chatter = force_by_power(CutPower(1500.0, 1.4e9, 0.0, True), SLOT, chatters=True)
+    assert (chatter.force, chatter.common, chatter.own) == pytest.approx((1 / 0.85, 0.10, math.hypot(0.05, 0.12)))
+
+
+def test_a_power_far_from_all_that_was_known_contradicts(mill: Mill) -> None:
+    read = ForceByPower(1.0, 0.13, 0.05)
+    learnt = mill.prior.learn_from(cut(read))
+    for force, contradicts in ((1.2, False), (0.85, False), (1.5, True), (0.65, True)):
+        again = replace(cut(replace(read, force=force)), depth=2e-5)
+        assert contradicts_by_power(learnt.predict(again)) == contradicts
+    assert not contradicts_by_power(mill.prior.predict(cut(replace(read, force=1.5))))
+    assert contradicts_by_power(mill.prior.predict(cut(replace(read, force=9.0))))
+    assert not contradicts_by_power(learnt.predict(cut(None)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from learning_study import ForeignTruth, heard, make_cuts, slot_limits
+from learning_study import TANGENTIAL, ForeignTruth, heard, make_cuts, slot_limits
 
 SHALLOWER, DEEPER = 0.95, 1.10
 
@@ -45,6 +45,17 @@ def test_a_truth_is_of_another_kind_than_the_prior() -> None:
         assert max(one.runout) > 0
 
 
+def test_the_power_of_a_truth_says_its_kt_within_the_error_that_is_reckoned_with() -> None:
+    off = []
+    for one in (ForeignTruth(number, reads_power=True) for number in range(60)):
+        one.write_down(9000.0, 1e-4, math.nan)
+        power = one.cuts[0].power
+        assert power is not None
+        off.append(math.log(power.force * TANGENTIAL / one.tangential) / math.hypot(power.common, power.own))
+    assert abs(np.mean(off)) < 0.4
+    assert 0.6 < np.std(off) < 1.3
+
+
 @pytest.mark.timeout(600)
 def test_a_few_spindles_reach_most_of_their_optimum_with_and_without_a_word_that_is_wrong() -> None:
     right, wrong = [ForeignTruth(number) for number in range(4)], [ForeignTruth(2, mislabelled=2)]
@@ -73,3 +84,17 @@ def test_one_wrong_word_of_five_leaves_most_of_it() -> None:
     median, tenth = reached(truths)
     assert median >= 0.75
     assert tenth >= 0.50
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize(("mislabelled", "median", "tenth"), [(0, 0.92, 0.78), (2, 0.86, 0.65)])
+def test_five_cuts_whose_power_is_read_reach_what_is_wanted_with_a_wrong_word_too(
+    mislabelled: int, median: float, tenth: float
+) -> None:
+    truths = [ForeignTruth(number, mislabelled, seed=2611, reads_power=True) for number in range(100)]
+    make_cuts(truths)
+    share = reached(truths)
+    assert share[0] >= median
+    assert share[1] >= tenth
+    assert np.mean([one.knows_force for one in truths]) >= 0.85

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -111,10 +110,6 @@ class Posterior:
     def learn_from(self, cut: CutEvidence) -> Posterior:
         """What is known after one more cut."""
         return self.predict(cut).learn()
-
-    def learn_from_all(self, cuts: Iterable[CutEvidence]) -> Posterior:
-        """What is known after some more."""
-        return reduce(Posterior.learn_from, cuts, self)
 
     def predict(self, cut: CutEvidence) -> NewEvidence:
         """A cut, and what it would sound like on the spindles that are not ruled out."""

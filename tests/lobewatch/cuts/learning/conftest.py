@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 import pytest
@@ -39,6 +41,10 @@ class Mill:
     def prior(self) -> Posterior:
         """Before the first cut."""
         return prior(self.middle, doubt(), 700)
+
+    def learnt_from(self, cuts: Iterable[CutEvidence]) -> Posterior:
+        """After some cuts."""
+        return reduce(Posterior.learn_from, cuts, self.prior)
 
     @property
     def grid(self) -> Grid:

@@ -70,11 +70,11 @@ def test_chatter_of_half_a_percent_of_the_weight_by_the_others_is_explained(shar
 def test_a_cut_that_contradicts_those_before_it_is_believed_where_those_after_explain_it(mill: Mill) -> None:
     stable = CutEvidence(mill.cut, 12000, 1.6e-3, "stable")
     shallow, deep = (CutEvidence(mill.cut, 12000, depth, "chatter") for depth in (0.9e-3, 1.65e-3))
-    (odd,) = contradictions(mill.prior.learn_from_all([stable, replace(stable, depth=1.7e-3), shallow]))
+    (odd,) = contradictions(mill.learnt_from([stable, replace(stable, depth=1.7e-3), shallow]))
     assert (odd.cut, odd.why) == (shallow, Contradiction.CHATTERS)
     assert odd.wrong > 0.9
     again = [stable, shallow, deep, replace(shallow, depth=0.95e-3), replace(shallow, speed_rpm=12100)]
-    (odd,) = contradictions(mill.prior.learn_from_all(again))
+    (odd,) = contradictions(mill.learnt_from(again))
     assert (odd.cut, odd.why) == (stable, Contradiction.STABLE)
 
 

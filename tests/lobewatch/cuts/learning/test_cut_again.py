@@ -56,7 +56,7 @@ def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_c
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
     cuts = [CutEvidence(mill.cut, speed, depth, "stable", id=f"c{k}") for k, depth in enumerate((2e-3, 2.5e-3))]
     odd = CutEvidence(mill.cut, speed, 1e-3, "chatter", id="c2")
-    learnt = mill.prior.learn_from_all([*cuts, odd])
+    learnt = mill.learnt_from([*cuts, odd])
     again = suggest(learnt, mill.grid, [*cuts, odd], 2, [odd])
     assert again is not None
     assert (again.speed_rpm, again.depth, again.repeats) == (speed, 1e-3, "c2")
@@ -73,7 +73,7 @@ def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: M
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
     cuts = [CutEvidence(mill.cut, speed, depth, "chatter", id=f"c{k}") for k, depth in enumerate((4e-3, 3e-3))]
     odd = CutEvidence(mill.cut, speed, 8e-3, "stable", id="c2")
-    learnt = mill.prior.learn_from_all([*cuts, odd])
+    learnt = mill.learnt_from([*cuts, odd])
     found = {left: suggest(learnt, mill.grid, [*cuts, odd], left, [odd]) for left in (2, 1)}
     assert {left: cut.repeats for left, cut in found.items() if cut} == {2: "c2", 1: ""}
 
@@ -83,7 +83,7 @@ def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_le
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
     places = [(speed, 1.5e-3, "stable"), (speed, 2e-3, "chatter"), (1.015 * speed, 2e-3, "stable")]
     cuts = [CutEvidence(mill.cut, *place, id=f"c{k}") for k, place in enumerate(places, 1)]  # type: ignore[arg-type]
-    learnt = mill.prior.learn_from_all(cuts)
+    learnt = mill.learnt_from(cuts)
     assert contradictions(learnt) == ()
     again = suggest(learnt, mill.grid, cuts, 2)
     assert again is not None
@@ -91,7 +91,7 @@ def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_le
     last = suggest(learnt, mill.grid, cuts, 1)
     assert last is None or not last.repeats
     twice = [*cuts, replace(cuts[1], id="c4")]
-    third = suggest(mill.prior.learn_from_all(twice), mill.grid, twice, 2)
+    third = suggest(mill.learnt_from(twice), mill.grid, twice, 2)
     assert third is None or third.repeats != "c2"
 
 
@@ -110,7 +110,7 @@ def test_chatter_is_not_asked_for_again_where_a_stable_word_is_more_doubtful(mil
     first, last = (replace(mill.chatter(speed), frequency=math.nan) for speed in (12000, 12400))
     between = CutEvidence(mill.cut, 12200, 1.1 * first.depth, "stable")
     cuts = [first, between, last]
-    found = suggest(mill.prior.learn_from_all(cuts), mill.grid, cuts, 2)
+    found = suggest(mill.learnt_from(cuts), mill.grid, cuts, 2)
     assert found is not None
     assert found.repeats == ""
     assert (found.speed_rpm, found.depth) not in [(cut.speed_rpm, cut.depth) for cut in cuts]

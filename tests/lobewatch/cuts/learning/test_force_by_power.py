@@ -67,7 +67,7 @@ def test_kt_moves_towards_what_is_read_and_no_closer_than_the_error_that_all_rea
 ) -> None:
     before = mill.prior.intervals["tangential"]
     read = [replace(cut(ForceByPower(force, 0.13, 0.05)), depth=1e-5 * (1 + k)) for k in range(4)]
-    one, four = (mill.prior.learn_from_all(read[:count]).intervals["tangential"] for count in (1, 4))
+    one, four = (mill.learnt_from(read[:count]).intervals["tangential"] for count in (1, 4))
     assert abs(one.mean - force) < abs(before.mean - force) / 3
     assert (one.mean - before.mean) * (force - before.mean) > 0
     assert one.std < before.std / 2

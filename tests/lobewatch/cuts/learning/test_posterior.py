@@ -147,14 +147,14 @@ def test_another_material_teaches_the_spindle_but_not_the_force_of_this_one() ->
 
 def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
     cuts = [replace(mill.hear(9500, 3e-3), material=1), mill.hear(13500, 3e-3)]
-    learnt = mill.prior.learn_from_all(cuts)
+    learnt = mill.learnt_from(cuts)
     assert (learnt.cuts, contradictions(learnt)) == (tuple(cuts), ())
 
 
 def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
-    once, again = (mill.prior.learn_from_all(cuts) for _ in range(2))
+    once, again = (mill.learnt_from(cuts) for _ in range(2))
     assert np.array_equal(once.draws.normal, again.draws.normal)
     assert np.array_equal(once.log_weight, again.log_weight)
     assert once.refreshed == 1
@@ -164,7 +164,7 @@ def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
 def test_what_contradicts_is_named_and_teaches_nothing(mill: Mill) -> None:
     cuts = [CutEvidence(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
     odd = CutEvidence(mill.cut, 12000, 0.3e-3, "chatter")
-    without, learnt = mill.prior.learn_from_all(cuts), mill.prior.learn_from_all([*cuts, odd])
+    without, learnt = mill.learnt_from(cuts), mill.learnt_from([*cuts, odd])
     assert [(doubt.cut, doubt.why) for doubt in contradictions(learnt)] == [(odd, Contradiction.CHATTERS)]
     assert learnt.intervals["tangential"].mean == pytest.approx(without.intervals["tangential"].mean, rel=0.01)
     deep = CutEvidence(mill.cut, 8000, 0.03, "stable")

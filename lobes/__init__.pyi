@@ -4,7 +4,7 @@ from .aged_mode import aged_mode
 from .average_angle import average_angle
 from .coefficients import Coefficients, tangential_and_radial
 from .cut import Cut, Direction
-from .cutting_power import deepest_for_drive, mean_torque, tangential_by_power
+from .cutting_power import deepest_for_drive, mean_torque
 from .floquet import (
     MillingRows,
     ProgramLimit,
@@ -100,7 +100,6 @@ __all__ = [
     "spectral_radius",
     "stability_boundary",
     "tangential_and_radial",
-    "tangential_by_power",
     "with_pattern",
     "write_history",
     "zero_order",

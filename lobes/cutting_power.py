@@ -36,32 +36,6 @@ def mean_torque(
     return np.asarray(cut.teeth * diameter / (4 * np.pi) * per_depth * np.asarray(depth, dtype=np.float64))
 
 
-def tangential_by_power(
-    cut: Cut,
-    power: float,
-    speed_rpm: float,
-    depth: float,
-    diameter: float,
-    feed_per_tooth: float,
-    edge: float = 0.0,
-) -> float:
-    """Tangential coefficient Kt (Pa) that the power (W) of a cut says, whatever that of the cut itself.
-
-    The inverse of 2 pi n `mean_torque`: what the edges (Kte, N/m) do not take, over what a Kt of 1 Pa would. diameter,
-    depth and feed_per_tooth in m. Raises ValueError as `mean_torque`, and where the edges alone take all of it.
-
-    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> round(tangential_by_power(slot, 672.0, 12000.0, 2e-3, diameter=12e-3, feed_per_tooth=0.1e-3) / 1e6)  # N/mm2
-    700
-    """
-    chips = float(mean_torque(cut, depth, diameter, feed_per_tooth))
-    edges = float(mean_torque(cut, depth, diameter, feed_per_tooth, edge)) - chips
-    turning = 2 * np.pi * speed_rpm / 60
-    if not power > turning * edges:
-        raise ValueError(f"power={power} W is not more than the {turning * edges:.6g} W that the edges alone take")
-    return cut.tangential * (power / turning - edges) / chips
-
-
 def deepest_for_drive(
     cut: Cut,
     speed_rpm: ArrayLike,

@@ -31,7 +31,6 @@ from lobes import (
     program_limit,
     spectral_radius,
     tangential_and_radial,
-    tangential_by_power,
 )
 from modal import Mode
 
@@ -157,28 +156,6 @@ def test_power_is_the_tangential_force_times_the_removal_rate() -> None:
     half = replace(SLOT, immersion=0.5)
     power = 2 * math.pi * 200 * mean_torque(half, 3e-3, 0.02, 1e-4)
     assert power == pytest.approx(half.tangential * 0.01 * 3e-3 * 1e-4 * 4 * 200)
-
-
-@pytest.mark.parametrize("edge", [0.0, 2e4])
-@pytest.mark.parametrize(
-    "cut", [SLOT, replace(SLOT, immersion=0.2, direction="down", pitch=(1.5, 1.6, 1.5, 2 * math.pi - 4.6))]
-)
-def test_kt_by_power_is_the_way_back_whatever_kt_the_cut_was_taken_for(cut: Cut, edge: float) -> None:
-    true = replace(cut, tangential=1.3 * cut.tangential)
-    power = 2 * math.pi * 200 * float(mean_torque(true, 3e-3, 0.02, 1e-4, edge))
-    assert tangential_by_power(cut, power, 12000, 3e-3, 0.02, 1e-4, edge) == pytest.approx(true.tangential)
-
-
-def test_kt_by_power_of_a_slot_is_that_of_chips_and_edges() -> None:
-    """N n b D (Kt f + Kte pi / 2): the chips, and half a turn of rubbing at pi D n."""
-    power = 4 * 200 * 3e-3 * 0.02 * (9e8 * 1e-4 + 2e4 * math.pi / 2)
-    assert tangential_by_power(SLOT, power, 12000, 3e-3, 0.02, 1e-4, 2e4) == pytest.approx(9e8)
-
-
-def test_a_power_that_the_edges_alone_take_says_no_kt() -> None:
-    edges = 4 * 200 * 3e-3 * 0.02 * 2e4 * math.pi / 2
-    with pytest.raises(ValueError, match="W that the edges alone take"):
-        tangential_by_power(SLOT, 0.99 * edges, 12000, 3e-3, 0.02, 1e-4, 2e4)
 
 
 def test_depth_for_power_and_torque() -> None:

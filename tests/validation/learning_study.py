@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from shown_power import FEED, ShownPower
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
@@ -21,11 +22,9 @@ from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, milling_system, rows_of
 from lobewatch.cuts.learning.contradicting import contradictions
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.force_by_power import ForceByPower, force_by_power
 from lobewatch.cuts.learning.grid import Grid, speeds_between
 from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.learning.suggest import suggest
-from lobewatch.machine.settings.cut_power import PowerReading
 from lobewatch.verdicts.doubt import Doubt, Span
 from modal import Mode
 
@@ -38,7 +37,6 @@ TEETH = 4
 LOW, HIGH, DEEPEST = 4000.0, 20000.0, 0.02
 STEP = 5e-5
 """Depths are set in steps of this (m)."""
-FEED = 1e-4
 PASSAGE = Passage(before=0.0, ramp=0.02, steady=0.8, after=0.0)
 CHATTERS = 0.05
 """Part of the motion that does not repeat from turn to turn (rms) from which a cut chatters."""
@@ -47,11 +45,6 @@ NOISE = 0.002
 TANGENTIAL, RATIO = 8e8, 0.3
 """Kt (Pa) and Kr/Kt as machine.toml has them."""
 CUT = Cut(TEETH, 1.0, "down", TANGENTIAL, RATIO * TANGENTIAL)
-DIAMETER, EDGE = 0.016, 2e4
-"""Diameter of the tool (m) and Kte (N/m) as machine.toml has them."""
-SHOWN, DULL, READ, CHATTERING = (0.85, 1.2), (0.5, 1.5), 0.05, (0.75, 1.0)
-"""Power that the drive shows over that of all cuts, Kte over Kt over what machine.toml says, error of each reading, and
-power of a cut that chatters over that of a stable one."""
 
 
 @dataclass
@@ -90,9 +83,7 @@ class ForeignTruth:
         best = int(np.argmax(self.speeds * depths))
         self.optimum = float(self.speeds[best]), float(depths[best])
         self.learnt = self._before()
-        self.display = np.random.default_rng((35, self.seed, self.number))
-        self.shown = self.display.uniform(*SHOWN)
-        self.edge = EDGE * self.tangential / TANGENTIAL * self.display.uniform(*DULL)
+        self.drive = ShownPower(CUT, self.tangential, np.random.default_rng((35, self.seed, self.number)))
 
     def _before(self) -> Posterior:
         """What is known before the first cut."""
@@ -131,19 +122,10 @@ class ForeignTruth:
             frequency = self.random.uniform(0.8, 1.3) * self.x[0][0] if truly and self.number % 2 else math.nan
         word: Literal["stable", "chatter"] = "stable" if truly != wrong else "chatter"
         name = f"c{len(self.cuts) + 1}"
-        power = self._power(speed_rpm, depth, truly, word == "chatter") if self.reads_power else None
+        power = self.drive.says(speed_rpm, depth, truly, word == "chatter") if self.reads_power else None
         self.cuts.append(CutEvidence(CUT, speed_rpm, depth, word, frequency, id=name, power=power))
         self.learnt = self.learnt.learn_from(self.cuts[-1])
         self.truly_stable.append(truly)
-
-    def _power(self, speed_rpm: float, depth: float, truly_stable: bool, chatters: bool) -> ForceByPower:
-        """What the power that is read says: Kt times the chips removed in a second, and the edges on half of a turn."""
-        teeth = TEETH * speed_rpm / 60
-        watts = teeth * depth * DIAMETER * (self.tangential * FEED + self.edge * math.pi / 2)
-        watts *= self.shown * (1 + READ * self.display.standard_normal())
-        watts *= 1.0 if truly_stable else self.display.uniform(*CHATTERING)
-        reading = PowerReading(watts, CUT, depth, DIAMETER, FEED, EDGE)
-        return force_by_power(reading.at(speed_rpm), CUT, chatters)
 
     @property
     def knows_force(self) -> bool:

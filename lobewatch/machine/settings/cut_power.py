@@ -1,13 +1,13 @@
-"""What the power that a drive shows in a cut says of its cutting coefficient."""
+"""What the power that a drive shows in a cut says of its cutting coefficients, Kt and Kte in their ratio."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from lobes import Coefficients, Cut, mean_torque, tangential_by_power
+from lobes import Coefficients, Cut, mean_torque
 from lobewatch.machine.settings.cut_tables import CutTable, Drive
 
 EDGE_LENGTH = 3e-5
@@ -26,7 +26,7 @@ class CutPower:
     tangential: float
     """Tangential cutting coefficient Kt that it says (Pa)."""
     edge_share: float
-    """Power that the edges took for themselves, over that of the chips (-)."""
+    """Power that the edges take for themselves, over that of the chips (-)."""
     edge_known: bool
     """Whether a Kte is known; else it was taken for `EDGE_LENGTH` times Kt."""
 
@@ -60,17 +60,17 @@ class PowerReading:
 
     def at(self, speed_rpm: float) -> CutPower:
         """What it says at the speed that was turned (rpm)."""
-        place = (self.depth, self.diameter, self.feed_per_tooth)
-        tangential = tangential_by_power(self.cut, self.watts, speed_rpm, *place, self.edge)
-        chips = self.expected(speed_rpm, tangential, edge=0.0)
-        return CutPower(self.watts, tangential, self.watts / chips - 1, self.edge_known)
+        tangential = self.cut.tangential * self.watts / self.expected(speed_rpm)
+        share = self._torque(self.edge) / self._torque(0.0) - 1
+        return CutPower(self.watts, tangential, share, self.edge_known)
 
-    def expected(self, speed_rpm: float, tangential: float, edge: float) -> float:
-        """Power (W) of the same cut with another Kt (Pa) and Kte (N/m)."""
-        cut = replace(self.cut, tangential=tangential)
-        return float(
-            2 * np.pi * speed_rpm / 60 * mean_torque(cut, self.depth, self.diameter, self.feed_per_tooth, edge)
-        )
+    def expected(self, speed_rpm: float) -> float:
+        """Power (W) by the coefficients of machine.toml."""
+        return 2 * np.pi * speed_rpm / 60 * self._torque(self.edge)
+
+    def _torque(self, edge: float) -> float:
+        """Mean torque (N m) with this Kte (N/m)."""
+        return float(mean_torque(self.cut, self.depth, self.diameter, self.feed_per_tooth, edge))
 
 
 def power_reading(
@@ -96,7 +96,7 @@ def power_reading(
         table.feed_per_tooth_mm / 1e3,
         known.tangential_edge,
     )
-    ends = [reading.expected(speed_rpm, cut.tangential * by, reading.edge) / 1e3 for by in (1 / FARTHEST, FARTHEST)]
+    ends = [reading.expected(speed_rpm) / 1e3 * by for by in (1 / FARTHEST, FARTHEST)]
     if not ends[0] <= power_kw <= ends[1]:
         raise ValueError(
             f"--power {power_kw:g}: with the Kt of {cut.tangential / 1e6:.0f} N/mm2 in machine.toml "

@@ -56,7 +56,8 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
             f"chance of chatter {round(100 * cut.chance)} %; {_why(cut, next_cut.lesson)}"
         )
         observe = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
-        yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+        power = "" if next_cut.lesson.program.feed_per_tooth_mm is None else "; --power KW, where it is shown, tells Kt"
+        yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ){power}"
     best = _best(next_cut)
     if best is not None:
         gain = f"; the next is expected to gain {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""

@@ -51,6 +51,14 @@ def test_cuts_are_suggested_learnt_from_and_come_to_an_end(shop: Shop, run: Any)
     assert "not learnt" in text
 
 
+def test_power_is_asked_for_where_it_can_say_a_kt(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    assert "--power" not in run("suggest", "--program", "A")[1]
+    shop.edit("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
+    text = run("suggest", "--program", "A")[1]
+    assert "--stable (or --chatter --frequency HZ); --power KW, where it is shown, tells Kt\n" in text
+
+
 def test_a_cut_that_contradicts_is_said_and_left_out(shop: Shop, run: Any) -> None:
     shop.tap_both()
     for depth, heard in (("2.2", "--stable"), ("2.1", "--stable"), ("0.2", "--chatter")):

@@ -81,19 +81,19 @@ def test_an_old_reading_counts_whole(mill: Mill) -> None:
 
 
 def test_edges_make_the_error_larger_and_more_so_where_their_force_is_not_known() -> None:
-    """Edges take 0.4 times what chips take: 10 % of both are 14 % of the chips, 30 or 50 % of edges 12 or 20 %."""
+    """Edges take a quarter of all power: 30 or 50 % of that are 7.5 or 12.5 %."""
     none, known, unknown = (
         force_by_power(CutPower(1500.0, 1.75e9, share, is_known), SLOT, chatters=False)
-        for share, is_known in ((0.0, True), (0.4, True), (0.4, False))
+        for share, is_known in ((0.0, True), (1 / 3, True), (1 / 3, False))
     )
-    assert (none.force, none.common, none.own) == pytest.approx((1.25, 0.10, 0.05))
-    assert (known.force, known.common, known.own) == pytest.approx((1.25, math.hypot(0.14, 0.12), 0.07))
-    assert unknown.common == pytest.approx(math.hypot(0.14, 0.2))
+    assert (none.force, none.common, none.own) == pytest.approx((1.25, 0.15, 0.05))
+    assert (known.force, known.common, known.own) == pytest.approx((1.25, math.hypot(0.15, 0.075), 0.05))
+    assert unknown.common == pytest.approx(math.hypot(0.15, 0.125))
 
 
 def test_a_cut_that_chatters_reads_low_and_scatters() -> None:
     chatter = force_by_power(CutPower(1500.0, 1.4e9, 0.0, True), SLOT, chatters=True)
-    assert (chatter.force, chatter.common, chatter.own) == pytest.approx((1 / 0.85, 0.10, math.hypot(0.05, 0.12)))
+    assert (chatter.force, chatter.common, chatter.own) == pytest.approx((1 / 0.89, 0.15, math.hypot(0.05, 0.08)))
 
 
 def test_a_power_far_from_all_that_was_known_contradicts(mill: Mill) -> None:

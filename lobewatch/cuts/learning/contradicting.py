@@ -121,8 +121,9 @@ def _contradiction_remark(contradicting: ContradictingCut) -> Remark:
             "cut it again, or take it out with lobewatch exclude",
         ),
         Contradiction.POWER: (
-            f"its power {at} says another Kt than what was known before: misread, another feed or depth, worn edges?",
-            "read the power again; what it sounded like counts",
+            f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
+            "another depth, worn edges?",
+            "read it again, or take the cut whose power was misread out with lobewatch exclude; its word counts",
         ),
     }[contradicting.why]
     return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

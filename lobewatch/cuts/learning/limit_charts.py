@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,6 @@ TRULY = 2.0
 the word is more likely wrong."""
 EQUAL = 1e-9
 """Difference of two depths that is none (m)."""
-LITTLE = 0.2
-"""Removal rate over the best of most draws that is little; chosen, see `LimitCharts.value`."""
 
 Floats = NDArray[np.float64]
 
@@ -55,8 +52,6 @@ class LimitCharts:
     """A natural frequency (Hz)."""
     chips: Floats
     """Speed times the deepest depth that can be set and is stable (rpm m) for each of them, shape (r, s)."""
-    little: float
-    """Removal rate that is little (rpm m)."""
 
     @classmethod
     def of(cls, draws: Draws, grid: Grid) -> LimitCharts:
@@ -68,23 +63,10 @@ class LimitCharts:
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True))
         limit = np.minimum(limit * grid.trust, grid.deepest)
         order = np.argsort(-limit, axis=0, kind="stable")
-        chips = grid.speeds * np.floor(limit * 1e3 / MM + ROUNDING) * MM / 1e3
-        little = LITTLE * float(np.median(np.max(chips, axis=1)))
+        depth = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / MM + ROUNDING) * MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
-        folded = fold_frequency(frequency, grid.cut.repeats * grid.speeds / 60)
-        return cls(grid, limit, folded, order, typical, np.take_along_axis(chips, order, axis=0), max(little, EQUAL))
-
-    def value(self, chips: float | Floats) -> Floats:
-        """What a removal rate (rpm m) is worth, in its unit: all of one that is little, less and less of more.
-
-        The logarithm, from what is little on: a cut that is safe is worth more where little was heard stable.
-        """
-        return np.asarray(self.little * np.log1p(np.divide(chips, self.little)))
-
-    @cached_property
-    def values(self) -> Floats:
-        """Values of the chips, shape (r, s)."""
-        return self.value(self.chips)
+        teeth = grid.cut.repeats * grid.speeds / 60
+        return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def truly_best(self, cuts: Sequence[CutEvidence]) -> Floats:
         """Largest removal rate (rpm m) of the cuts that were heard stable and are so, in each draw, shape (r,)."""
@@ -101,23 +83,23 @@ class LimitCharts:
         return np.asarray(excess < -TRULY * EDGE if cut.chatters else excess > TRULY * EDGE)
 
     def gains(self, weights: Floats, best: float | Floats) -> Floats:
-        """Expected gain of value by the best cut at each speed, shape (s,); best: value so far, of each draw or of
-        all."""
-        more = self.values > np.min(best)
+        """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,); best: that so far, of each
+        draw or of all."""
+        more = self.chips > np.min(best)
         speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
-        order, values = self.order[deep][:, speeds], self.values[deep][:, speeds]
-        gain = np.zeros(values.shape)
-        for so_far in np.unique(best):
-            stable = np.cumsum((weights * (best == so_far))[order], axis=0)
-            gain += stable * np.maximum(values - so_far, 0.0)
+        order, chips = self.order[deep][:, speeds], self.chips[deep][:, speeds]
+        gain = np.zeros(chips.shape)
+        for value in np.unique(best):
+            stable = np.cumsum((weights * (best == value))[order], axis=0)
+            gain += stable * np.maximum(chips - value, 0.0)
         likely = np.cumsum(weights[order], axis=0) > LIKELY
         best_gains = np.zeros(speeds.shape)
         best_gains[speeds] = np.max(likely * gain, axis=0, initial=0.0)
         return best_gains
 
     def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
-        """Speeds, by their place, and depths (m) that are worth looking at; best: removal rate so far (rpm m)."""
-        gains = self.gains(np.full(len(self.limits), 1 / len(self.limits)), self.value(best))
+        """Speeds, by their place, and depths (m) that are worth looking at."""
+        gains = self.gains(np.full(len(self.limits), 1 / len(self.limits)), best)
         places = list[int]()
         for row in np.argsort(-gains).tolist():
             if all(abs(np.log(self.grid.speeds[row] / self.grid.speeds[place])) > APART for place in places):
@@ -129,20 +111,20 @@ class LimitCharts:
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
     def worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
-        """Worth of a cut: the value that it gains, and where more are left what the best next one gains then; best:
-        removal rate so far (rpm m), of each draw or of all."""
+        """Worth of a cut (rpm m): what it gains, and where more are left what the best next one gains then; best: as
+        for `gains`."""
         stable = self.limits[:, row] >= depth - EQUAL
-        chance, value, so_far = float(np.mean(stable)), self.value(self.grid.speeds[row] * depth), self.value(best)
+        chance, chips = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
         if chance <= LIKELY:
             return 0.0
-        gain = float(np.mean(stable * np.maximum(value - so_far, 0.0)))
+        gain = float(np.mean(stable * np.maximum(chips - best, 0.0)))
         if left <= 1:
             return gain
-        after = chance * self._next(stable / np.sum(stable), np.maximum(so_far, value))
-        return gain + after + (1 - chance) * self._after_chatter(row, ~stable, so_far)
+        after = chance * self._next(stable / np.sum(stable), np.maximum(best, chips))
+        return gain + after + (1 - chance) * self._after_chatter(row, ~stable, best)
 
     def _after_chatter(self, row: int, chatters: NDArray[np.bool_], best: float | Floats) -> float:
-        """Gain of value by the next cut, over frequencies that may be heard."""
+        """Gain of the next cut, over frequencies that may be heard."""
         places = np.flatnonzero(chatters)
         if not places.size:
             return 0.0
@@ -157,5 +139,5 @@ class LimitCharts:
         return float(np.mean(gains))
 
     def _next(self, weights: Floats, best: float | Floats) -> float:
-        """Gain of value by the best cut at any speed."""
+        """Gain of the best cut at any speed (rpm m)."""
         return float(np.max(self.gains(weights, best)))

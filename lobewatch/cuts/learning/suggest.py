@@ -82,8 +82,7 @@ def suggest(
     if (again := _asked_again(few, [cut for cut in cuts if grid.holds(cut.speed_rpm)], left, doubted)) is not None:
         return replace(_judged(grid, again.speed_rpm, again.depth, best, draws), repeats=again.id)
     true = np.maximum(chart.truly_best(cuts), best_removal_rate([cut for cut in cuts if cut not in learnt.cuts]))
-    so_far = max(best, LEAST_RATE * float(np.max(chart.chips)))
-    least = chart.value((1 + GAINED) * so_far) - chart.value(so_far)
+    least = GAINED * max(best, LEAST_RATE * float(np.max(chart.chips)))
     careful_from = np.inf if cuts else DEEPER * programmed
     speeds = grid.speeds.tolist()
     places = [(row, deep) for row, deep in chart.candidates(true) if not is_taken(speeds[row], deep, cuts, doubted)]

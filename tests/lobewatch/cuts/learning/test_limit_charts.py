@@ -20,15 +20,15 @@ Floats = NDArray[np.float64]
 SPEEDS = np.array([6000.0, 9000.0, 9100.0, 12000.0, 15000.0])
 
 
-def charts(limits_mm: Floats, frequencies: Floats | None = None, little: float = 1e12) -> LimitCharts:
-    """Limits of some spindles (r, s) as a chart; typical natural frequency 1000 Hz, values as good as removal rates."""
+def charts(limits_mm: Floats, frequencies: Floats | None = None) -> LimitCharts:
+    """Limits of some spindles (r, s) as a chart; typical natural frequency 1000 Hz."""
     limits = np.asarray(limits_mm) / 1e3
     speeds = SPEEDS[: limits.shape[1]]
     grid = Grid(SLOT, (0.0,), speeds, np.full(speeds.shape, 0.02), np.ones(speeds.shape))
     order = np.argsort(-limits, axis=0, kind="stable")
     floored = np.vectorize(floor_depth)(np.take_along_axis(limits, order, axis=0))
     heard = np.zeros(limits.shape) if frequencies is None else frequencies
-    return LimitCharts(grid, limits, heard, order, 1000.0, speeds * floored, little)
+    return LimitCharts(grid, limits, heard, order, 1000.0, speeds * floored)
 
 
 def counted_gains(chart: LimitCharts, weights: Floats, best: float | Floats) -> list[float]:
@@ -76,22 +76,6 @@ def test_the_last_cut_is_worth_its_gain_times_its_chance() -> None:
     assert chart.worth(0, 2e-3, 13.0, 1) == 0.0
     assert chart.worth(0, 3e-3, 0.0, 1) == 0.0
     assert chart.worth(0, 3e-3, 0.0, 2) == 0.0
-
-
-def test_a_removal_rate_is_worth_less_and_less_the_more_there_is() -> None:
-    """By hand: 12 rpm m in three of four spindles in place of 3, where 4 are little."""
-    chart = charts(np.array([[1.0], [2.0], [3.0], [4.0]]), little=4.0)
-    assert chart.value(np.array([1e-9, 4.0, 12.0])) == pytest.approx([1e-9, 4 * math.log(2), 4 * math.log(4)])
-    assert chart.worth(0, 2e-3, 3.0, 1) == pytest.approx(0.75 * 4 * math.log(16 / 7))
-
-
-def test_what_is_safe_is_worth_more_where_little_was_heard_stable() -> None:
-    """Four of five spindles bear 2 mm, three 4 mm: with nothing so far the safe cut comes first."""
-    limits = np.array([[1.0], [2.0], [4.0], [4.0], [4.0]])
-    assert charts(limits).worth(0, 4e-3, 0.0, 1) > charts(limits).worth(0, 2e-3, 0.0, 1)
-    careful = charts(limits, little=2.0)
-    assert careful.worth(0, 4e-3, 0.0, 1) < careful.worth(0, 2e-3, 0.0, 1)
-    assert careful.worth(0, 4e-3, 11.0, 1) > careful.worth(0, 2e-3, 11.0, 1)
 
 
 def test_before_another_cut_it_is_worth_what_the_next_one_gains_besides() -> None:
@@ -173,7 +157,5 @@ def test_a_chart_is_that_of_zero_order_corrected_and_as_deep_as_is_allowed(mill:
     assert np.all(np.diff(np.take_along_axis(chart.limits, chart.order, axis=0), axis=0) <= 0)
     depths = np.sort([[floor_depth(limit) for limit in row] for row in chart.limits], axis=0)[::-1]
     assert chart.chips == pytest.approx(speeds * depths)
-    best = np.max(speeds * [[floor_depth(limit) for limit in row] for row in chart.limits], axis=1)
-    assert chart.little == pytest.approx(0.2 * np.median(best))
     middle = np.mean([ratios["frequency_x"] * mill.x.frequency, ratios["frequency_y"] * mill.y.frequency])
     assert chart.typical == pytest.approx(middle)

@@ -1,89 +1,90 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
-from .atomic import atomic_write
-from .channel import ACROSS, Block, Channel, SensorInput, TapDirection, tap_direction
+from .channel import CROSS_TAP, Block, Channel, SensorInput, TapDirection, parse_direction
 from .dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits
 from .devices import (
-    Answer,
+    DeviceAnswer,
     DeviceSettings,
     Driver,
-    PortSurvey,
-    SeenPort,
-    SensorPlace,
+    PortScan,
+    ScannedPort,
+    SensorDataLocation,
     check_settings,
-    driver_names,
     find_driver,
+    list_driver_names,
     load_drivers,
-    on_no_serial_port,
     probe_port,
-    survey_ports,
+    scan_ports,
+    skip_serial_probe,
 )
-from .emulation import Bench, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
-from .errors import DataError, DeviceError
+from .emulation import EmulationSetup, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
+from .errors import DataError, DeviceError, Remark, check_name, merge_remarks
 from .estimation import (
     RunningMean,
-    cross_spectra,
+    apply_exponential_window,
+    compute_cross_spectra,
+    correct_windowed_receptance,
     estimate_frf,
-    exponential_window,
-    force_noise,
-    hidden_window,
+    find_hit_time,
     infer_averages,
+    infer_recorded_share,
+    infer_window,
     is_smoothed,
-    recorded_share,
-    time_after_hit,
-    time_of_hit,
-    windowed_receptance,
-    without_mass,
+    measure_time_after_hit,
+    propagate_force_noise,
+    remove_sensor_mass,
 )
-from .event import Event, EventKind
-from .files.contents.contents import Contents, Signal
-from .files.contents.description import Description
-from .files.contents.ledger import Fact
+from .file_io import atomic_write
+from .files.contents.contents import Contents, Format, Signal
+from .files.contents.description import Description, Fact
 from .files.contents.recording import Recording
 from .files.contents.units import STANDARD_GRAVITY
-from .files.convert import Converted, convert
+from .files.convert import Conversion, convert
 from .files.file_source import FileSource
-from .files.formats import known_formats
-from .files.read_recording import look, read_frf, read_hits, read_recording
-from .files.readers.format import Format
+from .files.read_recording import inspect_file, list_formats, read_frf, read_hits, read_recording
 from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
 from .hit import Hit, HitFlags
-from .hits import HitSearch, Trigger, capture_hits, free_decay, ring_down
-from .names import check_name
-from .ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
-from .remark import Remark, joined
+from .hit_quality import HitVerdict, average_good_hits, check_hit, evaluate_hit
+from .hits import HitSearch, Trigger, capture_hits, estimate_decay_time, extract_free_decay
+from .ports import PortInfo, explain_no_ports, find_usb_identity, find_usb_port, list_serial_ports
 from .sensors import (
     MassCalibration,
     MeasuredRate,
     MeasuredSkew,
     calibrate_by_mass,
-    calibration_doubt,
-    channel_doubts,
+    calibration_remark,
+    channel_remarks,
     check_rate,
     measure_rate,
     measure_skew,
-    rate_doubt,
-    stiffness_doubt,
-    unit_mistake,
+    rate_remark,
+    stiffness_remark,
+    unit_mistake_remark,
 )
-from .source import Device, DeviceAddress, DeviceIdentity, Source
-from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, machine_of, named_in_id, new_tap_id
-from .taps import Faults, TapsEmulator, TapsSource
-from .verdicts import HitVerdict, average_good, check_hit, judge_hit
+from .source import Device, DeviceAddress, DeviceIdentity, Event, EventKind, Source
+from .tap_test import (
+    UNKNOWN_CONDITIONS,
+    Circumstances,
+    Conditions,
+    SourceFile,
+    TapTest,
+    new_tap_id,
+    parse_machine_name,
+    sanitize_id_part,
+)
+from .taps import TapsEmulator, TapsFaults, TapsSource
 
 __all__ = [
-    "ACROSS",
+    "CROSS_TAP",
     "STANDARD_GRAVITY",
-    "UNSAID",
-    "Answer",
-    "Bench",
+    "UNKNOWN_CONDITIONS",
     "Block",
     "Channel",
     "Circumstances",
     "Conditions",
     "Contents",
-    "Converted",
+    "Conversion",
     "DataError",
     "DataqEmulator",
     "DataqFaults",
@@ -92,15 +93,16 @@ __all__ = [
     "Description",
     "Device",
     "DeviceAddress",
+    "DeviceAnswer",
     "DeviceError",
     "DeviceIdentity",
     "DeviceSettings",
     "Driver",
+    "EmulationSetup",
     "EmulatorThread",
     "Event",
     "EventKind",
     "Fact",
-    "Faults",
     "FileSource",
     "Format",
     "Frf",
@@ -114,13 +116,13 @@ __all__ = [
     "MeasuredRate",
     "MeasuredSkew",
     "PortInfo",
-    "PortSurvey",
+    "PortScan",
     "Recording",
     "Remark",
     "RunningMean",
-    "SeenPort",
+    "ScannedPort",
+    "SensorDataLocation",
     "SensorInput",
-    "SensorPlace",
     "Signal",
     "SimulatedSource",
     "Source",
@@ -129,62 +131,63 @@ __all__ = [
     "TapDirection",
     "TapTest",
     "TapsEmulator",
+    "TapsFaults",
     "TapsSource",
     "Trigger",
+    "apply_exponential_window",
     "atomic_write",
-    "average_good",
+    "average_good_hits",
     "calibrate_by_mass",
-    "calibration_doubt",
+    "calibration_remark",
     "capture_hits",
-    "channel_doubts",
+    "channel_remarks",
     "check_hit",
     "check_name",
     "check_rate",
     "check_settings",
+    "compute_cross_spectra",
     "convert",
-    "cross_spectra",
-    "driver_names",
+    "correct_windowed_receptance",
+    "estimate_decay_time",
     "estimate_frf",
-    "exponential_window",
+    "evaluate_hit",
+    "explain_no_ports",
+    "extract_free_decay",
     "find_driver",
-    "find_port",
-    "force_noise",
-    "free_decay",
+    "find_hit_time",
+    "find_usb_identity",
+    "find_usb_port",
     "from_accelerance",
-    "hidden_window",
     "infer_averages",
+    "infer_recorded_share",
+    "infer_window",
+    "inspect_file",
     "is_smoothed",
-    "joined",
-    "judge_hit",
-    "known_formats",
-    "list_ports",
+    "list_driver_names",
+    "list_formats",
+    "list_serial_ports",
     "load_drivers",
-    "look",
-    "machine_of",
     "measure_rate",
     "measure_skew",
-    "named_in_id",
+    "measure_time_after_hit",
+    "merge_remarks",
     "new_tap_id",
-    "no_ports_hint",
-    "on_no_serial_port",
+    "parse_direction",
+    "parse_machine_name",
     "probe_port",
-    "rate_doubt",
+    "propagate_force_noise",
+    "rate_remark",
     "read_frf",
     "read_hits",
     "read_recording",
     "read_tap",
     "read_tap_hits",
-    "recorded_share",
-    "ring_down",
-    "stiffness_doubt",
-    "survey_ports",
-    "tap_direction",
-    "time_after_hit",
-    "time_of_hit",
-    "unit_mistake",
-    "usb_identity",
-    "windowed_receptance",
-    "without_mass",
+    "remove_sensor_mass",
+    "sanitize_id_part",
+    "scan_ports",
+    "skip_serial_probe",
+    "stiffness_remark",
+    "unit_mistake_remark",
     "write_hit",
     "write_tap",
 ]

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 ChannelQuantity = Literal["force", "acceleration"]
-FEWEST_BITS = 8
+MIN_ADC_BITS = 8
 """No converter for sensors has fewer."""
 TapDirection = Literal["x", "y", "xy"]
 """Direction at the tool tip in which is tapped: "xy" hits in x with the sensor in y."""
-ACROSS: TapDirection = "xy"
+CROSS_TAP: TapDirection = "xy"
 """Direction of a cross tap: no driving point."""
 
 
-def tap_direction(text: str) -> TapDirection:
+def parse_direction(text: str) -> TapDirection:
     """A direction from its text; ValueError for what is none.
 
-    >>> tap_direction("x"), tap_direction("xy") == ACROSS
+    >>> parse_direction("x"), parse_direction("xy") == CROSS_TAP
     ('x', True)
     """
     directions: tuple[TapDirection, ...] = get_args(TapDirection)
@@ -62,7 +62,7 @@ class Channel:
         """Refuse what cannot be a channel."""
         if self.quantity not in get_args(ChannelQuantity):
             raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
-        if self.direction and tap_direction(self.direction) == ACROSS:
+        if self.direction and parse_direction(self.direction) == CROSS_TAP:
             raise ValueError(f"direction={self.direction!r} is that of a tap across; a sensor has x or y")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
             raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
@@ -86,18 +86,18 @@ class Channel:
         """Lowest and highest ADC code."""
         return -(2 ** (self.adc_bits - 1)), 2 ** (self.adc_bits - 1) - 1
 
-    def step_in(self, codes: NDArray[np.integer[Any]]) -> int:
+    def effective_code_step(self, codes: NDArray[np.integer[Any]]) -> int:
         """Smallest step between codes: a power of 2 above 1 where a converter of fewer bits fills the upper ones only.
 
         Some devices have fewer bits at higher rates; their highest code is then a step below 2^(bits-1).
         """
         used = int(np.bitwise_or.reduce(codes, axis=None))
-        return min(used & -used, 2 ** max(self.adc_bits - FEWEST_BITS, 0)) or 1
+        return min(used & -used, 2 ** max(self.adc_bits - MIN_ADC_BITS, 0)) or 1
 
-    def rails_in(self, codes: NDArray[np.integer[Any]]) -> tuple[int, int]:
+    def effective_rails(self, codes: NDArray[np.integer[Any]]) -> tuple[int, int]:
         """Lowest and highest code that a converter can give whose codes are these."""
         low, high = self.rails
-        return low, high + 1 - self.step_in(codes)
+        return low, high + 1 - self.effective_code_step(codes)
 
     def encode(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
         """ADC codes of values (N or m/s^2), rounded and clipped at the rails as the converter does."""

@@ -8,9 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.hit import LARGEST, flaw
+from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 
-Quantity = Literal["receptance", "mobility", "accelerance"]
+FrfQuantity = Literal["receptance", "mobility", "accelerance"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Frf:
     """Ordinary coherence, 0 to 1, shape (n,); None where it is not known."""
     n_averages: int = 1
     """Number of hits averaged."""
-    measured_as: Quantity = "receptance"
+    measured_as: FrfQuantity = "receptance"
     """The quantity that the sensors gave: it says in which form the noise is flat."""
     usable_band: tuple[float, float] | None = None
     """Contiguous band where the force spectrum is within 20 dB of its largest value (Hz)."""
@@ -59,18 +59,20 @@ class Frf:
             raise ValueError(f"frequency has shape {f.shape}; a 1-D array of at least 2 lines (Hz) is needed")
         if not np.all(np.isfinite(f)) or f[0] < 0 or not np.all(np.diff(f) > 0):
             raise ValueError("frequency must be finite, >= 0 Hz and strictly rising")
-        if self.measured_as not in get_args(Quantity):
-            raise ValueError(f"measured_as={self.measured_as!r} is none of {', '.join(get_args(Quantity))}")
+        if self.measured_as not in get_args(FrfQuantity):
+            raise ValueError(f"measured_as={self.measured_as!r} is none of {', '.join(get_args(FrfQuantity))}")
         if self.n_averages < 1:
             raise ValueError(f"n_averages={self.n_averages} is not at least 1")
 
     def _check_values(self) -> None:
         if self.receptance.shape != self.frequency.shape:
             raise ValueError(f"receptance {self.receptance.shape} and frequency {self.frequency.shape} differ in shape")
-        bad = np.flatnonzero(~(np.abs(self.receptance) <= LARGEST))
+        bad = np.flatnonzero(~(np.abs(self.receptance) <= MAX_SI_VALUE))
         if bad.size:
             first = f"first at {self.frequency[bad[0]]:g} Hz"
-            raise ValueError(f"receptance is {flaw(self.receptance[bad[0]])} at {bad.size} lines, {first}")
+            raise ValueError(
+                f"receptance is {describe_invalid_value(self.receptance[bad[0]])} at {bad.size} lines, {first}"
+            )
         if self.coherence is None:
             return
         if self.coherence.shape != self.frequency.shape:

@@ -1,17 +1,19 @@
-"""One hammer hit: what was recorded and what is wrong with it."""
+"""One hammer hit, its faults, and the input channels it is recorded with."""
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.channel import Channel
+from acquisition.channel import Channel, ChannelQuantity
+from acquisition.errors import DataError
 
-LARGEST = 1e50
+MAX_SI_VALUE = 1e50
 """Largest size of a value in SI units: no measurement is larger, and powers of larger ones may be infinite."""
 
 
@@ -51,23 +53,23 @@ class HitFlags(enum.Flag):
     """The FRF of this hit is not that of the good ones."""
     UNDONE = enum.auto()
     """The operator has taken it back."""
-    NOT_JUDGED = enum.auto()
+    NOT_EVALUATED = enum.auto()
     """It could not be judged."""
 
     @property
     def words(self) -> str:
         """The verdict alone, e.g. "double hit, overload (force)"."""
-        return ", ".join(_WORDS[flag][0] for flag in self) or "good"
+        return ", ".join(_FLAG_TEXTS[flag][0] for flag in self) or "good"
 
     @property
     def cure(self) -> str:
         """What to do about it, a sentence a fault; empty when all is well."""
-        return " ".join(_WORDS[flag][1] for flag in self)
+        return " ".join(_FLAG_TEXTS[flag][1] for flag in self)
 
     @classmethod
     def from_words(cls, words: str) -> HitFlags:
         """The flags whose `words` these are; ValueError for unknown ones."""
-        by_words = {verdict: flag for flag, (verdict, _) in _WORDS.items()}
+        by_words = {verdict: flag for flag, (verdict, _) in _FLAG_TEXTS.items()}
         flags = cls.OK
         for word in filter(None, words.removeprefix("good").split(", ")):
             if word not in by_words:
@@ -77,10 +79,10 @@ class HitFlags(enum.Flag):
 
     def __str__(self) -> str:
         """Verdict and cure in words."""
-        return " ".join(f"{word}: {cure}" for word, cure in (_WORDS[flag] for flag in self)) or "good"
+        return " ".join(f"{word}: {cure}" for word, cure in (_FLAG_TEXTS[flag] for flag in self)) or "good"
 
 
-_WORDS: Mapping[HitFlags, tuple[str, str]] = {
+_FLAG_TEXTS: Mapping[HitFlags, tuple[str, str]] = {
     HitFlags.DOUBLE_HIT: ("double hit", "Let the hammer bounce back after the first touch."),
     HitFlags.OVERLOAD_FORCE: ("overload (force)", "Hit softer or choose a larger force range."),
     HitFlags.OVERLOAD_RESPONSE: ("overload (response)", "Hit softer or choose a larger acceleration range."),
@@ -99,13 +101,13 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
     HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
     HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
     HitFlags.UNDONE: ("undone", "Taken back by the operator."),
-    HitFlags.NOT_JUDGED: ("not judged", "Hit again; if it stays, check both sensors and their cables."),
+    HitFlags.NOT_EVALUATED: ("not judged", "Hit again; if it stays, check both sensors and their cables."),
 }
 
 
-def flaw(value: complex) -> str:
+def describe_invalid_value(value: complex) -> str:
     """What is wrong with a value that is not within LARGEST."""
-    return f"larger than {LARGEST:g}" if np.isfinite(value) else "not finite"
+    return f"larger than {MAX_SI_VALUE:g}" if np.isfinite(value) else "not finite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +140,7 @@ class Hit:
     """Raw ADC codes, a row a channel, force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
-    beside: Hit | None = None
+    cross_hit: Hit | None = None
     """The same blow as a second sensor felt it, across to the first; None where there is none."""
 
     def __post_init__(self) -> None:
@@ -146,9 +148,11 @@ class Hit:
         for name in ("force", "acceleration"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, values)
-            bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+            bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
             if bad.size:
-                raise ValueError(f"{name} is {flaw(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}")
+                raise ValueError(
+                    f"{name} is {describe_invalid_value(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}"
+                )
         same = self.force.shape in (self.acceleration.shape, (0,))
         if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
             raise ValueError(
@@ -184,7 +188,7 @@ class Hit:
     def sensors(self) -> tuple[Channel, ...]:
         """Channels of all that felt the blow, that of the response last; empty where it came from no DAQ."""
         channels = self.channels or ()
-        return channels if self.beside is None else (*channels[:1], *self.beside.sensors[-1:], *channels[-1:])
+        return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
     @property
     def signals(self) -> NDArray[np.float64]:
@@ -195,3 +199,70 @@ class Hit:
     def time(self) -> NDArray[np.float64]:
         """Time from the trigger (s), shape (n,)."""
         return (np.arange(self.acceleration.size) - self.pre_trigger) / self.sample_rate
+
+
+@dataclass(frozen=True)
+class TapInputs:
+    """Inputs of a device that a tap test reads: the force first, the response of the driving point last."""
+
+    rows: tuple[int, ...]
+    """Index of each among the channels of the device."""
+    channels: tuple[Channel, ...]
+    """Sensor on each."""
+
+    @classmethod
+    def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
+        """Those of a tap in a direction, as `select_input_channels` has it; DataError where they are not there.
+
+        A hammer in x is felt by a second sensor along y too, where there is one: it stands before the last.
+        """
+        first, *last = select_input_channels(channels, quantity, direction)
+        along_y = (i for i, channel in enumerate(channels) if (channel.quantity, channel.direction) == _Y_RESPONSE)
+        across = [i for i in along_y if direction == "x" and last and i not in last]
+        rows = (first, *across[:1], *last)
+        return cls(rows, tuple(channels[row] for row in rows))
+
+    def make_hit(
+        self,
+        codes: NDArray[np.integer[Any]],
+        sample_rate: float,
+        pre_trigger: int = 0,
+        lost_scans: int = 0,
+        overload: int = 0,
+    ) -> Hit:
+        """The hit that codes are, a row each; bit i of overload is that of row i."""
+
+        def felt_by(response: int, beside: Hit | None = None) -> Hit:
+            rows = [0, response] if len(self.rows) > 1 else [response]
+            mask = (overload >> response & 1) << 1 | (overload & 1 if len(rows) > 1 else 0)
+            sensors = tuple(self.channels[row] for row in rows)
+            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, beside)
+
+        last = len(self.rows) - 1
+        return felt_by(last, felt_by(1) if last > 1 else None)
+
+
+_Y_RESPONSE = ("acceleration", "y")
+
+
+def select_input_channels(
+    channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
+) -> tuple[int, ...]:
+    """Index of the force and of the acceleration channel; of the latter alone where that triggers.
+
+    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction
+    (of a tap across, "xy", that of y). DataError unless there is one of each that is needed.
+    """
+    forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
+    responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
+    several, seen = len(responses) > 1, direction[-1:] or "x"
+    if several:
+        responses = [i for i in responses if direction and channels[i].direction == seen]
+    if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
+        return (*forces, *responses) if quantity == "force" else (*responses,)
+    listed = ", ".join(channel.name for channel in channels) or "nothing"
+    needed = "one force and one acceleration channel are needed"
+    if quantity == "acceleration":
+        needed = "one acceleration channel is needed to tap without a force sensor"
+    which = f', of several that with direction = "{seen}"' if several else ""
+    raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")

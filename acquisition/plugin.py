@@ -6,10 +6,10 @@ from importlib.metadata import EntryPoint
 from traceback import format_exception_only
 from typing import Protocol, TypeVar
 
-from acquisition.remark import Remark
+from acquisition.errors import Remark
 
 
-class Named(Protocol):
+class NamedRecord(Protocol):
     """What a package may bring."""
 
     @property
@@ -18,36 +18,38 @@ class Named(Protocol):
         ...
 
 
-Plugin = TypeVar("Plugin", bound=Named)
-FAILURES = (Exception, SystemExit)
+Plugin = TypeVar("Plugin", bound=NamedRecord)
+PLUGIN_ERRORS = (Exception, SystemExit)
 """All that a foreign package may raise while ours go on; Ctrl-C ends ours."""
 
 
 def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
     """The record that an entry point names; a remark with the package where it cannot be used. Nothing else fails."""
-    package = package_of(point)
+    package = get_package_name(point)
     try:
         loaded = point.load()
-    except FAILURES as error:
-        return not_usable(kind, point.name, f"the package {package} cannot be loaded ({words_of(error)})")
+    except PLUGIN_ERRORS as error:
+        return make_unusable_remark(
+            kind, point.name, f"the package {package} cannot be loaded ({format_exception_line(error)})"
+        )
     if not isinstance(loaded, kind):
         text = f"{point.value} of the package {package} is no acquisition.{kind.__name__}"
-        return not_usable(kind, point.name, text)
+        return make_unusable_remark(kind, point.name, text)
     if loaded.name != point.name:
-        return not_usable(kind, point.name, f"the package {package} calls it {loaded.name!r} elsewhere")
+        return make_unusable_remark(kind, point.name, f"the package {package} calls it {loaded.name!r} elsewhere")
     return loaded
 
 
-def not_usable(kind: type, name: str, text: str, cure: str = "update or remove that package") -> Remark:
+def make_unusable_remark(kind: type, name: str, text: str, cure: str = "update or remove that package") -> Remark:
     """The remark on one that cannot be used."""
     return Remark("package-not-loaded", f"{kind.__name__.lower()} {name!r}", text, cure)
 
 
-def words_of(error: BaseException) -> str:
+def format_exception_line(error: BaseException) -> str:
     """Kind and text of an error of a foreign package on one line, whatever its text is or does."""
     return " ".join("".join(format_exception_only(error)).split())
 
 
-def package_of(point: EntryPoint) -> str:
+def get_package_name(point: EntryPoint) -> str:
     """Name of the package that an entry point belongs to."""
     return point.dist.name if point.dist else point.module

@@ -34,9 +34,9 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, check_hit, estimate_frf
 from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_data, encode_frame
-from acquisition.taps.stream import ScanStream
+from acquisition.taps.source import ScanStream
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import ScreenServer
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession

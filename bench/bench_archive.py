@@ -27,7 +27,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Channel, Circumstances, Hit, HitFlags, TapTest, estimate_frf
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 
 HITS, SCANS, RATE = 10, 65_536, 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
@@ -54,7 +54,7 @@ def plain(path: Path, tap: TapTest, **packed: object) -> None:
     codes = np.stack([hit.codes for hit in tap.hits if hit.codes is not None]).astype(np.int16)
     with h5py.File(path, "w") as file:
         file.create_dataset("codes", data=codes, chunks=(1, 2, codes.shape[2]), **packed)
-        file["receptance"] = tap.known_frf.receptance
+        file["receptance"] = tap.required_frf.receptance
 
 
 def races() -> Iterator[Race]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import Cut, PitchPattern, shown_modes, spectral_radius, stability_boundary, with_pattern
+from lobes import Cut, PitchPattern, project_modes, spectral_radius, stability_boundary, with_pitch_pattern
 from modal import Mode
 
 X, Y = [Mode(1500.0, 0.03, 20e6)], [Mode(1575.0, 0.028, 22e6)]
@@ -49,7 +49,10 @@ def ratios() -> Iterator[tuple[str, Floats]]:
     yield "feed between the axes, a/D 0.5 to 1", np.array(list(feed_ratios(np.random.default_rng(2))))
     for angles, cut in (((85, 95), SLOT), ((85, 95), quarter), ((80, 100), SLOT)):
         pattern = PitchPattern((*angles, *angles), "alternating")
-        yield f"pitch {angles} not written, a/D {cut.immersion:g}", limits(with_pattern(cut, pattern)) / limits(cut)
+        yield (
+            f"pitch {angles} not written, a/D {cut.immersion:g}",
+            limits(with_pitch_pattern(cut, pattern)) / limits(cut),
+        )
     wall = Mode(600.0, 0.02, 5e6)
     yield "thin wall of 600 Hz, 5 N/um, 2 % in y, slot", limits(SLOT, y=[*Y, wall]) / slot
     rounded = replace(SLOT, radial=SLOT.radial * math.sin(math.radians(45)))
@@ -65,7 +68,7 @@ def askew_ratios(rng: np.random.Generator) -> Iterator[float]:
         angle = math.radians(rng.uniform(5, 85))
         c, s = math.cos(angle), math.sin(angle)
         vectors, pair = np.array([[c, s], [-s, c]]), [*first, *second]
-        shown = shown_modes(pair, vectors)
+        shown = project_modes(pair, vectors)
         true = stability_boundary(pair, None, cut, speed, DEEPEST, vectors).depth[0]
         yield true / limits(cut, shown.x, shown.y, speed)[0]
 

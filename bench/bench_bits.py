@@ -1,6 +1,6 @@
 """What the converter of a board costs in accuracy: whole tap tests of one spindle at 24, 16 and 12 bits.
 
-`python bench/bench_bits.py [TESTS]`: so many for each converter (20), ten good hits each, through the emulated TAPS/1
+`python bench/bench_bits.py [EMULATED_TESTS]`: so many for each converter (20), ten good hits each, through the emulated TAPS/1
 device. Errors of f, zeta and K against the emulated truth, and by how much they differ from those of 24 bits with the
 same hits.
 """
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from acquisition import HammeredStructure, Hammering, Structure, TapsEmulator
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, build_structure
 from lobewatch.tap.session import plan_session
 
 PICO_BITS = 8.7
@@ -55,7 +55,7 @@ class Noisy:
         self._signal, self._random = signal, np.random.default_rng([seed, 7])
         bits = converter.effective
         volts = np.array(converter.full_scale) * 2 ** (1 - bits) / np.sqrt(12) if bits else np.zeros(2)
-        self._rms = (volts / [channel.sensitivity for channel in CHANNELS])[:, np.newaxis]
+        self._rms = (volts / [channel.sensitivity for channel in EMULATED_CHANNELS])[:, np.newaxis]
 
     def __call__(self, first: int, count: int) -> NDArray[np.float64]:
         signal = self._signal(first, count)
@@ -66,11 +66,16 @@ def tapped(structure: Structure, converter: Converter, seed: int) -> NDArray[np.
     """f (Hz), zeta and K (N/m) of the mode followed and their standard errors, shape (2, 3)."""
     channels = tuple(
         replace(channel, adc_bits=converter.bits, full_scale=volts)
-        for channel, volts in zip(CHANNELS, converter.full_scale, strict=True)
+        for channel, volts in zip(EMULATED_CHANNELS, converter.full_scale, strict=True)
     )
     how = Hammering(double_hits=0.0, overloads=0.0)
-    signal = Noisy(HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(seed), how), converter, seed)
-    with tempfile.TemporaryDirectory() as path, TapsEmulator(signal, channels, SAMPLE_RATE, realtime=False) as device:
+    signal = Noisy(
+        HammeredStructure(structure, EMULATED_SAMPLE_RATE, np.random.default_rng(seed), how), converter, seed
+    )
+    with (
+        tempfile.TemporaryDirectory() as path,
+        TapsEmulator(signal, channels, EMULATED_SAMPLE_RATE, realtime=False) as device,
+    ):
         make_machine_folder(Path(path) / "m", "surrogate_machine.toml")
         session = plan_session(MachineFolder(Path(path) / "m"), port=device.port)
         session.run()
@@ -86,7 +91,7 @@ def main(tests: int) -> None:
         make_machine_folder(Path(path) / "m", "surrogate_machine.toml")
         spindle = MachineFolder(Path(path) / "m").machine.spindle
     assert spindle is not None
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
     truth = np.array([structure.frequency[0], structure.damping_ratio[0], structure.stiffness[0]])
     results = {
         converter.name: np.array([tapped(structure, converter, seed) for seed in range(tests)])

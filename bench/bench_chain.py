@@ -23,10 +23,10 @@ from bench_replay import hammered_hits
 from dsm_peers import FiniteElements
 from race import Race
 
-from acquisition import Circumstances, Frf, Hit, TapDirection, TapTest, average_good, judge_hit, new_tap_id
+from acquisition import Circumstances, Frf, Hit, TapDirection, TapTest, average_good_hits, evaluate_hit, new_tap_id
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from modal import Mode
 
 MODES = [Mode(1000.0, 0.02, 2e7), Mode(1713.0, 0.03, 3.5e7), Mode(2900.0, 0.025, 9e7)]
@@ -52,8 +52,8 @@ def races() -> Iterator[Race]:
 
 def _ours(logbook: Logbook, hits: tuple[Hit, ...], direction: TapDirection) -> object:
     for hit in hits:
-        judge_hit(hit)
-    average, flags = average_good(hits)
+        evaluate_hit(hit)
+    average, flags = average_good_hits(hits)
     about = Circumstances("m", datetime.now(UTC), "reference", direction)
     tap = TapTest(new_tap_id(about), about, average, hits, flags)
     logbook.commit(tap)

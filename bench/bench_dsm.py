@@ -44,7 +44,7 @@ from dsm import (
     spindle_side,
     whirl_map,
 )
-from lobewatch.machine.settings.machine_file import read_machine
+from lobewatch.machine.settings.machine_file import read_machine_file
 
 MACHINE = Path(__file__).parent.parent / "sim_data" / "surrogate_machine.toml"
 MEASURED = 1722.0
@@ -93,7 +93,7 @@ class Table:
 
 def spindle(theory: Theory) -> Spindle:
     """The surrogate spindle."""
-    drawn = read_machine(MACHINE).spindle
+    drawn = read_machine_file(MACHINE).spindle
     if drawn is None:
         raise SystemExit(f"{MACHINE}: no [spindle]")
     built = drawn.build()
@@ -207,7 +207,7 @@ def bench_receptance(bench: Bench, given: Spindle, ross: RossRotor | None) -> No
 def bench_tools(bench: Bench, given: Spindle) -> None:
     """Tip receptance with another tool."""
     f = np.linspace(100.0, 4000.0, bench.frequencies)
-    machine = read_machine(MACHINE)
+    machine = read_machine_file(MACHINE)
     tool, cut = machine.tool[0].build(given), sum(segment.length for segment in given.segments[:4])
     table = Table(f"Tip receptance with another tool at {f.size} frequencies, {given.theory}")
     side, whole = spindle_side(given, f, cut, LOSS_FACTOR), change_tool(given, cut, tool)

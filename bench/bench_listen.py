@@ -16,8 +16,8 @@ from race import Race
 from scipy.signal import welch
 from threadpoolctl import threadpool_limits
 
-from acquisition.emulation import MillingCut, Passage, Structure, hear, random_housing, simulate_cuts
-from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
+from acquisition.emulation import MillingCut, Passage, Structure, make_random_housing, sample_housing, simulate_cuts
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording, evaluate_recording
 
 Floats = NDArray[np.float64]
 RATE, SECONDS, ROUNDS = 25600.0, 10.0, 5
@@ -48,9 +48,9 @@ def sounds(passage: Passage) -> list[Floats]:
     """Three axes of a housing in a passage through each of `DEPTHS`."""
     cuts = [MillingCut(TEETH, 0.0, np.pi / 2, 6e8, 2e8, depth, 1e-4, SPEED, X, Y) for depth in DEPTHS.values()]
     random, heard = np.random.default_rng(0), dict[int, Floats]()
-    housings = [random_housing(random, SPEED) for _ in range(3)]
+    housings = [make_random_housing(random, SPEED) for _ in range(3)]
     for place, motion in simulate_cuts(cuts, passage):
-        heard[place] = np.stack([hear(motion, housing, SPEED, RATE, random) for housing in housings])
+        heard[place] = np.stack([sample_housing(motion, housing, SPEED, RATE, random) for housing in housings])
     return [heard[place] for place in sorted(heard)]
 
 
@@ -69,7 +69,7 @@ def races() -> Iterator[Race]:
         if name in ("one cut, chatter, three axes", "seven cuts"):
             yield Race(
                 f"{SECONDS:g} s at {RATE / 1e3:g} kHz told: {name}",
-                partial(listen_to, CutRecording(axes, RATE, TEETH, 0.5, speed)),
+                partial(evaluate_recording, CutRecording(axes, RATE, TEETH, 0.5, speed)),
                 "Welch's spectrum by scipy, which tells nothing",
                 partial(welch, axes, RATE, nperseg=SAMPLES),
             )
@@ -80,9 +80,9 @@ def main() -> None:
     print("| recording | cuts told | CPU (s) | Welch's spectrum (s) | ratio |\n" + "|---" * 5 + "|")
     for name, axes, speed in recordings():
         recording = CutRecording(axes, RATE, TEETH, 0.5, speed)
-        told = [sound.word for sound in listen_to(recording)]
+        told = [sound.verdict for sound in evaluate_recording(recording)]
         words = ", ".join(f"{told.count(word)} {word}" for word in dict.fromkeys(told))
-        ours, peer = seconds(lambda: listen_to(recording)), seconds(lambda: welch(axes, RATE, nperseg=SAMPLES))  # noqa: B023
+        ours, peer = seconds(lambda: evaluate_recording(recording)), seconds(lambda: welch(axes, RATE, nperseg=SAMPLES))  # noqa: B023
         print(f"| {name} | {words} | {ours:.3f} | {peer:.3f} | {ours / peer:.0f} |", flush=True)
 
 

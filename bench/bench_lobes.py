@@ -29,9 +29,9 @@ from scipy.linalg import expm
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
-from lobes import Cut, spectral_radius, stability_boundary, zero_order
-from lobes.floquet import largest_multipliers, piece_numbers, rows_of
-from lobes.milling_system import milling_system
+from lobes import Cut, spectral_radius, stability_boundary, zero_order_lobes
+from lobes.floquet import count_pieces, largest_multipliers, rows_at_speeds
+from lobes.milling_system import build_milling_system
 from lobes.tooth_force import interval_forces
 from modal import Mode
 
@@ -64,7 +64,7 @@ Modes = Sequence[Mode] | None
 
 def textbook(x: Modes, y: Modes, speeds: Floats, depths: Floats, exponentials: int = 3) -> Floats:
     """As the listings of Insperger & Stepan: dense products, all eigenvalues, expm wherever it is written or once."""
-    system = milling_system(x, y)
+    system = build_milling_system(x, y)
     n, p = system.frequency.size, system.axes.size
     shape = (system.shape[:, np.newaxis] * system.vector).T
     forces = interval_forces(CUT, M)[0][:, system.axes[:, np.newaxis], system.axes]
@@ -174,9 +174,9 @@ def _largest(matrices: Floats) -> tuple[Floats, Floats]:
 
 
 def finest(x: Modes, y: Modes, speeds: Floats, depths: Floats) -> Floats:
-    rows = rows_of(milling_system(x, y), CUT, speeds)
+    rows = rows_at_speeds(build_milling_system(x, y), CUT, speeds)
     grid = np.broadcast_to(depths, (speeds.size, depths.size))
-    return np.abs(largest_multipliers(rows, grid, 8 * piece_numbers(rows, float(np.max(depths)))))
+    return np.abs(largest_multipliers(rows, grid, 8 * count_pieces(rows, float(np.max(depths)))))
 
 
 class Chart(NamedTuple):
@@ -253,7 +253,7 @@ def mean_force() -> None:
     modes = [[Mode(frequency, 0.037, 5.6e6)] for frequency in (603.0, 666.0)]
     tips = [Frf(lines, mode.receptance(lines)) for (mode,) in modes]
     for name, (x, y) in (("FRFs of 2000 lines", tips), ("modes", modes)):
-        best = min(cpu_time(zero_order, x, y, cut, speeds) for _ in range(20 * ROUNDS))
+        best = min(cpu_time(zero_order_lobes, x, y, cut, speeds) for _ in range(20 * ROUNDS))
         print(f"zero_order, {name} in x and y, 20 lobes, {speeds.size} speeds: {best * 1e3:.1f} ms")
 
 

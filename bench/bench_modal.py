@@ -31,7 +31,7 @@ from signalcalc import measured_frfs
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf, estimate_frf, from_accelerance, read_hits
-from modal import Mode, fit_modes, fit_points, synthesize
+from modal import Mode, fit_common_modes, fit_modes, synthesize_frf
 
 TRUE = [
     Mode(420.0, 0.020, 6.0e7),
@@ -56,7 +56,7 @@ def measured(seed: int) -> Frf:
 
 
 def noisy(modes: Sequence[Mode], seed: int) -> Frf:
-    exact = synthesize(modes, LINES).accelerance
+    exact = synthesize_frf(modes, LINES).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2)
     return from_accelerance(LINES, exact + NOISE * np.max(np.abs(exact)) * (noise[0] + 1j * noise[1]))
 
@@ -99,7 +99,7 @@ def time_measured(folder: Path) -> None:
             theirs([frf], [mode.frequency for mode in modes])
             other.append(time.process_time() - start)
     start = time.process_time()
-    fit_points(frfs[:POINTS])
+    fit_common_modes(frfs[:POINTS])
     together = time.process_time() - start
     print(f"{len(frfs)} measured FRFs of {frfs[0].frequency.size} lines: CPU time (s), median and largest")
     print(f"{'lobewatch fit_modes':32}{np.median(mine):10.3f}{max(mine):10.3f}")
@@ -133,7 +133,7 @@ def races() -> Iterator[Race]:
         lambda: theirs([beam], seen),
     )
     yield Race(
-        f"{POINTS} FRFs with common poles, {size}", lambda: fit_points(points), peer, lambda: theirs(points, true)
+        f"{POINTS} FRFs with common poles, {size}", lambda: fit_common_modes(points), peer, lambda: theirs(points, true)
     )
 
 

@@ -29,17 +29,17 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id, write_tap
+from lobewatch.fleet import summarize_folder
 from lobewatch.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.journal.tap_entry import TapEntry
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.measuring import Estimate
-from lobewatch.plant import summarise_folder
-from lobewatch.screen.board import LOOK_EVERY, Board
-from lobewatch.tool.order import Place
-from modal import Mode, synthesize
+from lobewatch.measurement import Estimate
+from lobewatch.screen.machine_table import MACHINE_POLL_INTERVAL, MachineTable
+from lobewatch.tool.tap_series import TapPlace
+from modal import Mode, synthesize_frf
 
 LINES = np.arange(8.0, 4000.0, 8.0)
 PLANT = 500
@@ -50,7 +50,7 @@ def make_plant(path: Path, machines: int, taps: int) -> None:
     """Machines of so many tap tests each, x and y in turn, the newest of today; their histories as if worked out."""
     first = path / "mill-000"
     make_machine(first, taps)
-    summarise_folder(first, datetime.now(UTC))  # so that its history has the word on each program
+    summarize_folder(first, datetime.now(UTC))  # so that its history has the word on each program
     history = Logbook.open(first).history
     for number in range(machines):
         folder = path / f"mill-{number:03d}"
@@ -61,7 +61,7 @@ def make_plant(path: Path, machines: int, taps: int) -> None:
         HistoryCache(MachineFolder(folder)).store(_scattered(history, Logbook.open(folder).files.places, number))
 
 
-def _scattered(history: History, places: Sequence[Place], seed: int) -> History:
+def _scattered(history: History, places: Sequence[TapPlace], seed: int) -> History:
     """Rows like those of the first two tap tests, with 0.3 % of scatter and a fall of its own."""
     random, rows = np.random.default_rng(seed), history.rows
     falls = np.linspace(0.0, random.uniform(0.0, 3.0), len(places))
@@ -70,9 +70,9 @@ def _scattered(history: History, places: Sequence[Place], seed: int) -> History:
     for place, share in zip(places, shares, strict=True):
         row, time = rows[place.number % 2], datetime.fromisoformat(place.entry.time)
         frequency = Estimate(row.frequency.value * share, 0.2)
-        rulings = rows[-1].rulings if place is places[-1] else None
+        rulings = rows[-1].verdicts if place is places[-1] else None
         found.append(
-            replace(row, tap_id=place.entry.id, time=time, series=place.series, frequency=frequency, rulings=rulings)
+            replace(row, tap_id=place.entry.id, time=time, series=place.series, frequency=frequency, verdicts=rulings)
         )
     return replace(history, rows=tuple(found))
 
@@ -90,7 +90,7 @@ def make_machine(path: Path, taps: int) -> None:
     folder, text = MachineFolder(path), (path / "machine.toml").read_text("utf-8")
     (path / "taps").mkdir()
     modes = [Mode(1713.0, 0.029, 3.5e7), Mode(2900.0, 0.02, 9e7), Mode(3400.0, 0.02, 1.2e8)]
-    frf, entries = from_accelerance(LINES, synthesize(modes, LINES).accelerance), {}
+    frf, entries = from_accelerance(LINES, synthesize_frf(modes, LINES).accelerance), {}
     for number in range(taps):
         when = datetime.now(UTC) - timedelta(days=0.1 + 5.0 * (taps - 1 - number))
         about = Circumstances("mill", when, "reference", "y" if number % 2 else "x", "", text)
@@ -128,16 +128,16 @@ def exported(table: Path, path: Path) -> float:
 
 def served(path: Path) -> None:
     """What the pages of lobewatch serve cost: the first, one where nothing has changed, one where one machine has."""
-    board = Board(path)
+    board = MachineTable(path)
     known = ""
     for name in ("first page", "nothing changed", "a machine changed"):
         if name == "a machine changed":
             toml = path / "mill-000" / "machine.toml"
             toml.write_text(toml.read_text("utf-8").replace('name = "', 'name = "New ', 1), "utf-8")
-            board.standings()  # its standing made anew is no part of the look
-        time.sleep(LOOK_EVERY)
+            board.assess_machines()  # its standing made anew is no part of the look
+        time.sleep(MACHINE_POLL_INTERVAL)
         begun = time.process_time()
-        answer = board.answer(known, set())
+        answer = board.updates_since(known, set())
         sent = msgspec.json.encode(answer)
         print(f"  serve, {name:22s} {time.process_time() - begun:6.2f} s, {len(sent) / 1e3:.1f} kB")
         known = answer["version"]

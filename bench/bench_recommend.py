@@ -12,14 +12,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.recommendation import recommend
-from lobewatch.verdicts.spindle_at_speed import AT_REST
-from lobewatch.verdicts.verdict import judge
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 
-MACHINE: Machine = parse_machine('[machine]\nname = "bench"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
+MACHINE: Machine = parse_machine_file('[machine]\nname = "bench"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
 DIAMETER = 20.0
 """Of the tool (mm)."""
 
@@ -51,9 +51,9 @@ def seconds(modes: int, immersion: float, teeth: int, either: bool) -> tuple[flo
     """CPU time (s) of a recommendation, and of the verdict on one program."""
     table, tool = cut(immersion, teeth), assembly(modes)
     begin = time.process_time()
-    answer = recommend(table, tool, MACHINE, AT_REST, either)
+    answer = recommend(table, tool, MACHINE, NO_TEST_CUTS, either)
     end = time.process_time()
-    judge(answer.program, tool, MACHINE)
+    evaluate_program(answer.program, tool, MACHINE)
     return end - begin, time.process_time() - end
 
 

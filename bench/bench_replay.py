@@ -43,20 +43,20 @@ from acquisition import (
     TapDirection,
     TapTest,
     Trigger,
-    average_good,
+    average_good_hits,
     capture_hits,
     new_tap_id,
     read_tap,
     write_tap,
 )
 from lobewatch import Logbook
+from lobewatch.fleet.fleet import Fleet
 from lobewatch.machine import TapEntry
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring.measurement import fit_tap
-from lobewatch.plant.plant import Plant
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.measurement.tap_measurement import fit_tap
+from modal import Mode, synthesize_frf
 
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
 SHORT = np.linspace(1202.0, 2198.0, 250)
@@ -75,7 +75,7 @@ def frf(number: int, of: int, lines: NDArray[np.float64]) -> Frf:
     """A mode that falls by 4 % over all of them, with noise of 0.1 % of the peak."""
     random = np.random.default_rng(number)
     frequency = 1713.0 * (1 - 0.04 * number / of) * (1 + 1e-3 * random.standard_normal())
-    clean = synthesize([Mode(900.0, 0.03, 8e7), Mode(frequency, 0.03, 3.5e7), Mode(3000.0, 0.02, 1e8)], lines)
+    clean = synthesize_frf([Mode(900.0, 0.03, 8e7), Mode(frequency, 0.03, 3.5e7), Mode(3000.0, 0.02, 1e8)], lines)
     noise = random.standard_normal((2, lines.size)) * 1e-3 * np.max(np.abs(clean.receptance))
     return Frf(lines, clean.receptance + noise[0] + 1j * noise[1], np.full(lines.size, 0.999), 10, "accelerance")
 
@@ -193,10 +193,10 @@ def opened(path: Path) -> None:
     """Works on a copy where something is added."""
     _ = Logbook(MachineFolder(path)).history  # brought up to date
     told("opening without new tap tests", lambda: Logbook(MachineFolder(path)).history)
-    told("opening and standing", lambda: Logbook(MachineFolder(path)).standing())
-    plant = Plant({"m": path})
-    told("dashboard, first look", plant.standings)
-    told("dashboard, nothing has changed", plant.standings)
+    told("opening and standing", lambda: Logbook(MachineFolder(path)).status())
+    plant = Fleet({"m": path})
+    told("dashboard, first look", plant.assess_machines)
+    told("dashboard, nothing has changed", plant.assess_machines)
     with tempfile.TemporaryDirectory(dir=path.parent) as work:
         few = newest_of(path, Path(work) / "few")
         for command in ("check", "lobes", "history"):
@@ -213,15 +213,15 @@ def added_to(path: Path) -> None:
     """Tap tests committed one after the other, without words on programs."""
     toml = path / "machine.toml"
     toml.write_text(toml.read_text("utf-8").split("[[program]]")[0], "utf-8")
-    logbook, plant = Logbook(MachineFolder(path)), Plant({"m": path})
-    _ = logbook.history, plant.standings()
-    size, count = logbook.folder.history.stat().st_size, len(logbook.taps)
+    logbook, plant = Logbook(MachineFolder(path)), Fleet({"m": path})
+    _ = logbook.history, plant.assess_machines()
+    size, count = logbook.folder.history_path.stat().st_size, len(logbook.taps)
     for number in range(count, count + ADDED):
         tap = small_tap(10_000 + number, 10_000, "")
         told(f"a commit into {number}, journal and tap file", partial(logbook.commit, tap))
         told("its row", lambda: logbook.history)
-        told("dashboard after it in a running server", plant.standings)
-    print(f"bytes added to history.rows: {(logbook.folder.history.stat().st_size - size) / ADDED:.0f}")
+        told("dashboard after it in a running server", plant.assess_machines)
+    print(f"bytes added to history.rows: {(logbook.folder.history_path.stat().st_size - size) / ADDED:.0f}")
 
 
 def newest_of(path: Path, to: Path) -> Path:
@@ -278,9 +278,12 @@ def hammered_hits() -> tuple[Hit, ...]:
 
 def ten_hits() -> None:
     hits = hammered_hits()
-    average, flags = average_good(hits)
+    average, flags = average_good_hits(hits)
     about = Circumstances("m", BEGIN, "reference")
-    tap, machine = TapTest(new_tap_id(about), about, average, hits, flags), parse_machine('[machine]\nname = "m"\n')
+    tap, machine = (
+        TapTest(new_tap_id(about), about, average, hits, flags),
+        parse_machine_file('[machine]\nname = "m"\n'),
+    )
     with tempfile.TemporaryDirectory() as work:
         path = Path(work) / "tap.h5"
         print(f"{len(hits)} hits of 2 x 16384: {len(write_tap(path, tap)) / 1e3:.0f} kB")

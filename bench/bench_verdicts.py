@@ -3,7 +3,7 @@
     python -m pip install -e .[bench]      (in an environment of its own)
     python bench/bench_verdicts.py
 
-Ours: `judge_hit` with the mean of the session. Theirs: `FRF.is_data_ok` with its own limits. Second table: share of
+Ours: `evaluate_hit` with the mean of the session. Theirs: `FRF.is_data_ok` with its own limits. Second table: share of
 double hits refused, by size, distance and noise; and the error in K where one of ten hits is such a hit and is
 averaged, against the same ten hits without the second touch.
 """
@@ -29,7 +29,7 @@ from labelled_hits import (
 from pyFRF import FRF
 from threadpoolctl import threadpool_limits
 
-from acquisition import Hit, HitFlags, estimate_frf, judge_hit
+from acquisition import Hit, HitFlags, estimate_frf, evaluate_hit
 from modal import fit_modes
 
 SESSIONS = 100
@@ -52,7 +52,7 @@ def compare(setting: Setting, seed: int) -> None:
     count, refused, named, overflow = (Counter[str]() for _ in range(4))
     double: dict[str, list[int]] = {kind: [] for kind in KINDS}
     for one in labelled_hits(setting, SESSIONS, seed):
-        flags = judge_hit(one.hit, one.mean).flags
+        flags = evaluate_hit(one.hit, one.mean).flags
         force, response = one.hit.force, one.hit.acceleration
         count[one.kind] += 1
         refused[one.kind] += bool(flags)
@@ -85,7 +85,9 @@ def touched(one: Session, share: float, gap: float) -> Hit:
 
 def detection(share: float, gap: float, noise: float, hits: int = 100) -> float:
     one = room(noise, np.random.default_rng(1))
-    return float(np.mean([bool(judge_hit(touched(one, share, gap)).flags & HitFlags.DOUBLE_HIT) for _ in range(hits)]))
+    return float(
+        np.mean([bool(evaluate_hit(touched(one, share, gap)).flags & HitFlags.DOUBLE_HIT) for _ in range(hits)])
+    )
 
 
 def stiffness_error(share: float, gap: float) -> float:

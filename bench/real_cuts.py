@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from acquisition import Description
-from acquisition.files.read_recording import NOTHING
-from acquisition.files.read_sound import read_sound
-from lobewatch.cuts.listening.fold_frequency import fold_frequency
-from lobewatch.cuts.listening.judge_cut import HeardSound
-from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
+from acquisition.files.read_cut import read_cut_recording
+from acquisition.files.read_recording import EMPTY_DESCRIPTION
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +65,7 @@ class Source:
     immersion: float = 1.0
     rpm: float = 0.0
     """Speed as set; 0 where it stands in the path."""
-    options: Description = NOTHING
+    options: Description = EMPTY_DESCRIPTION
     """What the files do not say."""
 
 
@@ -132,12 +131,12 @@ class Tally:
     pairs: int = 0
     apart: int = 0
 
-    def add(self, cuts: list[HeardSound], comb: Comb) -> None:
+    def add(self, cuts: list[CutEvaluation], comb: Comb) -> None:
         """One more recording."""
         heard = longest(cuts)
         self.cuts += 1
         self.found += len(cuts) == 1 and heard.parts.reason not in NOT_FOUND
-        self.words[heard.word if heard.word != "cannot tell" else heard.reason] += 1
+        self.words[heard.verdict if heard.verdict != "cannot tell" else heard.reason] += 1
         self.speeds[_speed_word(heard, comb)] += 1
         self.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
 
@@ -148,14 +147,14 @@ class Tally:
         return f"{right}, {wrong}, {silent} of {right + wrong + silent}"
 
 
-def listened(file: list[Axis], part: slice = slice(None)) -> list[HeardSound]:
+def listened(file: list[Axis], part: slice = slice(None)) -> list[CutEvaluation]:
     """What is told of some axes together, or of a part of them."""
     first, size = file[0], min(axis.signal.size for axis in file)
     signals = np.stack([axis.signal[:size][part] for axis in file])
-    return listen_to(CutRecording(signals, first.rate, first.source.teeth, first.source.immersion, first.rpm))
+    return evaluate_recording(CutRecording(signals, first.rate, first.source.teeth, first.source.immersion, first.rpm))
 
 
-def longest(cuts: list[HeardSound]) -> HeardSound:
+def longest(cuts: list[CutEvaluation]) -> CutEvaluation:
     """That of the longest cut."""
     return max(cuts, key=lambda heard: np.nan_to_num(heard.parts.end - heard.parts.begin))
 
@@ -166,7 +165,7 @@ def axes_of(folder: Path, source: Source) -> Iterator[list[Axis]]:
         speed = source.rpm or float((re.findall(r"(\d+)RPM", path.name) or re.findall(r"(\d+)RPM", str(path)))[0])
         yield [
             Axis(path, sound.acceleration, sound.sample_rate, speed, source)
-            for sound in (read_sound(path, said) for said in _descriptions(source))
+            for sound in (read_cut_recording(path, said) for said in _descriptions(source))
         ]
 
 
@@ -174,7 +173,7 @@ def _descriptions(source: Source) -> Iterator[Description]:
     """One for each axis."""
     places = [place for place, column in enumerate(source.columns) if column == "*"]
     for number, place in enumerate(places, 1):
-        if source.options != NOTHING:
+        if source.options != EMPTY_DESCRIPTION:
             response = number if len(places) > 1 else None
             yield Description(**vars(source.options) | {"response": response})
         else:
@@ -215,7 +214,7 @@ def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
     return tried, np.asarray(score / np.median(score))
 
 
-def steady_part(file: list[Axis], heard: HeardSound) -> slice:
+def steady_part(file: list[Axis], heard: CutEvaluation) -> slice:
     """What was listened to, else the middle of what is loud."""
     if heard.parts.cut.stop > heard.parts.cut.start:
         return heard.parts.cut
@@ -237,7 +236,7 @@ def judge_file(file: list[Axis], each: Tally, together: Tally) -> None:
     each.apart += sum(abs(one / other - 1) > SAME_SPEED for one, other in pairs)
 
 
-def _speed_word(heard: HeardSound, comb: Comb) -> str:
+def _speed_word(heard: CutEvaluation, comb: Comb) -> str:
     if not comb.is_clear:
         return "unclear"
     if np.isnan(heard.speed_rpm):
@@ -245,9 +244,9 @@ def _speed_word(heard: HeardSound, comb: Comb) -> str:
     return "right" if abs(heard.speed_rpm / 60 / comb.frequency - 1) < SAME_SPEED else "wrong"
 
 
-def _is_on_harmonic(heard: HeardSound, turn: float) -> bool:
+def _is_on_harmonic(heard: CutEvaluation, turn: float) -> bool:
     """Whether chatter is said at a multiple of a turn (Hz)."""
-    if heard.chatter is None or heard.word != "chatter":
+    if heard.chatter is None or heard.verdict != "chatter":
         return False
     return bool(fold_frequency(heard.chatter.frequency, turn) < ON_HARMONIC * turn)
 
@@ -260,7 +259,7 @@ def words_on_air(file: list[Axis], only_air: bool) -> Iterator[str]:
     outside = ((0, axis.signal.size),) if only_air else ((0, begin - spare), (end + spare, axis.signal.size))
     for first, last in outside:
         for place in range(first, last - size + 1, size):
-            yield from (heard.word for heard in listened(file, slice(place, place + size)))
+            yield from (heard.verdict for heard in listened(file, slice(place, place + size)))
 
 
 def row(source: Source, each: Tally, together: Tally) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from signalcalc import measured_frfs
 
-from modal import Mode, Trust, fit_modes, found_again, trust_of
+from modal import Mode, Trust, assess_trust, fit_modes, match_modes
 
 NEAR = 0.005
 """Relative distance within which two modes may be the same."""
@@ -47,7 +47,7 @@ def nearest(modes: list[Mode], mode: Mode) -> Mode | None:
 
 def agreements(hits: Hits) -> Iterator[NDArray[np.bool_]]:
     """Whether f and zeta of each pair of trusted modes agree within the root sum of squares of their intervals."""
-    trusted = [[mode for mode in sensor if trust_of(mode) is Trust.TRUSTED] for sensor in hits]
+    trusted = [[mode for mode in sensor if assess_trust(mode) is Trust.TRUSTED] for sensor in hits]
     for some, others in combinations(trusted, 2):
         for mode in some:
             other = nearest(others, mode)
@@ -57,13 +57,13 @@ def agreements(hits: Hits) -> Iterator[NDArray[np.bool_]]:
 
 
 def is_trusted(mode: Mode) -> bool:
-    return trust_of(mode) is Trust.TRUSTED
+    return assess_trust(mode) is Trust.TRUSTED
 
 
 def beside(hits: Hits, moved: float = 1.0) -> Hits:
     """The same, the other sensors of the hits looked at for each, their frequencies moved by a factor."""
     away = [[mode.scaled(moved, 1.0, "") for mode in sensor] for sensor in hits]
-    return [found_again(sensor, away[:k] + away[k + 1 :]) for k, sensor in enumerate(hits)]
+    return [match_modes(sensor, away[:k] + away[k + 1 :]) for k, sensor in enumerate(hits)]
 
 
 def row(files: list[Hits]) -> str:

@@ -4,37 +4,23 @@ Beams on springs, Euler-Bernoulli or Timoshenko, exact at every frequency. Sourc
 Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, without its poles.
 """
 
-from .calibration.calibrate import calibrate
+from .calibration.calibrate import calibrate, stiffness_curve
 from .calibration.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
-from .calibration.calibration import Calibration, UnreachableFrequencyError
+from .calibration.calibration import Calibration, RemainingPreload, UnreachableFrequencyError, remaining_preload
 from .calibration.fit_stiffness import fit_stiffness
-from .calibration.plus_minus import plus_minus, rounded
-from .calibration.predict_mode import PredictedMode, predict_mode
-from .calibration.preload_left import PreloadLeft, preload_left
 from .calibration.receptance_map import receptance_map
-from .calibration.stiffness_curve import stiffness_curve
-from .calibration.stiffness_fit import StiffnessFit, StiffnessFitError
-from .modes.critical_speed import critical_speed
+from .calibration.report_text import format_rounded, format_with_error
+from .calibration.stiffness_fit import PredictedMode, StiffnessFit, StiffnessFitError, predict_mode
 from .modes.damped_modes import DampedModes, damped_modes
 from .modes.energy_shares import EnergyShares, energy_shares
-from .modes.modal_stiffness import modal_stiffness
-from .modes.mode_shapes import mode_shapes
 from .modes.modes import Modes
-from .modes.modes_at import modes_at
-from .modes.natural_frequencies import natural_frequencies
-from .modes.whirl_map import WhirlMap, whirl_map
-from .response.couple_tool import couple_tool
-from .response.linearized_stiffness import linearized_stiffness
-from .response.receptance import receptance
-from .response.spindle_side import SpindleSide, spindle_side
-from .response.static_stiffness import static_stiffness
+from .modes.natural_frequencies import modal_stiffness, mode_shapes, modes_at, natural_frequencies
+from .modes.whirl_map import WhirlMap, critical_speed, whirl_map
+from .response import SpindleSide, couple_tool, linearized_stiffness, receptance, spindle_side, static_stiffness
 from .spindle.attachments import Bearing, Joint, LumpedMass
-from .spindle.change_tool import change_tool
-from .spindle.material import MATERIALS, Material
-from .spindle.segment import Segment
-from .spindle.spindle import Spindle, Theory
-from .spinning.beam import SpinningBeam, SpinningSegment, SpinningSpring
-from .spinning.element import spinning_element
+from .spindle.segment import MATERIALS, Material, Segment
+from .spindle.spindle import Spindle, Theory, change_tool
+from .spinning.beam import SpinningBeam, SpinningSegment, SpinningSpring, spinning_element
 from .spinning.frequencies import UnstableSpinError, spinning_frequencies
 
 __all__ = [
@@ -49,7 +35,7 @@ __all__ = [
     "Material",
     "Modes",
     "PredictedMode",
-    "PreloadLeft",
+    "RemainingPreload",
     "Segment",
     "Spindle",
     "SpindleSide",
@@ -71,17 +57,17 @@ __all__ = [
     "damped_modes",
     "energy_shares",
     "fit_stiffness",
+    "format_rounded",
+    "format_with_error",
     "linearized_stiffness",
     "modal_stiffness",
     "mode_shapes",
     "modes_at",
     "natural_frequencies",
-    "plus_minus",
     "predict_mode",
-    "preload_left",
     "receptance",
     "receptance_map",
-    "rounded",
+    "remaining_preload",
     "spindle_side",
     "spinning_element",
     "spinning_frequencies",

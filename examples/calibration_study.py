@@ -6,9 +6,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from dsm import calibrate, natural_frequencies
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 
-machine = parse_machine(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
+machine = parse_machine_file(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
 true = machine.model("reference")
 stiffness, frequency = true.bearings[0].stiffness, float(natural_frequencies(true, 1)[0])
 random = np.random.default_rng(1)

@@ -8,14 +8,14 @@ import csv
 import sys
 from pathlib import Path
 
-from acquisition import DataError, Description, look
+from acquisition import DataError, Description, inspect_file
 from acquisition.files.read_recording import read_frf
 from modal import Mode, fit_modes
 
 
 def modes_of(path: Path, unit: str) -> list[Mode]:
     """The modes of a file; DataError or ValueError where it has none."""
-    asked = look(path).complaint
+    asked = inspect_file(path).complaint
     return fit_modes(read_frf(path, Description(unit=unit) if asked else Description()))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from lobewatch.decay.forecast import forecast
+from lobewatch.monitoring.forecast import forecast_series
 
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("series.csv")
 if len(sys.argv) < 2:
@@ -18,7 +18,7 @@ if len(sys.argv) < 2:
     rows = np.column_stack((days, 1713 * (1 - 1e-4 * days) + scatter))
     np.savetxt(path, rows, "%.2f", ",", header="day,frequency_hz", comments="")
 days, frequency = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
-ahead = forecast(days, frequency, horizon=2 * days[-1])
+ahead = forecast_series(days, frequency, horizon=2 * days[-1])
 level = 0.98 * frequency[-1]
 first, probable, last = ahead.reached(level)
 print(f"{level:.0f} Hz: between day {first:.0f} and {last:.0f} (80 %), probably day {probable:.0f}")

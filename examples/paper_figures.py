@@ -9,11 +9,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from dsm import calibrate, modal_stiffness, stiffness_curve
-from lobes import Cut, aged_mode, zero_order
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobes import Cut, age_mode, zero_order_lobes
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from modal import Mode
 
-machine = parse_machine(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
+machine = parse_machine_file(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
 spindle = machine.model("reference")
 frequency = np.linspace(400, 2250, 150)
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
@@ -28,10 +28,10 @@ speeds = np.linspace(2000, 16_000, 1000)
 lowest = []
 for mode, style, name in (
     (measured, "k--", "as measured"),
-    (aged_mode(measured, 0.9, "paper"), "tab:red", "f x 0.9, K x 0.9 (paper)"),
-    (aged_mode(measured, 0.9, "model", softer), "tab:blue", f"f x 0.9, K x {softer:.3f} (model)"),
+    (age_mode(measured, 0.9, "paper"), "tab:red", "f x 0.9, K x 0.9 (paper)"),
+    (age_mode(measured, 0.9, "model", softer), "tab:blue", f"f x 0.9, K x {softer:.3f} (model)"),
 ):
-    limit = zero_order([mode], [mode], slot, speeds)
+    limit = zero_order_lobes([mode], [mode], slot, speeds)
     lowest.append(limit.minimum.depth)
     right.plot(speeds, limit.depth * 1e3, style, label=name)
 right.set(xlabel="spindle speed (rpm)", ylabel="deepest stable slot (mm)", ylim=(0, 6))

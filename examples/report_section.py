@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lobewatch import Logbook
-from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.report import write_report
+from lobewatch.show.report.report_data import ReportData
 from lobewatch.show.report.section import DataTable, Section
 from lobewatch.show.report.sections import SECTIONS
 
 
-def hammer_forces(material: ReportMaterial) -> Sequence[Section]:
+def hammer_forces(material: ReportData) -> Sequence[Section]:
     """A table of the peak forces of the newest tap test."""
     peaks = [f"{hit.force.max():.0f}" for hit in material.newest.accepted]
     rows = [[str(number), peak] for number, peak in enumerate(peaks, 1)]

@@ -6,12 +6,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from dsm import MATERIALS, Segment, Spindle, change_tool, modes_at
-from lobes import Cut, zero_order
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobes import Cut, zero_order_lobes
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from modal import Mode
 
 DAMPING = 0.03  # of a tool that was tapped in this spindle
-machine = parse_machine(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
+machine = parse_machine_file(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
 spindle = machine.model("reference")
 
 
@@ -28,7 +28,7 @@ for length in (0.060, 0.080, 0.100):
     frequency, stiffness = modes_at(predicted, 4)
     modes = [Mode(float(f), DAMPING, float(k)) for f, k in zip(frequency, stiffness, strict=True)]
     slot = Cut(teeth=2, immersion=1.0, direction="down", tangential=796e6, radial=168e6)
-    limit = zero_order(modes, modes, slot, speeds)
+    limit = zero_order_lobes(modes, modes, slot, speeds)
     softest = min(modes, key=lambda mode: mode.stiffness * mode.damping_ratio)
     print(
         f"16 mm end mill, {length * 1e3:.0f} mm out: softest mode {softest.frequency:.0f} Hz, "

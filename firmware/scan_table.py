@@ -1,4 +1,4 @@
-"""A table of scans for the boards that have no converter: `python firmware/scan_table.py MACHINE TABLE`."""
+"""A table of scans for the boards that have no converter: `python firmware/scan_table.py NAME_QUESTION POSTGRES_TABLE`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquisition import HammeredStructure, Hammering
 from acquisition.emulation import quantise
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, build_structure
 
 EVENTS = 16
 """What a table has room for."""
@@ -44,9 +44,9 @@ def main() -> None:
     spindle = MachineFolder(options.machine).machine.spindle
     if spindle is None:
         parser.error(f"{options.machine}: machine.toml has no [spindle] table: there is nothing to tap")
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
-    tapper = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(options.seed), Hammering())
-    codes = quantise(tapper(0, round(options.seconds * SAMPLE_RATE)), CHANNELS)
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
+    tapper = HammeredStructure(structure, EMULATED_SAMPLE_RATE, np.random.default_rng(options.seed), Hammering())
+    codes = quantise(tapper(0, round(options.seconds * EMULATED_SAMPLE_RATE)), EMULATED_CHANNELS)
     write_table(options.table, codes, by_clock=options.by_clock)
 
 

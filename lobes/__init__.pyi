@@ -1,106 +1,98 @@
 """From modes or FRFs to stability lobes, advice for cutting programs, and the history of the lobes of one machine."""
 
-from .aged_mode import aged_mode
-from .average_angle import average_angle
-from .coefficients import Coefficients, tangential_and_radial
-from .cut import Cut, Direction
-from .cutting_power import deepest_for_drive, mean_torque
+from .coefficients import CuttingCoefficients, SpecificForce, tangential_and_radial
+from .cut import Cut, Direction, Program, max_depth_for_drive, mean_torque
 from .floquet import (
     MillingRows,
     ProgramLimit,
-    growth,
-    joined_rows,
-    piece_numbers,
+    count_pieces,
+    growth_rate,
+    join_rows,
     program_limit,
-    rows_of,
+    rows_at_speeds,
     spectral_radius,
     stability_boundary,
 )
 from .history import SldHistory
 from .history_file import read_history, write_history
-from .known_materials import (
-    cutting_coefficients,
+from .materials import (
+    all_cutting_coefficients,
     find_materials,
-    folded_name,
+    fold_material_name,
     materials_by_name,
-    nearest_name,
+    nearest_material_name,
 )
-from .lowest_of import lowest_of
-from .milling_system import milling_system
-from .pitch_patterns import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pattern
-from .pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
-from .program import Program
-from .radial_lobes import RadialLobes, radial_lobes
-from .shown_modes import ShownModes, shown_modes
-from .specific_force import SpecificForce
-from .stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
+from .milling_system import ProjectedModes, age_mode, build_milling_system, project_modes
+from .pitch_patterns import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
+from .pockets import Pocket, PocketShift, find_pockets, match_pockets, rank_pockets
+from .stability_lobes import Lobe, LobeMinimum, MethodName, RadialLobes, StabilityLobes, lower_envelope, radial_lobes
 from .tool_data import (
     TOOL_MATERIALS,
     CutKind,
     PublishedRange,
     ToolMaterial,
-    cut_kind,
-    cutting_speed,
-    fastest_of_all,
-    feed_per_tooth,
+    classify_cut,
+    published_cutting_speed,
+    published_feed_per_tooth,
+    published_speed_of_any_tool,
 )
-from .zero_order import zero_order
+from .zero_order import average_angle_lobes, zero_order_lobes
 
 __all__ = [
     "TOOL_MATERIALS",
-    "Coefficients",
     "Cut",
     "CutKind",
+    "CuttingCoefficients",
     "Direction",
     "Lobe",
+    "LobeMinimum",
     "MethodName",
     "MillingRows",
-    "Minimum",
     "PitchPattern",
     "Pocket",
     "PocketShift",
     "Program",
     "ProgramLimit",
+    "ProjectedModes",
     "PublishedRange",
     "RadialLobes",
-    "ShownModes",
     "SldHistory",
     "SpecificForce",
     "StabilityLobes",
     "ToolMaterial",
-    "aged_mode",
-    "average_angle",
-    "best_pockets",
-    "cut_kind",
-    "cutting_coefficients",
-    "cutting_speed",
-    "deepest_for_drive",
+    "age_mode",
+    "all_cutting_coefficients",
+    "average_angle_lobes",
+    "build_milling_system",
+    "classify_cut",
+    "count_pieces",
     "equal_pitch",
-    "fastest_of_all",
-    "feed_per_tooth",
     "find_materials",
-    "folded_name",
-    "growth",
+    "find_pockets",
+    "fold_material_name",
+    "growth_rate",
     "half_wave_deg",
-    "joined_rows",
-    "lowest_of",
+    "join_rows",
+    "lower_envelope",
+    "match_pockets",
     "materials_by_name",
+    "max_depth_for_drive",
     "mean_torque",
-    "milling_system",
-    "nearest_name",
-    "piece_numbers",
+    "nearest_material_name",
     "pitch_patterns",
-    "pocket_shifts",
-    "pockets",
     "program_limit",
+    "project_modes",
+    "published_cutting_speed",
+    "published_feed_per_tooth",
+    "published_speed_of_any_tool",
     "radial_lobes",
+    "rank_pockets",
     "read_history",
-    "rows_of",
-    "shown_modes",
+    "rows_at_speeds",
     "spectral_radius",
     "stability_boundary",
     "tangential_and_radial",
-    "with_pattern",
+    "with_pitch_pattern",
     "write_history",
-    "zero_order",
+    "zero_order_lobes",
 ]

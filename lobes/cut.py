@@ -1,4 +1,4 @@
-"""The cut: cutter, immersion and material, and the conventions of all lobes."""
+"""Milling cut and program: geometry, conventions, torque and power."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from modal import Mode
 
 Direction = Literal["up", "down"]
 """Which way the tool turns against the feed: up (conventional) or down (climb) milling."""
 
 
-PITCH_SUM = np.radians(1e-3)
+PITCH_SUM_TOLERANCE = np.radians(1e-3)
 """Pitches sum to a turn within this (rad): angles may be written with three decimals of a degree."""
-SAME_PITCH = 1e-9
+PITCH_TOLERANCE = 1e-9
 """Angles that differ by less (rad) are one."""
 
 
-def checked_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
+def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
     """Pitches (rad) of so many teeth, those that are alike made equal; () where all are.
 
     Raises ValueError unless there is one > 0 for each tooth and they sum to a turn.
@@ -33,9 +35,9 @@ def checked_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
         raise ValueError(
             f"pitch [{shown}] degrees holds an angle that is not > 0; each tooth follows the one before it"
         )
-    if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM:
+    if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:
         raise ValueError(f"pitch [{shown}] sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
-    alike = [next(other for other in pitch if abs(other - angle) < SAME_PITCH) for angle in pitch]
+    alike = [next(other for other in pitch if abs(other - angle) < PITCH_TOLERANCE) for angle in pitch]
     return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
 
 
@@ -93,7 +95,7 @@ class Cut:
             )
         if not np.isfinite(self.feed_angle):
             raise ValueError(f"feed_angle={self.feed_angle} rad is not finite; 0 feeds along x, pi/2 along y")
-        object.__setattr__(self, "pitch", checked_pitch(self.pitch, self.teeth))
+        object.__setattr__(self, "pitch", normalize_pitch(self.pitch, self.teeth))
 
     @property
     def entry_angle(self) -> float:
@@ -111,18 +113,18 @@ class Cut:
         return (self.entry_angle + self.exit_angle) / 2
 
     @property
-    def pattern(self) -> tuple[float, ...]:
+    def pitch_pattern(self) -> tuple[float, ...]:
         """Pitches after which those of the cutter repeat (rad): one of even teeth, two of 85/95/85/95 degrees."""
         pitch = self.pitch or (2 * np.pi / self.teeth,)
         return next(pitch[:k] for k in range(1, len(pitch) + 1) if pitch[:k] * (len(pitch) // k) == pitch)
 
     @property
-    def repeats(self) -> int:
+    def repeats_per_turn(self) -> int:
         """Times that the cutter looks the same in a turn: its teeth where they are evenly spaced."""
-        return self.teeth // len(self.pattern)
+        return self.teeth // len(self.pitch_pattern)
 
     @property
-    def ahead(self) -> NDArray[np.float64]:
+    def lead_angles(self) -> NDArray[np.float64]:
         """Angle by which each tooth is ahead of the first (rad), shape (teeth,): not above 0 of uneven teeth."""
         if not self.pitch:
             return np.asarray(np.arange(self.teeth) * 2 * np.pi / self.teeth)
@@ -131,7 +133,7 @@ class Cut:
     @property
     def delays(self) -> tuple[float, ...]:
         """The different pitches (rad), rising: how long before a tooth the one before it passed."""
-        return tuple(sorted(set(self.pattern)))
+        return tuple(sorted(set(self.pitch_pattern)))
 
     @property
     def teeth_in_cut(self) -> float:
@@ -159,3 +161,91 @@ class Cut:
         phi = self.mean_angle - self.feed_angle
         force = phi + self.force_angle
         return round(float(np.sin(force) * np.sin(phi)), 15), round(float(np.cos(force) * np.cos(phi)), 15)
+
+
+DirectionModes = Sequence[Mode] | None
+"""Modes of one direction; None where it is rigid or not known."""
+
+CHECKED_DEPTH_SHARES = (0.25, 0.5, 0.75, 1.0)
+"""A program is stable where it is so at all these shares of its depth: an island above a limit is none to work in."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A cut at a speed and an axial depth. Raises ValueError where one is not > 0.
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> Program(slot, speed_rpm=12000.0, depth=-0.002)
+    Traceback (most recent call last):
+        ...
+    ValueError: depth=-0.002 m is not a finite depth > 0; 1 mm is 1e-3
+    """
+
+    cut: Cut
+    """Cutter, immersion and material."""
+    speed_rpm: float
+    """Spindle speed (rpm)."""
+    depth: float
+    """Axial depth of cut (m)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no speed or depth."""
+        if not (np.isfinite(self.speed_rpm) and self.speed_rpm > 0):
+            raise ValueError(f"speed_rpm={self.speed_rpm} is not a finite speed > 0 rpm; give that of the program")
+        if not (np.isfinite(self.depth) and self.depth > 0):
+            raise ValueError(f"depth={self.depth} m is not a finite depth > 0; 1 mm is 1e-3")
+
+
+def mean_torque(
+    cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0
+) -> NDArray[np.float64]:
+    """Torque averaged over a turn (N m) at axial depths b (m), shape of depth.
+
+    M = N D / (4 pi) b (Kt f (cos phi_st - cos phi_ex) + Kte (phi_ex - phi_st)): diameter D (m), feed per tooth f (m),
+    edge coefficient Kte (N/m). Power is 2 pi n M. Raises ValueError for values that are not > 0.
+    Source: Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 2.
+
+    Power by torque is the specific force times the chips removed, where edges cost nothing:
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> torque = mean_torque(slot, 2e-3, diameter=12e-3, published_feed_per_tooth=0.1e-3)
+    >>> round(float(torque) * 2 * np.pi * 12000 / 60)  # W at 12000 rpm
+    672
+    >>> round(700e6 * 12e-3 * 2e-3 * 0.1e-3 * 2 * 12000 / 60)  # Kt times m^3/s
+    672
+    """
+    for name, value in (("diameter", diameter), ("feed_per_tooth", feed_per_tooth)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name}={value} m is not a finite number > 0; 1 mm is 1e-3")
+    if not (np.isfinite(edge) and edge >= 0):
+        raise ValueError(f"edge={edge} N/m is not a finite number >= 0; 1 N/mm is 1e3, leave it out where not known")
+    chip = feed_per_tooth * (np.cos(cut.entry_angle) - np.cos(cut.exit_angle))
+    per_depth = cut.tangential * chip + edge * (cut.exit_angle - cut.entry_angle)
+    return np.asarray(cut.teeth * diameter / (4 * np.pi) * per_depth * np.asarray(depth, dtype=np.float64))
+
+
+def max_depth_for_drive(
+    cut: Cut,
+    speed_rpm: ArrayLike,
+    diameter: float,
+    feed_per_tooth: float,
+    edge: float = 0.0,
+    power: float = float("inf"),
+    torque: float = float("inf"),
+) -> NDArray[np.float64]:
+    """Deepest axial depth (m) that a power (W) and a torque (N m) of the spindle allow at each speed (rpm), shape (n,).
+
+    diameter, feed_per_tooth (m) and edge (N/m) as for `mean_torque`; power = 2 pi n M. Raises ValueError as that, and
+    for a power or a torque that is not > 0.
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> depth = max_depth_for_drive(slot, [6000.0, 12000.0], 12e-3, 0.1e-3, power=1000.0, torque=1.0)
+    >>> (depth * 1e3).round(2).tolist()  # mm: the torque sets the first, the power the second
+    [3.74, 2.98]
+    """
+    for name, value in (("power", power), ("torque", torque)):
+        if not value > 0:
+            raise ValueError(f"{name}={value} is not > 0; leave it out where the drive has no such limit")
+    turning = 2 * np.pi * np.asarray(speed_rpm, dtype=np.float64) / 60
+    allowed = np.minimum(torque, power / turning)
+    return np.asarray(allowed / mean_torque(cut, 1.0, diameter, feed_per_tooth, edge))

@@ -10,10 +10,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.speeds import check_speeds
+from lobes.stability_lobes import check_speeds
 
 Column = NDArray[np.float64] | NDArray[np.str_]
-SomeColumn = TypeVar("SomeColumn", NDArray[np.float64], Column)
+ColumnT = TypeVar("ColumnT", NDArray[np.float64], Column)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class SldHistory:
     def __post_init__(self) -> None:
         """Convert to arrays and check names, shapes and values."""
         object.__setattr__(self, "speed_rpm", check_speeds(self.speed_rpm))
-        object.__setattr__(self, "columns", {name: _column(name, c) for name, c in self.columns.items()})
+        object.__setattr__(self, "columns", {name: _check_column(name, c) for name, c in self.columns.items()})
         object.__setattr__(self, "depth", {name: np.asarray(d, dtype=np.float64) for name, d in self.depth.items()})
         object.__setattr__(self, "units", dict(self.units))
         if np.any(np.diff(self.speed_rpm) <= 0):
@@ -83,16 +83,16 @@ class SldHistory:
 
         Raises ValueError where names or shapes are not those of this history.
         """
-        return replace(self, columns=_extended(self.columns, row_columns), depth=_extended(self.depth, row_depth))
+        return replace(self, columns=_append_row(self.columns, row_columns), depth=_append_row(self.depth, row_depth))
 
 
-def _extended(table: Mapping[str, SomeColumn], row: Mapping[str, ArrayLike]) -> dict[str, SomeColumn]:
+def _append_row(table: Mapping[str, ColumnT], row: Mapping[str, ArrayLike]) -> dict[str, ColumnT]:
     if table.keys() != row.keys():
         raise ValueError(f"the new row has {sorted(row)}, the history {sorted(table)}; give a value for each of these")
-    return {name: _with_row(name, values, row[name]) for name, values in table.items()}
+    return {name: _append_value(name, values, row[name]) for name, values in table.items()}
 
 
-def _with_row(name: str, values: SomeColumn, row: ArrayLike) -> SomeColumn:
+def _append_value(name: str, values: ColumnT, row: ArrayLike) -> ColumnT:
     new = np.asarray(row)
     if new.shape != values.shape[1:]:
         raise ValueError(f"the new row of {name!r} has shape {new.shape}, the history {values.shape[1:]} a row")
@@ -101,7 +101,7 @@ def _with_row(name: str, values: SomeColumn, row: ArrayLike) -> SomeColumn:
     return np.concatenate((values, new[np.newaxis]))
 
 
-def _column(name: str, values: ArrayLike) -> Column:
+def _check_column(name: str, values: ArrayLike) -> Column:
     if not name.isidentifier():
         raise ValueError(f"column name {name!r} is not made of letters, digits and underscores; rename it")
     column = np.asarray(values)

@@ -21,9 +21,9 @@ import numpy as np
 from acquisition import atomic_write
 from lobes.history import Column, SldHistory
 
-FORMAT = "lobewatch-history"
-VERSION = 1
-HEAD_SIZE = 512
+HISTORY_FORMAT = "lobewatch-history"
+HISTORY_FORMAT_VERSION = 1
+HISTORY_HEAD_SIZE = 512
 """Smallest user block of HDF5 (bytes)."""
 
 
@@ -41,9 +41,12 @@ def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
     [696.2]
     """
     buffer = io.BytesIO()
-    with h5py.File(buffer, "w", userblock_size=HEAD_SIZE) as file:
+    with h5py.File(buffer, "w", userblock_size=HISTORY_HEAD_SIZE) as file:
         file.attrs.update(
-            format=FORMAT, version=VERSION, settings_hash=history.settings_hash, software=history.software
+            format=HISTORY_FORMAT,
+            version=HISTORY_FORMAT_VERSION,
+            settings_hash=history.settings_hash,
+            software=history.software,
         )
         speed = file.create_dataset("speed_rpm", data=history.speed_rpm)
         speed.attrs["units"] = "rpm"
@@ -58,8 +61,8 @@ def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
             dataset = cut.create_dataset("limiting_depth", data=depth)
             dataset.attrs["units"] = "m"
             dataset.dims[1].attach_scale(speed)
-    body = buffer.getvalue()[HEAD_SIZE:]
-    atomic_write(Path(path), _head(body) + body)
+    body = buffer.getvalue()[HISTORY_HEAD_SIZE:]
+    atomic_write(Path(path), _file_head(body) + body)
 
 
 def read_history(path: str | os.PathLike[str]) -> SldHistory:
@@ -68,17 +71,19 @@ def read_history(path: str | os.PathLike[str]) -> SldHistory:
     The checksum is verified before HDF5 sees the file: one flipped bit can make it hang, or pass unnoticed.
     """
     content = Path(path).read_bytes()
-    if content[:HEAD_SIZE] != _head(content[HEAD_SIZE:]):
+    if content[:HISTORY_HEAD_SIZE] != _file_head(content[HISTORY_HEAD_SIZE:]):
         raise ValueError(
-            f"{os.fspath(path)}: damaged, or no {FORMAT} file of version {VERSION}; "
+            f"{os.fspath(path)}: damaged, or no {HISTORY_FORMAT} file of version {HISTORY_FORMAT_VERSION}; "
             "a history is derived from the taps: rebuild it"
         )
     with h5py.File(io.BytesIO(content), "r") as file:
-        return _read(file)
+        return _read_file(file)
 
 
-def _head(body: bytes) -> bytes:
-    return f"{FORMAT} {VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n".encode().ljust(HEAD_SIZE, b"\0")
+def _file_head(body: bytes) -> bytes:
+    return f"{HISTORY_FORMAT} {HISTORY_FORMAT_VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n".encode().ljust(
+        HISTORY_HEAD_SIZE, b"\0"
+    )
 
 
 def _write_column(columns: h5py.Group, name: str, values: Column, units: str | None) -> None:
@@ -90,7 +95,7 @@ def _write_column(columns: h5py.Group, name: str, values: Column, units: str | N
         dataset.attrs["units"] = units
 
 
-def _read(file: h5py.File) -> SldHistory:
+def _read_file(file: h5py.File) -> SldHistory:
     columns, cuts = file["columns"], file["cuts"]
     return SldHistory(
         settings_hash=file.attrs["settings_hash"],

@@ -1,4 +1,4 @@
-"""Limits and lobes of a chatter loop that is known over frequency: what average angle and zero order share."""
+"""Stability limits of a chatter loop given over frequency."""
 
 from __future__ import annotations
 
@@ -12,27 +12,94 @@ from acquisition import Remark
 from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
-from lobes.uneven_limits import uneven_limits
+from lobes.tooth_force import mean_regeneration
 
-FIRST_BLOCK = 64
-"""Grid steps searched first; every further block is twice as long ..."""
-BLOCK = 2_000_000
-"""... up to this many grid values (speeds times steps): it bounds the memory."""
-MOST_STEPS = 60
-"""Of the search for a crossing inside one grid step; a handful do."""
-ROUNDING = 1e-11
-"""Turns that no longer count."""
-LOW_IMMERSION = 0.25
-"""Radial depth over diameter below which a mean force is no picture of a cut ..."""
-NEAR_SLOT = 0.95
-"""... and below which it is none at fast teeth: flip lobes lie around tooth frequency = 2 f_n / (2 k + 1)."""
-FAST = 0.5
-"""Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
-INSTEAD = "use semi-discretisation"
-"""What to do where a mean force is no picture of a cut."""
+MIN_UNEVEN_RESPONSE = 0.02
+"""Share of its largest value below which a response is not looked at."""
+MIN_STEPS_PER_WAVE = 24
+"""Frequencies in which the regeneration of the longest delay turns once, at least."""
+UNEVEN_REFINEMENT_STEPS = 6
+"""Of the false position that refines a crossing."""
+MAX_UNEVEN_GRID_VALUES = 2_000_000
+"""Speeds times frequencies that are worked on at once."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+
+def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tuple[Floats, Floats]:
+    """Lowest limit (m) and its frequency (Hz) at each mean tooth frequency (Hz), shape (n,); inf and nan if none.
+
+    b L s = -1 with s = 1 - exp(-i w tau) in the mean over the teeth: b = -1 / Re(L s) where Im(L s) = 0, Re(L s) < 0.
+    Source: Budak, An analytical design method for milling cutters with nonconstant pitch to increase stability,
+    J. Manuf. Sci. Eng. 125 (2003) 29-34.
+    """
+    depth, chatter = np.full(tooth_frequency.shape, np.inf), np.full(tooth_frequency.shape, np.nan)
+    for rows, grid in _frequency_blocks(branch, cut, tooth_frequency):
+        loop = branch.receptance(grid) * mean_regeneration(cut, grid / tooth_frequency[rows, np.newaxis])
+        row, step = np.nonzero((loop.imag[:, 1:] < 0) != (loop.imag[:, :-1] < 0))
+        frequency = _refine_uneven_crossing(branch, cut, tooth_frequency[rows][row], grid[step], grid[step + 1])
+        real = _loop_response(branch, cut, tooth_frequency[rows][row], frequency).real
+        limit = np.where(real < 0, -1 / np.minimum(real, -1e-300), np.inf)
+        order = np.lexsort((limit, row))
+        first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
+        limited = first[np.isfinite(limit[first])]
+        depth[rows[row[limited]]], chatter[rows[row[limited]]] = limit[limited], frequency[limited]
+    return depth, chatter
+
+
+def _frequency_blocks(
+    branch: TipResponse, cut: Cut, tooth_frequency: Floats
+) -> Iterator[tuple[NDArray[np.intp], Floats]]:
+    """Speeds and the frequencies to look at for them (Hz)."""
+    size = np.abs(branch.on_grid)
+    loud = branch.grid[size > MIN_UNEVEN_RESPONSE * np.max(size)]
+    longest = max(cut.delays) / (2 * np.pi) * cut.teeth
+    order = np.argsort(tooth_frequency)
+    for part in np.array_split(order, max(1, order.size // 32)):
+        step = tooth_frequency[part[0]] / longest / MIN_STEPS_PER_WAVE
+        even = np.arange(max(loud[0], step / MIN_STEPS_PER_WAVE), loud[-1], step)
+        grid = np.union1d(even, loud[loud > 0])
+        for rows in np.array_split(part, -(-part.size * grid.size // MAX_UNEVEN_GRID_VALUES)):
+            yield rows, grid
+
+
+def _loop_response(branch: TipResponse, cut: Cut, tooth_frequency: Floats, frequency: Floats) -> Complexes:
+    return np.asarray(branch.receptance(frequency) * mean_regeneration(cut, frequency / tooth_frequency))
+
+
+def _refine_uneven_crossing(
+    branch: TipResponse, cut: Cut, tooth_frequency: Floats, low: Floats, high: Floats
+) -> Floats:
+    """Frequencies between `low` and `high` (Hz) at which the loop is real."""
+    at_low = _loop_response(branch, cut, tooth_frequency, low).imag
+    at_high = _loop_response(branch, cut, tooth_frequency, high).imag
+    for _ in range(UNEVEN_REFINEMENT_STEPS):
+        middle = high - at_high * (high - low) / (at_high - at_low)
+        value = _loop_response(branch, cut, tooth_frequency, middle).imag
+        before = (value < 0) != (at_high < 0)
+        low, at_low = np.where(before, middle, low), np.where(before, value, at_low)
+        high, at_high = np.where(before, high, middle), np.where(before, at_high, value)
+    return np.asarray(np.where(np.abs(at_low) < np.abs(at_high), low, high))
+
+
+FIRST_BLOCK_STEPS = 64
+"""Grid steps searched first; every further block is twice as long ..."""
+MAX_BLOCK_VALUES = 2_000_000
+"""... up to this many grid values (speeds times steps): it bounds the memory."""
+MAX_LOOP_REFINEMENT_STEPS = 60
+"""Of the search for a crossing inside one grid step; a handful do."""
+TURN_TOLERANCE = 1e-11
+"""Turns that no longer count."""
+MIN_MEAN_FORCE_IMMERSION = 0.25
+"""Radial depth over diameter below which a mean force is no picture of a cut ..."""
+MAX_FLIP_IMMERSION = 0.95
+"""... and below which it is none at fast teeth: flip lobes lie around tooth frequency = 2 f_n / (2 k + 1)."""
+MIN_FAST_TOOTH_RATIO = 0.5
+"""Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
+MEAN_FORCE_REMEDY = "use semi-discretisation"
+"""What to do where a mean force is no picture of a cut."""
+
 Rows = NDArray[np.intp]
 
 
@@ -49,7 +116,9 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
     responses = [branch.on_grid for branch in branches]
     for i, branch in enumerate(branches):
         limit, frequency = (
-            uneven_limits(branch, cut, tooth_frequency) if cut.pitch else _limits(branch, responses[i], tooth_frequency)
+            uneven_limits(branch, cut, tooth_frequency)
+            if cut.pitch
+            else _branch_limits(branch, responses[i], tooth_frequency)
         )
         lower = limit < depth
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
@@ -63,9 +132,9 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         kind=np.where(limited, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
-        curves=tuple if cut.pitch else partial(_lobes_of, loops, cut, speed_rpm),
-        remarks=_out_of_band(branches, responses)
-        or _out_of_range(method, cut, _weakest(branches, responses), speed_rpm),
+        curves=tuple if cut.pitch else partial(_lobes_of_loops, loops, cut, speed_rpm),
+        remarks=_band_remarks(branches, responses)
+        or _mean_force_remarks(method, cut, _weakest_frequency(branches, responses), speed_rpm),
     )
 
 
@@ -73,13 +142,13 @@ def _weakest_branch(branches: Sequence[TipResponse], responses: Sequence[Complex
     return min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
 
 
-def _weakest(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> float:
+def _weakest_frequency(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> float:
     """Frequency at which the lowest limit of all speeds chatters (Hz)."""
     branch, response = _weakest_branch(branches, responses)
     return float(branch.grid[np.argmin(response.real)])
 
 
-def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[Remark, ...]:
+def _band_remarks(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[Remark, ...]:
     """Whether measured lines end before the loop is at its weakest."""
     branch, response = _weakest_branch(branches, responses)
     weakest = int(np.argmin(response.real))
@@ -92,24 +161,24 @@ def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]
     return (Remark("chatter-band-missing", "", text, "use a wider band, or record one"),)
 
 
-def _out_of_range(method: MethodName, cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
+def _mean_force_remarks(method: MethodName, cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
     """Whether the cut is too slender, or the teeth too fast, for a mean force."""
-    if cut.immersion < LOW_IMMERSION:
-        text = f"at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be lower"
-        return (Remark("low-immersion", "", f"{method} knows no flip lobes: {text}", INSTEAD),)
-    fast = FAST * 60 * chatter / cut.teeth
-    if cut.immersion >= NEAR_SLOT or np.max(speed_rpm) < fast:
+    if cut.immersion < MIN_MEAN_FORCE_IMMERSION:
+        text = f"at immersion {cut.immersion:g} (below {MIN_MEAN_FORCE_IMMERSION}) the true limit can be lower"
+        return (Remark("low-immersion", "", f"{method} knows no flip lobes: {text}", MEAN_FORCE_REMEDY),)
+    fast = MIN_FAST_TOOTH_RATIO * 60 * chatter / cut.teeth
+    if cut.immersion >= MAX_FLIP_IMMERSION or np.max(speed_rpm) < fast:
         return ()
     text = (
         f"{method} knows no flip lobes: above {fast:.0f} rpm, where the tooth frequency is half the chatter frequency, "
         f"the true limit at immersion {cut.immersion:g} can be far lower"
     )
-    return (Remark("fast-teeth", "", text, INSTEAD),)
+    return (Remark("fast-teeth", "", text, MEAN_FORCE_REMEDY),)
 
 
-def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
+def _branch_limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
     """Depth of the lowest crossing at each tooth frequency (Hz) in m and its frequency (Hz); inf and nan where none."""
-    chatter = _chatter_frequency(branch, response, tooth_frequency)
+    chatter = _lowest_crossing_frequency(branch, response, tooth_frequency)
     limited = np.flatnonzero(np.isfinite(chatter))
     real = branch.receptance(chatter[limited]).real
     chatter[limited[real >= 0]] = np.nan
@@ -118,7 +187,7 @@ def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -
     return depth, chatter
 
 
-def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> Floats:
+def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> Floats:
     """Frequency of the lowest crossing at each tooth frequency (Hz), shape (n,); nan where there is none.
 
     f/f_t - arg(L)/pi + 1/2 is a whole number at every crossing, with arg(L) followed continuously along f. The steps
@@ -129,12 +198,12 @@ def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency
     order = np.flatnonzero(lowest < 0)
     order = order[np.argsort(lowest[order])]
     best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
-    begin, size = 0, FIRST_BLOCK
+    begin, size = 0, FIRST_BLOCK_STEPS
     while begin < order.size:
         rows = np.flatnonzero(best > lowest[order[begin]])
         if not rows.size:
             break
-        block = order[begin : begin + max(1, min(size, BLOCK // rows.size))]
+        block = order[begin : begin + max(1, min(size, MAX_BLOCK_VALUES // rows.size))]
         real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
         lower = real < best[rows]
         best[rows[lower]], step[rows[lower]], whole[rows[lower]] = real[lower], where[lower], number[lower]
@@ -142,7 +211,7 @@ def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency
     chatter = np.full(tooth_frequency.shape, np.nan)
     negative = np.flatnonzero(best < 0)
     missing = whole[negative] - branch.grid[step[negative]] / tooth_frequency[negative] - turn[step[negative]]
-    chatter[negative] = _refine(branch, step[negative], missing, tooth_frequency[negative])
+    chatter[negative] = _refine_crossing(branch, step[negative], missing, tooth_frequency[negative])
     return chatter
 
 
@@ -174,7 +243,7 @@ def _lowest_step(
     return best, step, whole
 
 
-def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: Floats) -> Floats:
+def _refine_crossing(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: Floats) -> Floats:
     """Frequency (Hz) inside each grid step at which `missing` turns, counted from its lower end, have been made.
 
     By the false position, with the weight of an end that stays put twice halved (Illinois).
@@ -188,10 +257,10 @@ def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: F
 
     at_low, at_high = -missing, excess(high)
     middle, was_before = low, np.full(step.shape, -1)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_LOOP_REFINEMENT_STEPS):
         middle = np.clip(high - at_high * (high - low) / (at_high - at_low), low, high)
         value = excess(middle)
-        if np.all(np.abs(value) < ROUNDING):
+        if np.all(np.abs(value) < TURN_TOLERANCE):
             break
         before = value * at_high < 0
         weight = np.where(before == was_before, 0.5, 1.0)
@@ -201,15 +270,15 @@ def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: F
     return middle
 
 
-def _lobes_of(
+def _lobes_of_loops(
     loops: Sequence[tuple[Floats, Complexes, NDArray[np.int64]]], cut: Cut, speed_rpm: Floats
 ) -> Iterator[Lobe]:
     """Lobes of loops, each known by its frequencies (Hz), its response there, and waves between teeth at the limits."""
     for grid, response, waves in loops:
-        yield from _lobes(grid, response, cut, np.unique(waves), speed_rpm)
+        yield from _lobes_of_loop(grid, response, cut, np.unique(waves), speed_rpm)
 
 
-def _lobes(
+def _lobes_of_loop(
     grid: Floats, response: Complexes, cut: Cut, numbers: NDArray[np.int64], speed_rpm: Floats
 ) -> Iterator[Lobe]:
     index = np.flatnonzero(response.real < 0)

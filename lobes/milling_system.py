@@ -1,9 +1,10 @@
-"""The modes of tool tip and cut as one system."""
+"""Modes of the tool tip as one system: directions, projections, frequency drop."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,7 @@ from acquisition import Frf
 from lobes.tip_response import check_modes
 from modal import Mode
 
-UNDERDAMPED = 0.99
+MAX_UNDERDAMPED_RATIO = 0.99
 """A complex constant with a larger damping ratio, as a draw may have it, is taken as if with this one."""
 
 
@@ -20,7 +21,7 @@ UNDERDAMPED = 0.99
 class MillingSystem:
     """n modes in the p directions that give way: q'' + 2 zeta w q' + w^2 q = shape vector . F.
 
-    The tip shows d = sum shape vector (place q + velocity q' / w): see `seen_at_tip`. Real modes show shape vector q.
+    The tip shows d = sum shape vector (place q + velocity q' / w): see `tip_participation`. Real modes show shape vector q.
     """
 
     frequency: NDArray[np.float64]
@@ -42,7 +43,7 @@ class MillingSystem:
         """Receptance (m/N) at frequencies (Hz) of any shape, shape (..., p, p)."""
         omega = 2 * np.pi * frequency
         total = np.zeros((*omega.shape, self.axes.size, self.axes.size), dtype=np.complex128)
-        shares = seen_at_tip(self.damping_ratio, self.phase)
+        shares = tip_participation(self.damping_ratio, self.phase)
         modes = zip(self.frequency, self.damping_ratio, self.shape, *shares, self.vector, strict=True)
         for w, zeta, shape, place, velocity, vector in modes:
             shown = shape**2 * (place + 1j * velocity * omega / w if velocity else place)
@@ -51,18 +52,18 @@ class MillingSystem:
         return total
 
 
-def seen_at_tip(
+def tip_participation(
     damping_ratio: NDArray[np.float64], phase: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What the tip shows of a mode's coordinate q and of its velocity q' / w, for phases (rad); 1 and 0 for phase 0.
 
     y = (cos + sin zeta / sqrt(1 - zeta^2)) q + sin / sqrt(1 - zeta^2) q' / w has the receptance of `modal.Mode`.
     """
-    velocity = np.sin(phase) / np.sqrt(1 - np.minimum(damping_ratio, UNDERDAMPED) ** 2)
+    velocity = np.sin(phase) / np.sqrt(1 - np.minimum(damping_ratio, MAX_UNDERDAMPED_RATIO) ** 2)
     return np.cos(phase) + velocity * damping_ratio, velocity
 
 
-def milling_system(
+def build_milling_system(
     x: Sequence[Mode] | None, y: Sequence[Mode] | None, vectors: ArrayLike | None = None
 ) -> MillingSystem:
     """The system of the modes in the feed (x) and normal (y) direction; None for one that is rigid or not known.
@@ -72,7 +73,7 @@ def milling_system(
     two rigid directions, an empty list, modes of negative stiffness, and vectors that do not fit the modes.
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
-    >>> system = milling_system([mode], [mode])
+    >>> system = build_milling_system([mode], [mode])
     >>> at_resonance = system.receptance(np.array(500.0))  # m/N, (2, 2): 1 / (2 i zeta K) on the diagonal
     >>> (at_resonance * 2 * 0.02 * 2e7).round(6).tolist()
     [[-1j, 0j], [0j, -1j]]
@@ -87,7 +88,7 @@ def milling_system(
     modes = [mode for _, _, group in given for mode in group]
     direction = np.repeat(np.arange(len(given)), [len(group) for _, _, group in given])
     axes = np.array([axis for axis, _, _ in given])
-    vector = np.eye(axes.size)[direction] if vectors is None else checked_vectors(vectors, len(modes))
+    vector = np.eye(axes.size)[direction] if vectors is None else check_directions(vectors, len(modes))
     frequency = 2 * np.pi * np.array([mode.frequency for mode in modes])
     return MillingSystem(
         frequency=frequency,
@@ -100,7 +101,7 @@ def milling_system(
     )
 
 
-def checked_vectors(vectors: ArrayLike, number: int) -> NDArray[np.float64]:
+def check_directions(vectors: ArrayLike, number: int) -> NDArray[np.float64]:
     """Directions of so many modes, shape (n, 2); ValueError where they are none."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):
@@ -110,3 +111,69 @@ def checked_vectors(vectors: ArrayLike, number: int) -> NDArray[np.float64]:
     if not np.all(np.isfinite(vector)):
         raise ValueError("vectors holds a value that is not finite; give the parts in x and y of each mode")
     return vector
+
+
+class ProjectedModes(NamedTuple):
+    """Modes as each FRF of the tool tip shows them; a direction that no mode moves in is empty."""
+
+    x: list[Mode]
+    """Modes hit and seen in x."""
+    y: list[Mode]
+    """Modes hit and seen in y."""
+    cross: list[Mode]
+    """Modes hit in x and seen in y; the stiffness is negative where y moves against x."""
+
+
+def project_modes(modes: Sequence[Mode], vectors: ArrayLike) -> ProjectedModes:
+    """Modes with directions (n, 2) at the tip as zero order takes them: a residue u_a u_b / K from a to b.
+
+    Raises ValueError for vectors that do not fit the modes.
+
+    A mode of 20 N/um along its own axis, 30 degrees from x, is 26.7 N/um stiff in x and 80 N/um in y:
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> angle = np.radians(30.0)
+    >>> shown = project_modes([mode], [[np.cos(angle), np.sin(angle)]])
+    >>> [round(modes[0].stiffness / 1e6, 1) for modes in (shown.x, shown.y, shown.cross)]  # N/um
+    [26.7, 80.0, 46.2]
+    """
+    vector = check_directions(vectors, len(modes))
+    pairs = (
+        [(mode, float(u[a] * u[b])) for mode, u in zip(modes, vector, strict=True)] for a, b in ((0, 0), (1, 1), (0, 1))
+    )
+    return ProjectedModes(*([mode.scaled(1.0, 1 / share, "") for mode, share in shown if share] for shown in pairs))
+
+
+StiffnessRule = Literal["measured", "model", "paper"]
+
+
+def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio: float | None = None) -> Mode:
+    """The mode at `ratio` times its frequency, with the damping of the baseline and the stiffness that a rule gives it.
+
+    "measured": K times `stiffness_ratio`, that of a new tap test to the baseline's (needed). "model": K times
+    `stiffness_ratio`, the ratio of modal stiffness of a recalibrated model; without one K stays, and `method` says so.
+    "paper": K times `ratio`, as Gaber & Hashemi (2015) assume (K x 0.9 for f x 0.9); no stiffness_ratio. The covariance
+    is scaled along. Raises ValueError for ratios <= 0 and a stiffness_ratio that does not go with the rule.
+
+    >>> new = Mode(frequency=1000.0, damping_ratio=0.03, stiffness=2e7)
+    >>> old = age_mode(new, 0.9, "paper")
+    >>> round(old.frequency), round(old.stiffness / 1e6, 1)  # Hz, N/um
+    (900, 18.0)
+    >>> old = age_mode(new, 0.9, "measured", stiffness_ratio=0.85)
+    >>> round(old.frequency), round(old.stiffness / 1e6, 1)
+    (900, 17.0)
+    """
+    if rule not in get_args(StiffnessRule):
+        raise ValueError(
+            f"rule={rule!r} is none of {', '.join(get_args(StiffnessRule))}; choose what K does when f_n falls"
+        )
+    for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{name}={value} is not a finite number > 0; give new over old")
+    if rule == "measured" and stiffness_ratio is None:
+        raise ValueError('rule="measured" needs stiffness_ratio, K of the new tap test over K of the baseline')
+    if rule == "paper" and stiffness_ratio is not None:
+        raise ValueError(f'rule="paper" sets K itself; leave stiffness_ratio={stiffness_ratio} out')
+    softer = ratio if rule == "paper" else 1.0 if stiffness_ratio is None else stiffness_ratio
+    rule_text = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
+    return baseline.scaled(ratio, softer, f"aged, {rule_text}")

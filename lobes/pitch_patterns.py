@@ -9,15 +9,15 @@ import numpy as np
 
 from lobes.cut import Cut
 
-MOST_UNEVEN = 0.2
+MAX_PITCH_DEVIATION = 0.2
 """Largest difference of a pitch from the mean, relative: a tooth cuts chips of so much more than the mean; chosen."""
-MOST_OFF_CENTRE = 0.1
+MAX_EDGE_IMBALANCE = 0.1
 """Largest distance of the middle of the edges from the axis over the radius; chosen: grinding has to balance it."""
-PER_HALF_WAVE = 6
+PITCH_STEPS_PER_HALF_WAVE = 6
 """Number of steps in which the difference between neighbouring pitches grows by half a wave ..."""
-HALF_WAVES = 3.5
+MAX_HALF_WAVES = 3.5
 """... and half waves up to which it does: further on the doubt of the frequency blurs what is gained."""
-COARSE, FINE = 1.0, 0.2
+COARSE_PITCH_STEP_DEG, FINE_PITCH_STEP_DEG = 1.0, 0.2
 """Differences are whole multiples of this (deg), of the second where half a wave is less than six times the first."""
 
 
@@ -31,13 +31,13 @@ class PitchPattern:
     """Name: "equal", "alternating", "linear", "linear, 2 times" (the same steps so often in a turn), "as it is"."""
 
     @property
-    def chips(self) -> tuple[float, float]:
+    def feed_ratio_range(self) -> tuple[float, float]:
         """Smallest and largest feed of a tooth over the mean feed per tooth: each cuts what its pitch has left."""
         mean = sum(self.pitch_deg) / len(self.pitch_deg)
         return min(self.pitch_deg) / mean, max(self.pitch_deg) / mean
 
     @property
-    def off_centre(self) -> float:
+    def imbalance(self) -> float:
         """Distance of the middle of all edges from the axis over the radius of the tool; 0 is balanced."""
         edges = np.exp(1j * np.radians(np.cumsum(self.pitch_deg)))
         return round(float(abs(np.mean(edges))), 12)
@@ -60,7 +60,7 @@ def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
     """Patterns whose neighbouring pitches differ by up to a few half waves (deg, `half_wave_deg`).
 
     Pitches rise by equal steps over so many teeth as divide the number of all, two of them alternate, and begin anew.
-    Those beyond `MOST_UNEVEN` or `MOST_OFF_CENTRE` are left out. Raises ValueError for less than two teeth.
+    Those beyond `MAX_PITCH_DEVIATION` or `MAX_EDGE_IMBALANCE` are left out. Raises ValueError for less than two teeth.
 
     >>> patterns = list(pitch_patterns(4, half_wave_deg(6000.0, 1800.0)))
     >>> [(pattern.name, pattern.pitch_deg) for pattern in (patterns[5], patterns[-1])]  # degrees
@@ -68,17 +68,19 @@ def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
     """
     if teeth < 2:
         raise ValueError(f"teeth={teeth}: a cutter of one tooth has no pitch to divide; pitches need two teeth or more")
-    unit = COARSE if half_wave >= PER_HALF_WAVE * COARSE else FINE
-    wanted = half_wave * np.arange(1, PER_HALF_WAVE * HALF_WAVES + 1) / PER_HALF_WAVE
+    unit = (
+        COARSE_PITCH_STEP_DEG if half_wave >= PITCH_STEPS_PER_HALF_WAVE * COARSE_PITCH_STEP_DEG else FINE_PITCH_STEP_DEG
+    )
+    wanted = half_wave * np.arange(1, PITCH_STEPS_PER_HALF_WAVE * MAX_HALF_WAVES + 1) / PITCH_STEPS_PER_HALF_WAVE
     for block in (number for number in range(2, teeth + 1) if teeth % number == 0):
         for difference in np.unique(np.maximum(np.round(wanted / unit), 1)) * unit:
-            pattern = _pattern(teeth, block, float(difference))
-            low, high = pattern.chips
-            if max(1 - low, high - 1) <= MOST_UNEVEN + 1e-9 and pattern.off_centre <= MOST_OFF_CENTRE:
+            pattern = _block_pattern(teeth, block, float(difference))
+            low, high = pattern.feed_ratio_range
+            if max(1 - low, high - 1) <= MAX_PITCH_DEVIATION + 1e-9 and pattern.imbalance <= MAX_EDGE_IMBALANCE:
                 yield pattern
 
 
-def _pattern(teeth: int, block: int, difference: float) -> PitchPattern:
+def _block_pattern(teeth: int, block: int, difference: float) -> PitchPattern:
     steps = difference * (np.arange(block) - (block - 1) / 2)
     pitch = np.round(360 / teeth + np.tile(steps, teeth // block), 2)
     pitch[-1] = round(360 - float(np.sum(pitch[:-1])), 2)
@@ -95,11 +97,11 @@ def equal_pitch(teeth: int) -> PitchPattern:
     return PitchPattern((360 / teeth,) * teeth, "equal")
 
 
-def with_pattern(cut: Cut, pattern: PitchPattern) -> Cut:
+def with_pitch_pattern(cut: Cut, pattern: PitchPattern) -> Cut:
     """A cut by a cutter with these pitches.
 
     >>> side = Cut(teeth=4, immersion=0.25, direction="down", tangential=700e6, radial=200e6)
-    >>> uneven = with_pattern(side, PitchPattern((85.0, 95.0, 85.0, 95.0), "alternating"))
+    >>> uneven = with_pitch_pattern(side, PitchPattern((85.0, 95.0, 85.0, 95.0), "alternating"))
     >>> uneven.repeats, np.degrees(uneven.delays).round(6).tolist()  # times in a turn, degrees
     (2, [85.0, 95.0])
     """

@@ -1,4 +1,4 @@
-"""The pockets between the lobes: where to cut deep, and how they move."""
+"""Stable pockets between the lobes, and how they move."""
 
 from __future__ import annotations
 
@@ -8,10 +8,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.peaks import peaks
 from lobes.stability_lobes import StabilityLobes
 
-SHARE = 0.8
+
+def find_curve_peaks(values: NDArray[np.float64], prominence: float) -> NDArray[np.intp]:
+    """Places of the peaks of a curve (n,), n > 0, of at least this prominence; of a flat top the middle, rounded down.
+
+    The prominence of a peak is its height above the higher of the two lowest points between it and whatever is higher
+    on either side, or the end. The ends of the curve are no peaks.
+    """
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(values)) + 1))
+    ends = np.concatenate((starts[1:], [values.size])) - 1
+    height = values[starts]
+    tops = map(int, np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])) + 1)
+    kept = [
+        top for top in tops if height[top] - max(_peak_base(height, top, -1), _peak_base(height, top, 1)) >= prominence
+    ]
+    return np.asarray((starts[kept] + ends[kept]) // 2)
+
+
+def _peak_base(height: NDArray[np.float64], top: int, step: int) -> float:
+    """The lowest point on one side of a peak before something higher, or the end."""
+    side = height[top::step]
+    higher = np.flatnonzero(side > height[top])
+    return float(np.min(side[: higher[0]] if higher.size else side))
+
+
+POCKET_DEPTH_SHARE = 0.8
 """Between the ends of a pocket the limit is at least this share of its depth."""
 
 
@@ -31,34 +54,34 @@ class Pocket(NamedTuple):
 class PocketShift(NamedTuple):
     """A pocket then and now."""
 
-    then: Pocket
+    before: Pocket
     """Pocket as it was."""
-    now: Pocket
+    after: Pocket
     """Pocket as it is."""
 
     @property
     def speed_change(self) -> float:
         """Relative change of its speed."""
-        return self.now.speed_rpm / self.then.speed_rpm - 1
+        return self.after.speed_rpm / self.before.speed_rpm - 1
 
     @property
     def depth_change(self) -> float:
         """Relative change of its depth."""
-        return self.now.depth / self.then.depth - 1
+        return self.after.depth / self.before.depth - 1
 
 
-def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
+def find_pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
     """All pockets of a diagram in the order of speed, cut off at the deepest cut of interest (m), a number or (n,).
 
-    `deepest` is what the flutes or the drive (`lobes.deepest_for_drive`) allow. A pocket that the range of speeds cuts
+    `deepest` is what the flutes or the drive (`lobes.max_depth_for_drive`) allow. A pocket that the range of speeds cuts
     through counts with what is inside. Raises ValueError for a `deepest` that is not > 0.
 
     The fastest pocket is where the teeth come as often as the mode swings, at 60 f / N = 15000 rpm:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
-    >>> for pocket in pockets(lobes, deepest=5e-3)[1:]:  # the first is cut by the end of the speeds
+    >>> lobes = zero_order_lobes([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
+    >>> for pocket in find_pockets(lobes, deepest=5e-3)[1:]:  # the first is cut by the end of the speeds
     ...     print(f"{pocket.from_rpm:.0f} to {pocket.to_rpm:.0f} rpm: {pocket.depth * 1e3:.2f} mm")
     4841 to 5116 rpm: 5.00 mm
     7011 to 7860 rpm: 5.00 mm
@@ -70,13 +93,13 @@ def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
         raise ValueError(f"deepest={deepest!r} m is not finite and > 0; give the deepest cut of interest")
     speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
     padded = np.concatenate(([0.0], depth, [0.0]))
-    tops = peaks(padded, prominence=0.05 * depth.min()) - 1
-    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in tops]
+    tops = find_curve_peaks(padded, prominence=0.05 * depth.min()) - 1
+    return [Pocket(float(speed[i]), float(depth[i]), *_pocket_ends(speed, depth, i)) for i in tops]
 
 
-def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:
+def _pocket_ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:
     """The speeds on each side of a peak where the depth falls to SHARE of it, linear between the speeds given."""
-    level = SHARE * depth[peak]
+    level = POCKET_DEPTH_SHARE * depth[peak]
     low = np.flatnonzero(depth < level)
     before, after = low[low < peak], low[low > peak]
     slowest, fastest = speed[0], speed[-1]
@@ -89,13 +112,13 @@ def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> 
     return float(slowest), float(fastest)
 
 
-def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
+def rank_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
     """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth).
 
     Raises ValueError for any other `by`.
 
     >>> few = [Pocket(5000.0, 3e-3, 4900.0, 5100.0), Pocket(15000.0, 2e-3, 14500.0, 15500.0)]
-    >>> best_pockets(few, 1)[0].speed_rpm, best_pockets(few, 1, by="removal")[0].speed_rpm  # rpm
+    >>> rank_pockets(few, 1)[0].speed_rpm, rank_pockets(few, 1, by="removal")[0].speed_rpm  # rpm
     (5000.0, 15000.0)
     """
     if by not in ("depth", "removal"):
@@ -107,7 +130,7 @@ def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> 
     return sorted(found, key=worth, reverse=True)[:count]
 
 
-def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> list[PocketShift]:
+def match_pockets(then: StabilityLobes, now: StabilityLobes, deepest: float) -> list[PocketShift]:
     """The pockets of two diagrams of one cut that belong together: a pair is nearest to each other.
 
     Pocket k stands at about 60 f / (N k): all move by one ratio, which the median of the chatter frequencies tells.
@@ -115,14 +138,14 @@ def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
 
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> new, old = ([Mode(f, damping_ratio=0.02, stiffness=2e7)] for f in (500.0, 450.0))  # 10 % lower
-    >>> then, now = (zero_order(m, m, slot, np.linspace(4000.0, 18000.0, 701)) for m in (new, old))
-    >>> [round(shift.speed_change, 2) for shift in pocket_shifts(then, now, deepest=5e-3)]
+    >>> then, now = (zero_order_lobes(m, m, slot, np.linspace(4000.0, 18000.0, 701)) for m in (new, old))
+    >>> [round(shift.speed_change, 2) for shift in match_pockets(then, now, deepest=5e-3)]
     [-0.1, -0.1, -0.1]
     """
-    before, after = _inside(then, deepest), _inside(now, deepest)
+    before, after = _pockets_inside(then, deepest), _pockets_inside(now, deepest)
     if not before or not after:
         return []
-    ratio = _median_chatter(now) / _median_chatter(then)
+    ratio = _median_chatter_frequency(now) / _median_chatter_frequency(then)
     speeds: NDArray[np.float64] = np.log([pocket.speed_rpm for pocket in after])
     shifts = []
     for pocket in before:
@@ -134,11 +157,11 @@ def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
     return shifts
 
 
-def _inside(lobes: StabilityLobes, deepest: float) -> list[Pocket]:
+def _pockets_inside(lobes: StabilityLobes, deepest: float) -> list[Pocket]:
     ends = (np.min(lobes.speed_rpm), np.max(lobes.speed_rpm))
-    return [pocket for pocket in pockets(lobes, deepest) if pocket.speed_rpm not in ends]
+    return [pocket for pocket in find_pockets(lobes, deepest) if pocket.speed_rpm not in ends]
 
 
-def _median_chatter(lobes: StabilityLobes) -> float:
+def _median_chatter_frequency(lobes: StabilityLobes) -> float:
     frequency = lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)]
     return float(np.median(frequency)) if frequency.size else 1.0

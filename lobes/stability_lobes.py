@@ -1,16 +1,29 @@
-"""The result of every stability method."""
+"""Result of every stability method: limits over speed and over radial depth."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition import Remark
-from lobes.speeds import check_speeds
+from lobes.cut import Cut
+
+
+def check_speeds(speed_rpm: ArrayLike) -> NDArray[np.float64]:
+    """Spindle speeds (rpm) as a 1-D array; ValueError unless there is one at least and all are finite and > 0."""
+    speed = np.atleast_1d(np.asarray(speed_rpm, dtype=np.float64))
+    if speed.ndim != 1 or speed.size == 0:
+        raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
+    bad = np.flatnonzero(~(np.isfinite(speed) & (speed > 0)))
+    if bad.size:
+        raise ValueError(f"speed_rpm[{bad[0]}]={speed[bad[0]]} is not a finite speed > 0 rpm; leave such speeds out")
+    return speed
+
 
 MethodName = Literal["average angle", "zero order", "semi-discretisation"]
 """How stability limits are found."""
@@ -30,7 +43,7 @@ class Lobe:
     """Chatter frequency (Hz), shape (p,)."""
 
 
-class Minimum(NamedTuple):
+class LobeMinimum(NamedTuple):
     """The lowest point of a stability chart."""
 
     depth: float
@@ -49,7 +62,7 @@ class StabilityLobes:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
+    >>> lobes = zero_order_lobes([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
     >>> (lobes.depth_at([9000.0, 15000.0]) * 1e3).round(3).tolist()  # mm
     [1.278, 18.766]
     >>> lobes.is_stable([9000.0, 15000.0], 0.5e-3).tolist()
@@ -100,15 +113,15 @@ class StabilityLobes:
         return tuple(self.curves())
 
     @property
-    def stated_method(self) -> str:
+    def method_text(self) -> str:
         """The method with its detail, for people."""
         return ", ".join(filter(None, (self.method, self.detail)))
 
     @property
-    def minimum(self) -> Minimum:
+    def minimum(self) -> LobeMinimum:
         """The lowest limit among the speeds of this chart; the first of them where none has a limit."""
         i = int(np.argmin(self.depth))
-        return Minimum(float(self.depth[i]), float(self.speed_rpm[i]), float(self.chatter_frequency[i]))
+        return LobeMinimum(float(self.depth[i]), float(self.speed_rpm[i]), float(self.chatter_frequency[i]))
 
     def depth_at(self, speed_rpm: ArrayLike) -> NDArray[np.float64]:
         """Limiting depth at one or several speeds inside the range (m), shape of speed_rpm.
@@ -139,3 +152,79 @@ class StabilityLobes:
         if not np.all(wanted >= 0):
             raise ValueError(f"depth={wanted} m is not >= 0; give the axial depth of cut in metres")
         return np.asarray(wanted < self.depth_at(speed_rpm))
+
+
+def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
+    """At each speed the limit, frequency and kind of the lowest, such as of the directions of feed of one cut.
+
+    All by one method at the same speeds. The lobes and remarks of all are kept, each remark once.
+
+    >>> x, y = Mode(500.0, 0.02, 2e7), Mode(700.0, 0.02, 2e7)
+    >>> along_x = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)
+    >>> speeds = [9000.0, 12000.0, 15000.0]
+    >>> fed = [zero_order_lobes([x], [y], along_x, speeds), zero_order_lobes([y], [x], along_x, speeds)]
+    >>> [(lobes.depth * 1e3).round(2).tolist() for lobes in (*fed, lower_envelope(fed))]  # mm
+    [[4.3, 12.54, 8.37], [18.35, 5.59, 22.18], [4.3, 5.59, 8.37]]
+    """
+    first = diagrams[0]
+    lowest, speed = np.argmin([diagram.depth for diagram in diagrams], axis=0), np.arange(first.speed_rpm.size)
+    width = max(diagram.crossings.shape[1] for diagram in diagrams)
+    crossings = [
+        np.pad(diagram.crossings, ((0, 0), (0, width - diagram.crossings.shape[1])), constant_values=np.inf)
+        for diagram in diagrams
+    ]
+    return replace(
+        first,
+        depth=np.stack([diagram.depth for diagram in diagrams])[lowest, speed],
+        chatter_frequency=np.stack([diagram.chatter_frequency for diagram in diagrams])[lowest, speed],
+        kind=np.stack([diagram.kind for diagram in diagrams])[lowest, speed],
+        crossings=np.stack(crossings)[lowest, speed],
+        curves=partial(_envelope_lobes, diagrams),
+        remarks=tuple(dict.fromkeys(remark for diagram in diagrams for remark in diagram.remarks)),
+    )
+
+
+def _envelope_lobes(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
+    return [lobe for diagram in diagrams for lobe in diagram.lobes]
+
+
+@dataclass(frozen=True, eq=False)
+class RadialLobes:
+    """Limiting axial depth over spindle speed and radial depth."""
+
+    speed_rpm: NDArray[np.float64]
+    """Spindle speeds (rpm), shape (n,)."""
+    immersion: NDArray[np.float64]
+    """Radial depths over cutter diameter, shape (r,)."""
+    depth: NDArray[np.float64]
+    """Limiting depths (m), shape (r, n); inf where there is no limit."""
+    method: MethodName
+    """Method that the limits were found by."""
+    remarks: tuple[Remark, ...]
+    """Remarks on what is wrong with the method at the smallest immersion."""
+
+
+def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:
+    """The limits of a cut at other immersions (r,), each in (0, 1], by any method with its other arguments set:
+
+        radial_lobes(lambda cut: stability_boundary(x, y, cut, speeds, 0.02), cut, np.linspace(0.05, 1, 20))
+
+    Raises ValueError for immersions that are none.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> compute_lobe_chart = radial_lobes(lambda cut: zero_order_lobes([mode], [mode], cut, [9000.0]), slot, [0.25, 0.5, 1.0])
+    >>> (compute_lobe_chart.depth * 1e3).round(2).tolist()  # mm, by radial depth
+    [[6.76], [3.29], [1.28]]
+    """
+    shares = np.atleast_1d(np.asarray(immersion, dtype=np.float64))
+    if shares.ndim != 1 or shares.size == 0:
+        raise ValueError(f"immersion has shape {shares.shape}; a 1-D array of at least one value in (0, 1] is needed")
+    charts = [limits(replace(cut, immersion=float(share))) for share in shares]
+    return RadialLobes(
+        speed_rpm=charts[0].speed_rpm,
+        immersion=shares,
+        depth=np.stack([chart.depth for chart in charts]),
+        method=charts[0].method,
+        remarks=charts[int(np.argmin(shares))].remarks,
+    )

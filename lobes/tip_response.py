@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from modal import Mode
 
-Tip = Frf | Sequence[Mode]
+TipData = Frf | Sequence[Mode]
 """What is known of the tool tip in one direction: its measured FRF, or its modes."""
 
-MODE_STEP = 0.02
+GRID_STEP_HALF_WIDTHS = 0.02
 """Spacing of the grid: in half-power half-widths near a mode, relative to the distance from it further away."""
-FAR = 100
+MAX_MODE_FREQUENCY_RATIO = 100
 """Modes are followed up to this many times the highest natural frequency of both directions ..."""
-FAR_TEETH = 2
+MAX_TOOTH_FREQUENCY_RATIO = 2
 """... and this many tooth frequencies: with in-phase modes, the deciding crossing comes within the first two."""
-STEPS_PER_LINE = 4
+GRID_STEPS_PER_LINE = 4
 """Grid points from one line of an FRF to the next."""
 
 
@@ -33,13 +33,13 @@ class TipResponse:
     """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
     receptance: Callable[[NDArray[np.float64]], NDArray[np.complex128]]
     """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
-    known: NDArray[np.complex128] | None = None
+    measured: NDArray[np.complex128] | None = None
     """Receptance on the grid (m/N), shape (p,), where it has been computed already."""
 
     @property
     def on_grid(self) -> NDArray[np.complex128]:
         """Receptance on the grid (m/N), shape (p,)."""
-        return self.receptance(self.grid) if self.known is None else self.known
+        return self.receptance(self.grid) if self.measured is None else self.measured
 
 
 def check_modes(modes: Sequence[Mode], direction: str) -> None:
@@ -54,7 +54,7 @@ def check_modes(modes: Sequence[Mode], direction: str) -> None:
             )
 
 
-def tip_responses(x: Tip | None, y: Tip | None, tooth_frequency: float) -> list[tuple[int, TipResponse]]:
+def tip_responses(x: TipData | None, y: TipData | None, tooth_frequency: float) -> list[tuple[int, TipResponse]]:
     """Axis (0 for x, 1 for y) and receptance of each direction that is not None, for tooth frequencies (Hz) up to one.
 
     Modes are known up to one frequency in both directions, an FRF inside its usable band, between its lines by a cubic
@@ -68,14 +68,14 @@ def tip_responses(x: Tip | None, y: Tip | None, tooth_frequency: float) -> list[
     for _, name, tip in given:
         if not isinstance(tip, Frf):
             check_modes(tip, name)
-    highest = max(_highest(tip) for _, _, tip in given) + FAR_TEETH * tooth_frequency
+    highest = max(_highest_frequency(tip) for _, _, tip in given) + MAX_TOOTH_FREQUENCY_RATIO * tooth_frequency
     return [
         (axis, _from_frf(tip.in_band(tip.usable_band)) if isinstance(tip, Frf) else _from_modes(tip, highest))
         for axis, _, tip in given
     ]
 
 
-def cross_response(cross: Tip, highest: float) -> TipResponse:
+def cross_response(cross: TipData, highest: float) -> TipResponse:
     """Receptance from a force in x to a displacement in y: modes are known up to a frequency (Hz), an FRF in its band.
 
     Modes have the sign of what they show; ValueError for an empty list.
@@ -117,19 +117,23 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
 def _from_frf(frf: Frf) -> TipResponse:
 
     lines = np.arange(frf.frequency.size)
-    steps = np.arange(lines[-1] * STEPS_PER_LINE + 1) / STEPS_PER_LINE
+    steps = np.arange(lines[-1] * GRID_STEPS_PER_LINE + 1) / GRID_STEPS_PER_LINE
     return TipResponse(
         np.interp(steps, lines, frf.frequency), scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
     )
 
 
-def _highest(tip: Tip) -> float:
+def _highest_frequency(tip: TipData) -> float:
     """Frequency (Hz) above which a direction has nothing to say."""
-    return float(tip.frequency[-1]) if isinstance(tip, Frf) else FAR * max(mode.frequency for mode in tip)
+    return (
+        float(tip.frequency[-1])
+        if isinstance(tip, Frf)
+        else MAX_MODE_FREQUENCY_RATIO * max(mode.frequency for mode in tip)
+    )
 
 
 def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
-    grid = np.unique(np.concatenate([[0.0, highest], *(_around(mode, highest) for mode in modes)]))
+    grid = np.unique(np.concatenate([[0.0, highest], *(_grid_near_mode(mode, highest) for mode in modes)]))
 
     def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         total = np.zeros(np.shape(frequency), dtype=np.complex128)
@@ -140,9 +144,9 @@ def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
     return TipResponse(grid, receptance)
 
 
-def _around(mode: Mode, highest: float) -> NDArray[np.float64]:
+def _grid_near_mode(mode: Mode, highest: float) -> NDArray[np.float64]:
     """Frequencies up to `highest` (Hz), dense at the mode."""
     width = mode.damping_ratio * mode.frequency
-    distance = width * np.sinh(np.arange(0.0, np.arcsinh(highest / width), MODE_STEP))
+    distance = width * np.sinh(np.arange(0.0, np.arcsinh(highest / width), GRID_STEP_HALF_WIDTHS))
     around = mode.frequency + np.concatenate((-distance[::-1], distance))
     return around[(around > 0) & (around < highest)]

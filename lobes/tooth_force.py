@@ -17,7 +17,7 @@ def mean_force(cut: Cut) -> Floats:
 
     A helix does not change it.
     """
-    return cut.teeth / (2 * np.pi) * _in_machine(cut, _once(cut, np.array(cut.exit_angle)))
+    return cut.teeth / (2 * np.pi) * _to_machine_axes(cut, _tooth_integral(cut, np.array(cut.exit_angle)))
 
 
 @lru_cache(maxsize=64)
@@ -27,16 +27,16 @@ def interval_forces(cut: Cut, intervals: int) -> Floats:
     Of the teeth of each delay of the cut apart; the pattern is one tooth period of even teeth. Returns Pa, shape
     (delays, intervals, 2, 2).
     """
-    step = sum(cut.pattern) / intervals
-    edges = cut.ahead[:, np.newaxis] + step * np.arange(intervals + 1)
-    forces = _in_machine(cut, _by_delay(cut, np.diff(_once(cut, edges), axis=1))) / step
+    step = sum(cut.pitch_pattern) / intervals
+    edges = cut.lead_angles[:, np.newaxis] + step * np.arange(intervals + 1)
+    forces = _to_machine_axes(cut, _sum_by_delay(cut, np.diff(_tooth_integral(cut, edges), axis=1))) / step
     forces.flags.writeable = False
     return np.asarray(forces)
 
 
 def mean_regeneration(cut: Cut, waves: Floats) -> NDArray[np.complex128]:
     """1 - exp(-i w tau) in the mean of all teeth, for waves in the mean tooth period (...)."""
-    delays = np.array(cut.pattern) / (2 * np.pi / cut.teeth)
+    delays = np.array(cut.pitch_pattern) / (2 * np.pi / cut.teeth)
     return np.asarray(np.mean([1 - np.exp(-2j * np.pi * waves * delay) for delay in delays], axis=0))
 
 
@@ -48,61 +48,63 @@ def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
     (delays, ..., s, 2, 2, 2), the coefficient before the matrix. Not to be asked for at an angle where a tooth enters
     or leaves.
     """
-    tooth = cut.entry_angle + angle + cut.ahead.reshape(-1, *np.ones(angle.ndim, dtype=int))
+    tooth = cut.entry_angle + angle + cut.lead_angles.reshape(-1, *np.ones(angle.ndim, dtype=int))
     if cut.helix_lag == 0:
         inside = (np.mod(tooth, 2 * np.pi) > cut.entry_angle) & (np.mod(tooth, 2 * np.pi) < cut.exit_angle)
         cuts = inside.astype(np.float64)
-        shares = _shares(cuts, cuts * np.sin(2 * tooth), cuts * np.cos(2 * tooth))
+        shares = _force_terms(cuts, cuts * np.sin(2 * tooth), cuts * np.cos(2 * tooth))
     else:
         lag = cut.helix_lag * np.broadcast_to(depth[..., np.newaxis], tooth.shape)
         lag = np.maximum(lag, 1e-9)
-        shares = (_once(cut, tooth) - _once(cut, tooth - lag)) / _expanded(lag)
-    return _by_delay(cut, shares)
+        shares = (_tooth_integral(cut, tooth) - _tooth_integral(cut, tooth - lag)) / _append_axes(lag)
+    return _sum_by_delay(cut, shares)
 
 
-def turned(matrix: Floats, feed_angle: Floats) -> Floats:
+def rotate_to_machine(matrix: Floats, feed_angle: Floats) -> Floats:
     """Matrices in the frame of the feed (..., 2, 2) as machine axes x and y see them; feed_angle (rad) broadcasts."""
-    turn = turns(feed_angle)
+    turn = feed_rotation(feed_angle)
     return np.asarray(np.swapaxes(turn, -1, -2) @ matrix @ turn)
 
 
-def turns(feed_angle: Floats) -> Floats:
+def feed_rotation(feed_angle: Floats) -> Floats:
     """From displacements along machine axes x and y to those in the frame of the feed, shape (..., 2, 2)."""
     c, s = np.cos(feed_angle), np.sin(feed_angle)
     return np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=-2)
 
 
-def _in_machine(cut: Cut, shares: Floats) -> Floats:
+def _to_machine_axes(cut: Cut, shares: Floats) -> Floats:
     """The matrix of a cut (Pa) from the shares of its two coefficients."""
-    return turned(cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle))
+    return rotate_to_machine(
+        cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle)
+    )
 
 
-def _by_delay(cut: Cut, shares: Floats) -> Floats:
+def _sum_by_delay(cut: Cut, shares: Floats) -> Floats:
     """What each tooth does (teeth, ...) summed over those of one delay, shape (delays, ...)."""
     if not cut.pitch:
         return np.asarray(shares.sum(axis=0, keepdims=True))
     return np.stack([shares[np.array(cut.pitch) == delay].sum(axis=0) for delay in cut.delays])
 
 
-def _once(cut: Cut, angle: Floats) -> Floats:
+def _tooth_integral(cut: Cut, angle: Floats) -> Floats:
     """Integral of H of one tooth from angle 0 for both coefficients, shape (..., 2, 2, 2)."""
     turns, remainder = np.divmod(angle, 2 * np.pi)
     inside = np.clip(remainder, cut.entry_angle, cut.exit_angle)
-    start, end = _integral(np.array(cut.entry_angle)), _integral(np.array(cut.exit_angle))
-    return _integral(inside) - start + _expanded(turns) * (end - start)
+    start, end = _full_turn_integral(np.array(cut.entry_angle)), _full_turn_integral(np.array(cut.exit_angle))
+    return _full_turn_integral(inside) - start + _append_axes(turns) * (end - start)
 
 
-def _integral(angle: Floats) -> Floats:
+def _full_turn_integral(angle: Floats) -> Floats:
     """Integral of H from 0 at any angle, as if it were always in the cut."""
-    return _shares(angle, -np.cos(2 * angle) / 2, np.sin(2 * angle) / 2)
+    return _force_terms(angle, -np.cos(2 * angle) / 2, np.sin(2 * angle) / 2)
 
 
-def _shares(one: Floats, sine: Floats, cosine: Floats) -> Floats:
+def _force_terms(one: Floats, sine: Floats, cosine: Floats) -> Floats:
     """H from what stands for 1, sin 2 phi and cos 2 phi: s^2 = (1 - cos 2 phi) / 2, c^2 = (1 + cos 2 phi) / 2."""
     tangential = [[sine, one + cosine], [-(one - cosine), -sine]]
     radial = [[one - cosine, sine], [sine, one + cosine]]
     return np.moveaxis(np.array([tangential, radial]), (0, 1, 2), (-3, -2, -1)) / 2
 
 
-def _expanded(values: Floats) -> Floats:
+def _append_axes(values: Floats) -> Floats:
     return np.asarray(values)[..., np.newaxis, np.newaxis, np.newaxis]

@@ -1,4 +1,4 @@
-"""Stability lobes by the zero-order approximation."""
+"""Stability lobes by the zero-order approximation and by the average tooth angle."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquisition import Remark
 from lobes.cut import Cut
-from lobes.loop_limits import INSTEAD, loop_limits
-from lobes.speeds import check_speeds
-from lobes.stability_lobes import StabilityLobes
-from lobes.tip_response import Tip, TipResponse, common_grid, cross_response, tip_responses, weighted_sum
+from lobes.loop_limits import MEAN_FORCE_REMEDY, loop_limits
+from lobes.stability_lobes import StabilityLobes, check_speeds
+from lobes.tip_response import TipData, TipResponse, common_grid, cross_response, tip_responses, weighted_sum
 from lobes.tooth_force import interval_forces, mean_force
 
-CANCELS = 0.7
+MIN_NET_FORCE_RATIO = 0.7
 """Mean force of one direction over the mean of its magnitude, below which zero order is no picture of it."""
-SAMPLES = 400
+CANCELLATION_SAMPLES = 400
 """Intervals of a tooth period that they are taken over."""
 
 
-def zero_order(
-    x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike, cross: Tip | None = None
+def zero_order_lobes(
+    x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: ArrayLike, cross: TipData | None = None
 ) -> StabilityLobes:
     """Limiting depth at each speed (rpm) for the force matrix averaged over a turn of the cutter.
 
@@ -38,7 +37,7 @@ def zero_order(
 
     cross is what is hit in x and seen in y: its FRF, or modes whose stiffness has the sign of theirs (`cross_modes`).
     None: x and y do not move each other. From FRFs only chatter inside their common usable band is seen; each may have
-    its own lines. A depth of inf means no chatter there. Raises ValueError as `average_angle` does, and for a cross FRF
+    its own lines. A depth of inf means no chatter there. Raises ValueError as `average_angle_lobes` does, and for a cross FRF
     without both directions.
     Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
 
@@ -46,7 +45,7 @@ def zero_order(
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 16000.0, 1001))
+    >>> lobes = zero_order_lobes([mode], [mode], slot, np.linspace(4000.0, 16000.0, 1001))
     >>> lowest = lobes.minimum
     >>> f"{lowest.depth * 1e3:.3f} mm at {lowest.chatter_frequency:.0f} Hz"
     '1.123 mm at 501 Hz'
@@ -62,27 +61,27 @@ def zero_order(
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
-        return replace(lobes, remarks=(*_cancelling(cut, axis), *lobes.remarks))
+        return replace(lobes, remarks=(*_cancellation_remarks(cut, axis), *lobes.remarks))
     responses = [tip for _, tip in tips]
     if cross is not None:
         responses.append(cross_response(cross, float(responses[0].grid[-1])))
-    return loop_limits(_eigenvalues(force, *responses), cut, speed, "zero order")
+    return loop_limits(_loop_eigenvalues(force, *responses), cut, speed, "zero order")
 
 
-def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
+def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
     """Whether most of the force in the one direction that is known cancels over a turn."""
-    forces = interval_forces(cut, SAMPLES).sum(axis=0)[:, axis, axis]
+    forces = interval_forces(cut, CANCELLATION_SAMPLES).sum(axis=0)[:, axis, axis]
     share = abs(np.mean(forces)) / np.mean(np.abs(forces))
-    if share >= CANCELS:
+    if share >= MIN_NET_FORCE_RATIO:
         return ()
     text = (
         f"zero order knows the mean force alone, and {100 * (1 - share):.0f} % of the force in {'xy'[axis]}, the one "
         "direction known, cancels over a turn: the true limit can be far lower"
     )
-    return (Remark("force-cancels", "", text, INSTEAD),)
+    return (Remark("force-cancels", "", text, MEAN_FORCE_REMEDY),)
 
 
-def _eigenvalues(
+def _loop_eigenvalues(
     force: NDArray[np.float64], x: TipResponse, y: TipResponse, cross: TipResponse | None = None
 ) -> list[TipResponse]:
     """Both eigenvalues L = t +- sqrt(t^2 - det) of H0 G, t = trace / 2, each followed continuously over frequency."""
@@ -112,3 +111,41 @@ def _eigenvalues(
         return TipResponse(grid, value, half_trace + side * root)
 
     return [branch(1.0), branch(-1.0)]
+
+
+def average_angle_lobes(x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: ArrayLike) -> StabilityLobes:
+    """Limiting depth at each speed (rpm) for the tooth frozen at its average angle.
+
+    x is the feed, y the normal to it; None stands for a direction that is rigid or not known. With
+    G_or = mu_x Gx + mu_y Gy (`Cut.orientation_factors`) the cut is at its limit where chatter at frequency f_c > 0
+    sustains itself,
+
+        Ks Nt* b G_or (1 - exp(-2 pi i f_c / f_t)) = -1,     tooth frequency f_t = N speed / 60:
+
+    b = -1 / (2 Ks Nt* Re G_or) where Re G_or < 0, and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ...,
+    eps / 2 = atan2(-Re G_or, Im G_or). The limit is the lowest b over all lobes j; `crossings` holds it alone.
+    A mean force knows no flip lobes: at low immersion (below 0.25) the true limit can be lower.
+
+    From FRFs only chatter inside their common usable band is seen: cut them with `Frf.in_band` to what is to be
+    trusted; x and y may have different lines (see `lobes.tip_response`). A depth of inf means no chatter there.
+
+    Raises ValueError for speeds not > 0, two rigid directions, an empty list of modes, modes of negative stiffness,
+    and FRFs without a common band.
+    Source: Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
+
+    Of one mode in the feed the limit at the worst speed is 2 K zeta (1 + zeta) / (Ks mu_x Nt*):
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> half = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = average_angle_lobes([mode], None, half, np.linspace(4000.0, 16000.0, 4001))
+    >>> round(float(lobes.depth.min()) * 1e3, 3)  # mm
+    3.627
+    >>> factor = half.specific_force * half.orientation_factors[0] * half.teeth_in_cut
+    >>> round(2 * 2e7 * 0.02 * (1 + 0.02) / factor * 1e3, 3)
+    3.627
+    """
+    speed = check_speeds(speed_rpm)
+    tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)
+    force = cut.specific_force * cut.teeth_in_cut
+    loop = weighted_sum([(force * cut.orientation_factors[axis], tip) for axis, tip in tips])
+    return loop_limits([loop], cut, speed, "average angle")

@@ -16,13 +16,13 @@ from typing import Annotated, Any, cast
 import typer
 
 from lobewatch.commands import COMMANDS, GROUPS
-from lobewatch.commands.help_page import HelpCommand, HelpGroup, page_width
+from lobewatch.commands.help_page import HelpCommand, HelpGroup, get_page_width
 
-OBJECTS = 100_000
+GC_THRESHOLD = 100_000
 """Objects made between two searches for unreachable ones; imports make 200 000, nearly all of which stay."""
 
 
-class _Commands(Mapping[str, Any]):
+class _LazyCommands(Mapping[str, Any]):
     """The commands by name; a look at one imports it."""
 
     def __getitem__(self, name: str) -> Any:
@@ -45,12 +45,12 @@ class _Commands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-class _Root(HelpGroup):
+class _RootGroup(HelpGroup):
     """All commands, none of them imported before it is needed."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = cast(MutableMapping[str, Any], _Commands())
+        self.commands = cast(MutableMapping[str, Any], _LazyCommands())
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read these options where no command comes first: what reads them takes a while to import."""
@@ -67,7 +67,7 @@ class _Root(HelpGroup):
 
 
 app = typer.Typer(
-    cls=_Root,
+    cls=_RootGroup,
     help="Tap test in, stability lobes out: which cuts stop being safe as a spindle ages.",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -76,7 +76,7 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
@@ -85,10 +85,10 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def _options(
+def _root_options(
     _debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
     _show_version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
     pass
@@ -96,7 +96,7 @@ def _options(
 
 def main() -> None:
     """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C or ended."""
-    gc.set_threshold(OBJECTS)
+    gc.set_threshold(GC_THRESHOLD)
     atexit.register(gc.freeze)  # what is left goes with the process, searched or not
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service is ended as by Ctrl-C
@@ -104,7 +104,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead
     try:
-        app(terminal_width=page_width())
+        app(terminal_width=get_page_width())
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -113,10 +113,10 @@ def main() -> None:
             raise
         from rich.markup import escape
 
-        from acquisition.errors import failure_text
+        from acquisition.errors import format_error
         from lobewatch.show.terminal.output import notes
 
-        notes.print("[bold red]error:[/]", escape(failure_text(error)))
+        notes.print("[bold red]error:[/]", escape(format_error(error)))
         sys.exit(2)
 
 

@@ -1,74 +1,69 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
-from .bands.extract import extract
-from .bands.extraction import Extraction, FittedBand
+from .bands.extract_modes import extract_modes
+from .bands.extraction import Extraction, FittedBand, candidate_frequencies, stabilisation_charts
 from .bands.find_resonances import ConjugateError
-from .bands.survey import candidates, survey
-from .cut_edges import cut_edges
 from .edit_modes import edit_modes
-from .fit_modes import fit_modes, modes_of
-from .fit_points import fit_points
-from .free_decays import decay_spectra, fit_decays, modes_of_decays
-from .mass_loading import MassLoading, mass_loading, with_mass_doubt
-from .mode_indicator import mode_indicator
-from .modes.common_decay import common_decay
-from .modes.common_delay import CommonDelay, common_delay
-from .modes.follow import Followed, follow
-from .modes.found_again import found_again
-from .modes.mac import mac
-from .modes.mode import Mode
-from .modes.mode_edits import ModeEdits, parse_edits
-from .modes.predominant import predominant
-from .modes.synthesize import synthesize
-from .pick_peaks import pick_peaks
-from .poles import PhysicalPoles, StabilisationChart, physical_poles, stabilise
-from .quality.peaks_beyond import peaks_beyond
-from .quality.plausible import Believed, believed
-from .quality.trust import Trust, trust_of, trust_rules
-from .remove_window import remove_window, with_windowed_noise
+from .fit_modes import decay_spectra, fit_common_modes, fit_decays, fit_modes, modes_from_decays, modes_from_extraction
+from .frf_peaks import find_peaks_above_band, find_truncated_peaks, mode_indicator, pick_peaks
+from .modes.match_modes import FollowedMode, follow_mode, mac, match_modes, predominant_mode
+from .modes.measurement_effects import (
+    CommonDelay,
+    MassLoading,
+    common_decay_rate,
+    common_delay,
+    mass_loading,
+    remove_window,
+    widen_for_window,
+    with_mass_uncertainty,
+)
+from .modes.mode import Mode, synthesize_frf
+from .modes.mode_edits import ModeEdits, parse_mode_edits
+from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
+from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
 
 __all__ = [
-    "Believed",
     "CommonDelay",
     "ConjugateError",
+    "CredibleModes",
     "Extraction",
     "FittedBand",
-    "Followed",
+    "FollowedMode",
     "MassLoading",
     "Mode",
     "ModeEdits",
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",
-    "believed",
-    "candidates",
-    "common_decay",
+    "assess_trust",
+    "candidate_frequencies",
+    "common_decay_rate",
     "common_delay",
-    "cut_edges",
     "decay_spectra",
     "edit_modes",
-    "extract",
+    "extract_modes",
+    "find_peaks_above_band",
+    "find_truncated_peaks",
+    "fit_common_modes",
     "fit_decays",
+    "fit_lscf_poles",
     "fit_modes",
-    "fit_points",
-    "follow",
-    "found_again",
+    "follow_mode",
     "mac",
     "mass_loading",
+    "match_modes",
     "mode_indicator",
-    "modes_of",
-    "modes_of_decays",
-    "parse_edits",
-    "peaks_beyond",
-    "physical_poles",
+    "modes_from_decays",
+    "modes_from_extraction",
+    "parse_mode_edits",
     "pick_peaks",
-    "predominant",
+    "predominant_mode",
     "remove_window",
-    "stabilise",
-    "survey",
-    "synthesize",
-    "trust_of",
+    "select_credible_modes",
+    "select_physical_poles",
+    "stabilisation_charts",
+    "synthesize_frf",
     "trust_rules",
-    "with_mass_doubt",
-    "with_windowed_noise",
+    "widen_for_window",
+    "with_mass_uncertainty",
 ]

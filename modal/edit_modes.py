@@ -6,27 +6,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modal.bands.extraction import HELD, Array, Extraction, FittedBand
+from modal.bands.extract_modes import limit_to_one_thread
+from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand, Floats
 from modal.bands.find_resonances import Resonance
-from modal.bands.fit_peaks import LARGEST_ERROR, are_modes, fit_real
-from modal.bands.local_bands import local_bands
-from modal.bands.one_thread import one_thread
-from modal.bands.settle import settle
-from modal.fitting import LEAST_TERMS, fit_band
+from modal.bands.fit_peaks import (
+    MAX_PEAK_FIT_ERROR,
+    are_modes,
+    group_into_bands,
+    iterate_bands,
+    refit_with_real_constants,
+)
+from modal.fitting import MIN_RESIDUAL_TERMS, fit_band
 from modal.modes.mode_edits import ModeEdits
-from modal.poles import physical_poles
+from modal.poles import select_physical_poles
 
-NEAR = 0.01
+EDITED_MODE_DISTANCE = 0.01
 """Relative distance up to which a mode is the one that is meant; chosen."""
-SAME = 0.25
+SAME_MODE_HALF_WIDTHS = 0.25
 """Half-power half-widths up to which a mode is there already; chosen."""
-DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03)
+TRIAL_DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03)
 """Damping ratios that an added mode is begun with, beside that of an LSCF pole near it."""
-FARTHEST = 0.05
+MAX_ADDED_MODE_SHIFT = 0.05
 """Relative distance from where it was looked for that an added mode has at most, within its half-width; chosen."""
-USUAL = 0.02
+LONE_MODE_DAMPING = 0.02
 """Damping ratio that the band of a mode that stands alone is laid for."""
-ADDED = "added"
+ADDED_MODE = "added"
 """Word for a mode that a person added."""
 
 
@@ -37,82 +41,84 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
     frequency outside the lines, one without a mode within 1 % to leave out, one near which no further mode fits, and
     one where nothing of a held damping is to be seen.
 
-    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
-    >>> edited = edit_modes(extract([frf]), ModeEdits(drop=(900.0,)))
+    >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
+    >>> edited = edit_modes(extract_modes([frf]), ModeEdits(drop=(900.0,)))
     >>> [round(mode.frequency, 1) for mode in modes_of(edited)]  # Hz
     [500.0]
     """
     if not edits:
         return state
-    with one_thread():
+    with limit_to_one_thread():
         edited = state
         for frequency in edits.drop:
-            edited = _without(edited, frequency)
+            edited = _drop_mode(edited, frequency)
         for frequency in edits.add:
-            edited = _with_more(edited, frequency)
+            edited = _add_mode(edited, frequency)
         for frequency, zeta in edits.fix:
-            edited = _with_held(edited, frequency, zeta)
-        settled = settle(edited)
-        return replace(settled, bands=tuple(b if b in state.bands else fit_real(b) for b in settled.bands))
+            edited = _fix_mode(edited, frequency, zeta)
+        settled = iterate_bands(edited)
+        return replace(
+            settled, bands=tuple(b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class _Plan:
+class _EditPlan:
     """Modes that are to be fitted together."""
 
     band: FittedBand | None
     """Band that they take the place of."""
     lines: slice
-    poles: Array
+    poles: Floats
     """Where the fit begins, (2, m)."""
     words: tuple[str, ...]
     """What a person said of each."""
 
-    def without(self, i: int) -> _Plan:
+    def without(self, i: int) -> _EditPlan:
         words = tuple(np.delete(np.array(self.words, dtype=object), i))
         return replace(self, poles=np.delete(self.poles, i, axis=1), words=words)
 
-    def with_mode(self, frequency: float, zeta: float, word: str) -> _Plan:
+    def with_mode(self, frequency: float, zeta: float, word: str) -> _EditPlan:
         return replace(self, poles=np.column_stack([self.poles, [frequency, zeta]]), words=(*self.words, word))
 
     def fitted(self, state: Extraction) -> FittedBand | None:
         """The band of these modes; None where nothing fits."""
         data = state.data(self.lines, without=self.band)
-        terms = LEAST_TERMS if self.band is None else self.band.terms
-        held = np.array([word == HELD for word in self.words])
-        fit = fit_band(data.frequency, data.own, data.weight, self.poles, terms, held)
+        terms = MIN_RESIDUAL_TERMS if self.band is None else self.band.terms
+        held = np.array([word == FIXED_MODE for word in self.words])
+        fit = fit_band(data.frequency, data.target, data.weight, self.poles, terms, held)
         if fit is None:
             return None
         resonances = () if self.band is None else self.band.resonances
-        return FittedBand(data, resonances, np.zeros(held.size), fit, terms, by_hand=self.words)
+        return FittedBand(data, resonances, np.zeros(held.size), fit, terms, edits=self.words)
 
 
-def _without(state: Extraction, frequency: float) -> Extraction:
+def _drop_mode(state: Extraction, frequency: float) -> Extraction:
     said = f"drop {frequency:g} Hz"
-    place = _mode_at(state, frequency)
+    place = _find_mode(state, frequency)
     if place is None:
         modes = ", ".join(f"{mode:.0f}" for band in state.bands for mode in band.fit.frequency) or "none"
         raise ValueError(f"{said}: no mode within 1 % of it; there are modes at: {modes} Hz")
     band, i = place
-    plan = _plan_of(band).without(i)
+    plan = _plan_for_band(band).without(i)
     if not plan.words:
         return replace(state, bands=tuple(other for other in state.bands if other is not band))
     fitted = plan.fitted(state)
     if fitted is None:
         raise ValueError(f"{said}: the modes beside it cannot be fitted without it; drop them, too")
-    return _with(state, band, fitted)
+    return _replace_band(state, band, fitted)
 
 
-def _with_more(state: Extraction, frequency: float) -> Extraction:
+def _add_mode(state: Extraction, frequency: float) -> Extraction:
     said = f"add {frequency:g} Hz"
-    plan = _plan_at(state, frequency, said)
+    plan = _plan_at_frequency(state, frequency, said)
     for known in plan.poles.T:
-        if abs(known[0] - frequency) < SAME * np.prod(known):
+        if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
             raise ValueError(
                 f"{said}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
             )
-    tries = [plan.with_mode(*start, ADDED).fitted(state) for start in _starts(state, plan, frequency)]
-    fits = [fitted for fitted in tries if fitted is not None and _is_near(fitted, frequency)]
+    tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
+    fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
         raise ValueError(f"{said}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix")
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
@@ -122,57 +128,57 @@ def _with_more(state: Extraction, frequency: float) -> Extraction:
             f"{said}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain by "
             f"{100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
         )
-    return _with(state, plan.band, best)
+    return _replace_band(state, plan.band, best)
 
 
-def _with_held(state: Extraction, frequency: float, zeta: float) -> Extraction:
+def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
     said = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
-    place = _mode_at(state, frequency)
-    plan = _plan_at(state, frequency, said) if place is None else _plan_of(place[0]).without(place[1])
-    fitted = plan.with_mode(frequency, zeta, HELD).fitted(state)
-    if fitted is None or np.min(fitted.fit.size_error[:, -1]) > LARGEST_ERROR:
+    place = _find_mode(state, frequency)
+    plan = _plan_at_frequency(state, frequency, said) if place is None else _plan_for_band(place[0]).without(place[1])
+    fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
+    if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
         raise ValueError(f"{said}: nothing of it is to be seen there; look at the picture")
-    return _with(state, plan.band, fitted)
+    return _replace_band(state, plan.band, fitted)
 
 
-def _mode_at(state: Extraction, frequency: float) -> tuple[FittedBand, int] | None:
+def _find_mode(state: Extraction, frequency: float) -> tuple[FittedBand, int] | None:
     """The band of the mode that is meant, and which of its modes; None where there is none."""
     modes = [(band, i) for band in state.bands for i in range(band.fit.frequency.size)]
     distances = [abs(band.fit.frequency[i] / frequency - 1) for band, i in modes]
     nearest = int(np.argmin(distances)) if modes else 0
-    return modes[nearest] if modes and distances[nearest] <= NEAR else None
+    return modes[nearest] if modes and distances[nearest] <= EDITED_MODE_DISTANCE else None
 
 
-def _plan_of(band: FittedBand) -> _Plan:
-    return _Plan(band, band.lines, band.fit.poles, band.by_hand or ("",) * band.fit.frequency.size)
+def _plan_for_band(band: FittedBand) -> _EditPlan:
+    return _EditPlan(band, band.lines, band.fit.poles, band.edits or ("",) * band.fit.frequency.size)
 
 
-def _plan_at(state: Extraction, frequency: float, said: str) -> _Plan:
+def _plan_at_frequency(state: Extraction, frequency: float, said: str) -> _EditPlan:
     """The band that a frequency lies in, or a new one about it."""
     f = state.frf.frequency
     if not f[0] < frequency < f[-1]:
         raise ValueError(f"{said}: lies outside the lines, {f[0]:g} to {f[-1]:g} Hz")
     for band in state.bands:
         if band.data.frequency[0] <= frequency <= band.data.frequency[-1]:
-            return _plan_of(band)
-    (alone,) = local_bands([Resonance(frequency, USUAL * frequency, 0.0)], f)
-    return _Plan(None, alone.lines, np.empty((2, 0)), ())
+            return _plan_for_band(band)
+    (alone,) = group_into_bands([Resonance(frequency, LONE_MODE_DAMPING * frequency, 0.0)], f)
+    return _EditPlan(None, alone.lines, np.empty((2, 0)), ())
 
 
-def _starts(state: Extraction, plan: _Plan, frequency: float) -> list[tuple[float, float]]:
+def _start_values(state: Extraction, plan: _EditPlan, frequency: float) -> list[tuple[float, float]]:
     """Where an added mode may begin."""
-    poles = physical_poles(state.data(plan.lines, without=plan.band).chart)
-    near = np.abs(poles.frequency / frequency - 1) < NEAR
+    poles = select_physical_poles(state.data(plan.lines, without=plan.band).chart)
+    near = np.abs(poles.frequency / frequency - 1) < EDITED_MODE_DISTANCE
     from_poles = [*zip(poles.frequency[near].tolist(), poles.damping_ratio[near].tolist(), strict=True)]
-    return [*from_poles, *((frequency, zeta) for zeta in DAMPING_RATIOS)]
+    return [*from_poles, *((frequency, zeta) for zeta in TRIAL_DAMPING_RATIOS)]
 
 
-def _is_near(band: FittedBand, frequency: float) -> bool:
+def _is_added_mode_near(band: FittedBand, frequency: float) -> bool:
     """Whether the mode added last stands where it was looked for."""
     mode, zeta = band.fit.poles[:, -1]
-    return bool(abs(mode / frequency - 1) <= max(NEAR, min(zeta, FARTHEST)))
+    return bool(abs(mode / frequency - 1) <= max(EDITED_MODE_DISTANCE, min(zeta, MAX_ADDED_MODE_SHIFT)))
 
 
-def _with(state: Extraction, old: FittedBand | None, new: FittedBand) -> Extraction:
+def _replace_band(state: Extraction, old: FittedBand | None, new: FittedBand) -> Extraction:
     bands = [*(band for band in state.bands if band is not old), new]
     return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))

@@ -1,4 +1,4 @@
-"""Modes by weighted least squares: the default."""
+"""Fit modes to FRFs or free decays by weighted least squares."""
 
 from __future__ import annotations
 
@@ -6,18 +6,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from acquisition import Frf, Hit
-from modal.bands.extract import extract
-from modal.bands.extraction import Array, Extraction, FittedBand
-from modal.bands.systematic import systematic
+from acquisition import Frf, Hit, from_accelerance
+from modal.bands.extract_modes import extract_modes
+from modal.bands.extraction import Extraction, FittedBand, Floats
+from modal.bands.residual_analysis import systematic_error
 from modal.fitting import BandFit
-from modal.force_dependence import with_force_remarks
-from modal.hammer_covariance import hammer_covariance
-from modal.jackknife import jackknife, left_out
-from modal.modes.mode import UNKNOWN_PHASE, Mode, ratio_or_zero
-from modal.quality.assess import assess, with_phase_remarks, with_smoothing_remarks
+from modal.hit_scatter import (
+    MIN_HITS_FOR_JACKKNIFE,
+    add_linearity_remarks,
+    hammer_covariance,
+    jackknife_covariance,
+    leave_one_out_frfs,
+)
+from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
+from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
@@ -42,63 +46,72 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
     phase, and hits that have other lines than the FRF or no pulse.
 
-    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(520.0, 0.02, 4e7)], np.arange(1.0, 1501.0))
+    >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(520.0, 0.02, 4e7)], np.arange(1.0, 1501.0))
     >>> for mode in fit_modes(frf, band=(100.0, 1000.0)):
     ...     print(f"{mode.frequency:.2f} Hz, {mode.damping_ratio:.4f}, {mode.stiffness / 1e6:.2f} N/um")
     500.00 Hz, 0.0200, 20.00 N/um
     520.00 Hz, 0.0200, 40.00 N/um
     """
-    return modes_of(extract([frf], band), [hits])
+    return modes_from_extraction(extract_modes([frf], band), [hits])
 
 
-def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode]:
+def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode]:
     """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from.
 
     Raises ValueError for another number of lists of hits than FRFs, and for hits that have other lines or no pulse.
 
-    >>> state = extract([synthesize([Mode(500.0, 0.02, 2e7)], np.arange(1.0, 1501.0))])
+    >>> state = extract_modes([synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(1.0, 1501.0))])
     >>> [f"{mode.frequency:.1f} Hz" for mode in modes_of(state)]
     ['500.0 Hz']
     """
     if hits and len(hits) != len(state.frfs):
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
-    without = [left_out(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
-    modes = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
+    without = [leave_one_out_frfs(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
+    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, hits, without)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
-    return with_smoothing_remarks(state.frf, with_phase_remarks(rising))
+    return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
 
 
-def _modes(
+def _modes_with_scatter(
     state: Extraction, band: FittedBand, hits: Sequence[Sequence[Hit]], without: Sequence[Sequence[Frf]]
 ) -> list[Mode]:
     by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
     n_hits = min(map(len, without), default=0)
-    over_hits = np.sum([jackknife(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
-    judged = modes_of_band(state, band, by_hammer, over_hits, n_hits)
-    return with_force_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
+    over_hits = (
+        np.sum([jackknife_covariance(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
+    )
+    judged = modes_from_band(state, band, by_hammer, over_hits, n_hits)
+    return add_linearity_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
 
 
-def modes_of_band(
-    state: Extraction, band: FittedBand, by_hammer: Array | int, over_hits: Array | None, n_hits: int
+def modes_from_band(
+    state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: Floats | None, n_hits: int
 ) -> list[Mode]:
     """Modes of one band with their figures of quality; the covariances, of the hammer's noise and over this many hits,
     are in the order of `BandFit`."""
-    fit, beyond = band.fit, systematic(band)
+    fit, beyond = band.fit, systematic_error(band)
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
-    modes = [_mode(fit, i, covariance, beyond.freedom, scatter, n_hits) for i in range(fit.frequency.size)]
-    return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
+    modes = [
+        _mode_from_fit(fit, i, covariance, beyond.degrees_of_freedom, scatter, n_hits)
+        for i in range(fit.frequency.size)
+    ]
+    return [
+        assess_mode(state, band, i, replace(mode, method=_method_text(state, band))) for i, mode in enumerate(modes)
+    ]
 
 
-def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Array | None, n_hits: int) -> Mode:
+def _mode_from_fit(
+    fit: BandFit, i: int, covariance: Floats, freedom: float, scatter: Floats | None, n_hits: int
+) -> Mode:
     """Mode i of a band, as the driving point shows it."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
-    of_fit = _of_one(covariance, fit, i)
-    over_hits = None if scatter is None else _of_one(scatter, fit, i)
+    of_fit = _mode_covariance(covariance, fit, i)
+    over_hits = None if scatter is None else _mode_covariance(scatter, fit, i)
     best = of_fit if over_hits is None else over_hits
     error = np.sqrt(np.diag(best))
-    error[3] = np.hypot(error[3], np.degrees(fit.unasked[0, i]))
+    error[3] = np.hypot(error[3], np.degrees(fit.phase_if_complex[0, i]))
     return Mode(
         float(fit.frequency[i]),
         float(fit.damping_ratio[i]),
@@ -108,19 +121,19 @@ def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Arra
         jackknife=None if over_hits is None else over_hits[:3, :3],
         n_hits=n_hits,
         phase_deg=float(np.degrees(np.angle(sign * constant))),
-        phase_deg_std=min(float(error[3]), UNKNOWN_PHASE),
+        phase_deg_std=min(float(error[3]), UNKNOWN_PHASE_STD_DEG),
         phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),
-        shape=_shape(fit.constant[:, i]),
+        shape=_mode_shape(fit.constant[:, i]),
     )
 
 
-def _method(state: Extraction, band: FittedBand) -> str:
+def _method_text(state: Extraction, band: FittedBand) -> str:
     f, p, m = state.frf.frequency[band.lines], len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     return f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
 
 
-def _shape(constants: NDArray[np.complex128]) -> Array | None:
+def _mode_shape(constants: NDArray[np.complex128]) -> Floats | None:
     """Part of each in phase with the driving point or against it, the largest 1 or -1; None of one FRF."""
     if constants.size == 1:
         return None
@@ -128,7 +141,7 @@ def _shape(constants: NDArray[np.complex128]) -> Array | None:
     return np.asarray(along / np.max(np.abs(along)))
 
 
-def _of_one(covariance: Array, fit: BandFit, i: int) -> Array:
+def _mode_covariance(covariance: Floats, fit: BandFit, i: int) -> Floats:
     """Covariance of frequency, damping ratio, stiffness and phase (degrees) of mode i from that of its band, (4, 4)."""
     p, m = fit.constant.shape
     block = np.ix_(*2 * [[i, m + i, 2 * m + i, (2 + p) * m + i]])
@@ -136,3 +149,134 @@ def _of_one(covariance: Array, fit: BandFit, i: int) -> Array:
     by_size = -np.sign(constant.real) / abs(constant) ** 2
     scale = np.array([1.0, 1.0, by_size, np.degrees(1 / abs(constant))])
     return np.asarray(covariance[block] * np.outer(scale, scale))
+
+
+def fit_common_modes(
+    frfs: Sequence[Frf], band: tuple[float, float] | None = None, hits: Sequence[Sequence[Hit]] = ()
+) -> list[Mode]:
+    """Modes that all these FRFs share, by rising frequency, each with its shape; maybe none.
+
+    The extraction of `fit_modes` with common frequencies and damping ratios, and a modal constant and residual terms
+    for each FRF: a mode counts where one of the FRFs shows it. They have one frequency axis; the first is the driving
+    point, which stiffness and covariance belong to, and shape holds the modal constants of all, relative to the
+    largest.
+
+    hits: for each FRF those that it was averaged from (H1), maybe none; noise of the hammer counts where they are
+    given. Where all have three or more, the modes have a jackknife that leaves out one hit of one FRF at a time,
+    which takes the FRFs for measured independently. Its n_hits is that of the FRF with the fewest.
+
+    Raises ValueError as `fit_modes`, for no FRF, for FRFs with different lines, and for another number of lists of
+    hits than FRFs.
+
+    >>> line = np.arange(1.0, 1001.0)
+    >>> tip, nose = synthesize_frf([Mode(500.0, 0.02, 2e7)], line), synthesize_frf([Mode(500.0, 0.02, -4e7)], line)
+    >>> (mode,) = fit_common_modes([tip, nose])
+    >>> f"{mode.frequency:.1f} Hz, K = {mode.stiffness / 1e6:.1f} N/um, shape {mode.shape.round(3).tolist()}"
+    '500.0 Hz, K = 20.0 N/um, shape [1.0, -0.5]'
+    """
+    return modes_from_extraction(extract_modes(frfs, band), hits)
+
+
+STIFFNESS_REMARK_CODES = ("not-driving-point", "near-node")
+"""Remarks on sign and size of K, which decays do not show."""
+
+
+def fit_decays(decays: ArrayLike, sample_rate: float, band: tuple[float, float] | None = None) -> list[Mode]:
+    """Modes of free decays (m/s^2), shape (p, n), between band[0] and band[1] (Hz), by rising frequency; maybe none.
+
+    Natural frequency and damping ratio with their errors; K is NaN, for it needs the force. `decay_spectra`, `extract_modes`
+    and `modes_from_decays` one after the other. sample_rate in Hz.
+
+    Raises ValueError as `fit_modes`, and for decays of zeros, values that are not finite, or fewer than 32 samples.
+
+    >>> time = np.arange(2048) / 10240.0  # s
+    >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.cos(2 * np.pi * 500.0 * np.sqrt(1 - 0.02**2) * time)
+    >>> (mode,) = fit_decays([300.0 * decay, 200.0 * decay, 250.0 * decay], 10240.0)  # m/s^2, Hz
+    >>> f"{mode.frequency:.2f} Hz, {mode.damping_ratio:.4f}, K {mode.stiffness}"
+    '500.00 Hz, 0.0200, K nan'
+    """
+    return modes_from_decays(extract_modes(decay_spectra(decays, sample_rate), band))
+
+
+def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
+    """Spectra of free decays (m/s^2), shape (p, n), each as the FRF of a force of 1 N s at its first sample.
+
+    The spectrum of a decay that begins at once and has ended with the record is the sum of r / (i w - lambda): the
+    poles are those of the structure; what the hit was, and when, is in r alone, another one for each decay. So they
+    are fitted together with common poles and never averaged. What is left of the force after the first sample is
+    smooth over the lines of a mode, and does not move its pole either.
+
+    sample_rate in Hz. Raises ValueError for fewer than 32 samples, values that are not finite, and decays of one value.
+
+    Source: Ewins, Modal Testing, ch. 2 and 4; Brown, Allemang, Zimmerman & Mergeay (1979), SAE paper 790221.
+
+    >>> time = np.arange(2048) / 10240.0  # s
+    >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.sin(2 * np.pi * 500.0 * time)
+    >>> (spectrum,) = decay_spectra([300.0 * decay], 10240.0)
+    >>> float(spectrum.frequency[abs(spectrum.accelerance).argmax()]), spectrum.measured_as  # Hz
+    (500.0, 'accelerance')
+    """
+    records = np.atleast_2d(np.asarray(decays, dtype=np.float64))
+    if records.ndim != 2 or records.shape[1] < 32:
+        raise ValueError(f"decays have shape {records.shape}; give (p, n) with 32 samples or more each")
+    if not np.all(np.isfinite(records)) or not np.all(np.ptp(records, axis=1)):
+        raise ValueError("a decay holds values that are not finite, or nothing but one value: leave it out")
+    frequency = np.fft.rfftfreq(records.shape[1], 1 / sample_rate)
+    return [from_accelerance(frequency, np.fft.rfft(record) / sample_rate) for record in records]
+
+
+def modes_from_decays(state: Extraction) -> list[Mode]:
+    """Modes of an extraction from `decay_spectra`, by rising frequency.
+
+    From three decays on with errors over the decays: each one moves the common values by its part of a Gauss-Newton
+    step, and these parts scatter as whatever differs from decay to decay does (a sandwich with the decays as clusters).
+    Source: Liang & Zeger (1986), Biometrika 73, 13.
+    """
+    pairs = [pair for band in state.bands for pair in _decay_modes(state, band)]
+    highest = max((height for _, height in pairs), default=1.0)
+    modes = [_drop_stiffness(mode, height / highest) for mode, height in pairs]
+    return sorted(modes, key=lambda mode: mode.frequency)
+
+
+def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
+    """Modes of a band with the heights of their peaks, rms over the decays."""
+    enough = len(state.frfs) >= MIN_HITS_FOR_JACKKNIFE
+    modes = modes_from_band(
+        state, band, 0, _decay_covariance(band) if enough else None, len(state.frfs) if enough else 0
+    )
+    heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
+    return list(zip(modes, heights.tolist(), strict=True))
+
+
+def _decay_covariance(band: FittedBand) -> Floats:
+    """Covariance of the values of a band by how its decays pull at them; shape as `BandFit.covariance`."""
+    fit, count = band.fit, len(band.fit.constant)
+    parts = fit.residual.reshape(count, -1)
+    pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
+    outer = np.transpose(pulls) @ np.array(pulls)
+    return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
+
+
+def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
+    """What decays tell of a mode."""
+    return replace(
+        mode,
+        stiffness=np.nan,
+        covariance=_pole_covariance(mode.covariance),
+        jackknife=_pole_covariance(mode.jackknife),
+        phase_deg=0.0,
+        phase_deg_std=0.0,
+        phase_correlation=None,
+        shape=None,
+        relative_peak=relative_peak,
+        remarks=tuple(remark for remark in mode.remarks if remark.code not in STIFFNESS_REMARK_CODES),
+    )
+
+
+def _pole_covariance(covariance: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    """That of frequency and damping ratio; NaN for the stiffness."""
+    if covariance is None:
+        return None
+    known = np.full((3, 3), np.nan)
+    known[:2, :2] = covariance[:2, :2]
+    return known

@@ -13,7 +13,7 @@ from hypothesis import settings
 from numpy.typing import NDArray
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
-from lobewatch.tap.state import Check, Choice, Outcome, Plots, ProgramWord, TakenHit, TapState, TapStep
+from lobewatch.tap.state import Check, Choice, ListedHit, LiveCurves, Outcome, ProgramVerdict, TapState, TapStep
 
 DATA = Path(__file__).parent / "data"
 settings.register_profile("untimed", deadline=None)
@@ -109,7 +109,7 @@ class ScriptedSession:
     def hit(self, flags: HitFlags = HitFlags.OK, reason: str = "") -> None:
         """One more hit."""
         good = self.state.good + (not flags)
-        taken = TakenHit(len(self.state.hits) + 1, flags, f"{312 + 7 * len(self.state.hits)} N")
+        taken = ListedHit(len(self.state.hits) + 1, flags, f"{312 + 7 * len(self.state.hits)} N")
         self.show(
             TapStep.REFUSED if flags else TapStep.GOOD,
             verdict=flags.words,
@@ -126,7 +126,7 @@ class ScriptedSession:
         """All hits are there."""
         texts = ("f_1 1688.20 ± 0.12 Hz, 1.9 % below the first test", "K 33.1 ± 0.2 N/um, bearing stiffness 1190 N/um")
         words = ("bracket, slot (8000 rpm, 2 mm)", "stable"), ("pocket (12600 rpm, 2.5 mm)", "not stable")
-        programs = [ProgramWord(*word) for word in words]
+        programs = [ProgramVerdict(*word) for word in words]
         step = "Tap again in 14 days, and run lobewatch check mill-3 today."
         done = Outcome("warn", texts, step, programs=programs)
         self.show(TapStep.DONE, reason="", outcome=done)
@@ -154,14 +154,14 @@ class ScriptedSession:
         self.chosen.append((key, tool))
 
 
-def scripted_plots(good: int) -> Plots:
+def scripted_plots(good: int) -> LiveCurves:
     """A pulse, a ring-down and the FRF of one mode at 1722 Hz."""
     time = np.linspace(-0.02, 0.23, 2001)
     frequency = np.linspace(4.0, 12800.0, 1500)
     ringing = np.where(time > 0, np.exp(-300 * time) * np.sin(2 * np.pi * 1722 * time), 0.0)
     ratio = frequency / 1722
     receptance = np.abs(1 / (3.2e7 * (1 - ratio**2 + 0.06j * ratio))) + 1e-9 + 1e-4 / frequency**2
-    return Plots(
+    return LiveCurves(
         time,
         312 * np.exp(-(((time - 4e-4) / 3e-4) ** 2)),
         900 * ringing,

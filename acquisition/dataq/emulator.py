@@ -10,27 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import SensorInput
-from acquisition.dataq.digital_clock import CLOCK_BIT
 from acquisition.dataq.protocol import (
-    DEC,
-    DECA,
-    DIGITAL_INPUTS,
-    OVERFLOW,
-    RANGES,
-    REFUSALS,
-    SRATE,
+    DATAQ_RANGES,
+    DEC_LIMITS,
+    DECA_LIMITS,
+    DIGITAL_INPUTS_CODE,
+    OVERFLOW_REPLY,
+    REFUSAL_REPLIES,
+    SRATE_LIMITS,
     RateSetting,
     packet_bytes,
     split_lines,
 )
-from acquisition.emulation.simulated_source import Signal
-from acquisition.emulation.thread import EmulatorThread
+from acquisition.dataq.stream import CLOCK_BIT
+from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
 
-BUFFER_SECONDS = 1.0
+DATAQ_BUFFER_SECONDS = 1.0
 """What the device keeps for a slow host before it stops (s)."""
-CHUNK = 512
+MAX_SCANS_PER_STEP = 512
 """Most scans that are made at a time."""
-UNKNOWN, INVALID = REFUSALS[:2]
+UNKNOWN_COMMAND_REPLY, INVALID_PARAMETER_REPLY = REFUSAL_REPLIES[:2]
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,11 @@ class DataqTraits:
     """Frequency of a square wave on digital input 0 (Hz)."""
     bits: int = 16
     """Resolution; the lower bits of each word are 0. The devices have fewer than 16 at high rates."""
-    scanned: bool = False
+    is_multiplexed: bool = False
     """Inputs are converted one after the other within a scan, not at once."""
     echoes_stop: bool = False
     """A `stop` that ends scanning is echoed."""
-    stop_takes: float = 0.0
+    stop_delay: float = 0.0
     """Time that it sends nothing before that echo and what it still had to send (s)."""
 
 
@@ -75,7 +74,7 @@ class DataqFaults:
     """The buffer runs over after so many scans, once."""
     streaming_at_connect: bool = False
     """A program before this one has left it scanning."""
-    deaf: bool = False
+    ignores_commands: bool = False
     """No command is heeded."""
 
 
@@ -84,7 +83,7 @@ class DataqEmulator(EmulatorThread):
 
     def __init__(
         self,
-        signal_at: Callable[[float], Signal],
+        signal_at: Callable[[float], SignalFunction],
         inputs: tuple[SensorInput, ...],
         *,
         realtime: bool = True,
@@ -102,7 +101,7 @@ class DataqEmulator(EmulatorThread):
         self._realtime, self._clock = realtime, clock
         self._traits, self._faults = traits or DataqTraits(), faults or DataqFaults()
         self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: "5E0ABC12", 9: "60000000"}
-        self._ranges = RANGES[self._traits.model]
+        self._ranges = DATAQ_RANGES[self._traits.model]
         self._scan_list = [0]
         self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}
         self._received = b""
@@ -115,7 +114,7 @@ class DataqEmulator(EmulatorThread):
     def serve_once(self) -> bool:
         """See EmulatorThread."""
         lines, self._received = split_lines(self._received + self.wire.exchange(self._patience()))
-        for line in [] if self._faults.deaf else lines:
+        for line in [] if self._faults.ignores_commands else lines:
             self._obey(line)
         if self.streaming:
             self._stream()
@@ -132,7 +131,7 @@ class DataqEmulator(EmulatorThread):
         if self.streaming:
             if line == "stop":
                 self.streaming = False
-                time.sleep(self._traits.stop_takes)
+                time.sleep(self._traits.stop_delay)
                 if self._traits.echoes_stop:
                     self._say(line)
             return
@@ -143,11 +142,11 @@ class DataqEmulator(EmulatorThread):
         try:
             self._say(self._answer(name, arguments, line))
         except (ValueError, LookupError):
-            self._say(INVALID)
+            self._say(INVALID_PARAMETER_REPLY)
 
     def _answer(self, name: str, arguments: list[str], line: str) -> str:
         """Echo with what is added to it; ValueError or LookupError for arguments that do not fit."""
-        limits = {"srate": SRATE, "dec": DEC, "deca": DECA, "ps": (0, 7), "encode": (0, 1)}
+        limits = {"srate": SRATE_LIMITS, "dec": DEC_LIMITS, "deca": DECA_LIMITS, "ps": (0, 7), "encode": (0, 1)}
         if name == "info":
             return f"{line} {self._info[int(arguments[0])]}"
         if name == "slist":
@@ -161,12 +160,12 @@ class DataqEmulator(EmulatorThread):
                 raise ValueError(line)
             self._settings[name] = value
         elif name != "stop":
-            return UNKNOWN
+            return UNKNOWN_COMMAND_REPLY
         return line
 
     def _set_scan_list(self, position: int, code: int) -> None:
         source, gain = code & 0xF, code >> 8
-        if source > DIGITAL_INPUTS or (source < DIGITAL_INPUTS and gain >= len(self._ranges)):
+        if source > DIGITAL_INPUTS_CODE or (source < DIGITAL_INPUTS_CODE and gain >= len(self._ranges)):
             raise ValueError(code)
         if position > len(self._scan_list):
             raise ValueError(position)
@@ -178,7 +177,7 @@ class DataqEmulator(EmulatorThread):
     def _start(self) -> None:
         setting = RateSetting(*(self._settings[name] for name in ("srate", "dec", "deca")))
         self._rate = setting.rate(int(self._info[9])) * (0.5 if self._faults.halved_rate else 1.0)
-        self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.scanned else 1))
+        self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.is_multiplexed else 1))
         self._started, self._scan, self._sent = self._clock(), 0, 0
         self._waiting = b""
         self.streaming = True
@@ -190,9 +189,9 @@ class DataqEmulator(EmulatorThread):
         if self._realtime and not self._has_room():
             self._overflow()
             return
-        due = CHUNK if self._has_room() else 0
+        due = MAX_SCANS_PER_STEP if self._has_room() else 0
         if self._realtime:
-            due = min(int((self._clock() - self._started) * self._rate) - self._scan, CHUNK)
+            due = min(int((self._clock() - self._started) * self._rate) - self._scan, MAX_SCANS_PER_STEP)
         if due > 0:
             self._waiting += self._scans(due).tobytes()
         size = packet_bytes(self._settings["ps"])
@@ -206,11 +205,11 @@ class DataqEmulator(EmulatorThread):
 
     def _has_room(self) -> bool:
         """Whether the device's buffer takes more; when not in real time, little is sent ahead of the host."""
-        size = int(BUFFER_SECONDS * self._rate) * 2 * len(self._scan_list) if self._realtime else 1 << 16
+        size = int(DATAQ_BUFFER_SECONDS * self._rate) * 2 * len(self._scan_list) if self._realtime else 1 << 16
         return len(self.wire.pending) <= size
 
     def _overflow(self) -> None:
-        self.wire.pending += OVERFLOW + b"1\r"
+        self.wire.pending += OVERFLOW_REPLY + b"1\r"
         self.streaming = False
 
     def _send(self, packet: bytes) -> None:
@@ -224,12 +223,12 @@ class DataqEmulator(EmulatorThread):
 
     def _scans(self, count: int) -> NDArray[np.int16]:
         """The next words, shape (count, length of the scan list)."""
-        step = len(self._scan_list) if self._traits.scanned else 1
+        step = len(self._scan_list) if self._traits.is_multiplexed else 1
         values = self._signal(self._scan * step, count * step)
         words = np.zeros((count, len(self._scan_list)), "<i2")
         for position, code in enumerate(self._scan_list):
             number, gain = code & 0xF, code >> 8
-            if number == DIGITAL_INPUTS:
+            if number == DIGITAL_INPUTS_CODE:
                 words[:, position] = self._digital_words(count)
             elif number in self._inputs:
                 row, sensor = self._inputs[number]

@@ -10,26 +10,27 @@ from types import TracebackType
 from typing import Self
 
 from acquisition.channel import Block, SensorInput
-from acquisition.dataq.dialogue import DataqDialogue, DataqIdentity
 from acquisition.dataq.protocol import (
-    DIGITAL_INPUTS,
-    OLDEST_FIRMWARE,
+    DIGITAL_INPUTS_CODE,
+    MIN_FIRMWARE_VERSION,
+    DataqCommandLink,
+    DataqInfo,
     check_inputs,
-    choose_packet,
+    choose_packet_code,
     choose_rate,
     encode_command,
-    firmware_of,
-    range_code,
-    scan_code,
+    encode_range,
+    encode_scan_entry,
+    parse_firmware,
 )
-from acquisition.dataq.stream import Piece, ScanDecoder
+from acquisition.dataq.stream import CodeBlock, ScanDecoder
 from acquisition.errors import DeviceError
-from acquisition.event import Event
-from acquisition.ports.serial_link import SerialLink
+from acquisition.ports.serial_ports import SerialLink
+from acquisition.source import Event
 
-SILENCE = 3.0
+DATAQ_SILENCE_TIMEOUT = 3.0
 """A scanning device that gives no scans for so long has failed (s)."""
-DEFAULT_RATE = 50_000.0
+DATAQ_DEFAULT_RATE = 50_000.0
 """Hz, where none is asked for: force and acceleration with the digital word are 150 000 words a second."""
 
 
@@ -81,12 +82,14 @@ class DataqSource:
         self._has_sent = False
         self._heard = 0.0
         self._link = SerialLink(port)
-        self._dialogue = DataqDialogue(self._link)
+        self._dialogue = DataqCommandLink(self._link)
         try:
             self._dialogue.halt()
             device = self._identify()
             self.identity = device.identity
-            self.sample_rate = self._configure(device, inputs, DEFAULT_RATE if sample_rate is None else sample_rate)
+            self.sample_rate = self._configure(
+                device, inputs, DATAQ_DEFAULT_RATE if sample_rate is None else sample_rate
+            )
         except BaseException:
             self._link.close()
             raise
@@ -104,7 +107,7 @@ class DataqSource:
     def start(self) -> None:
         """Begin an endless stream."""
         if self._has_sent:
-            self._dialogue.settle()
+            self._dialogue.synchronize()
         self._has_sent, self._next_scan = True, 0
         self._heard = time.monotonic()
         self._decoder.begin()
@@ -135,7 +138,7 @@ class DataqSource:
         since = time.monotonic()
         while self.status != DataqStatus.STOPPED:
             data = self._link.read(0.1)
-            if self._link.overruns > self._overruns or (not data and self._decoder.ran_over()):
+            if self._link.overruns > self._overruns or (not data and self._decoder.has_overflowed()):
                 if self.status == DataqStatus.SCANNING:
                     since = time.monotonic()
                 self._start_again()
@@ -144,10 +147,10 @@ class DataqSource:
                 self.status = DataqStatus.SCANNING
                 yield self._block(piece)
                 since = self._heard = time.monotonic()
-            if time.monotonic() - since > SILENCE:
+            if time.monotonic() - since > DATAQ_SILENCE_TIMEOUT:
                 raise self._failed(bool(data))
 
-    def _block(self, piece: Piece) -> Block:
+    def _block(self, piece: CodeBlock) -> Block:
         codes, lost = piece
         first = self._next_scan + lost
         self._next_scan = first + codes.shape[1]
@@ -158,7 +161,7 @@ class DataqSource:
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
         self._dialogue.halt()
-        self._dialogue.settle()
+        self._dialogue.synchronize()
         self._link.write(encode_command("start"))
         self._overruns = self._link.overruns
         self._decoder.begin(lost=max(round((time.monotonic() - self._heard) * self.sample_rate), 1))
@@ -170,30 +173,32 @@ class DataqSource:
                 "leave them unconnected, or set loss_detection = false in [daq]",
             )
         return DeviceError(
-            f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s",
+            f"the DAQ on {self._link.port} has sent no samples for {DATAQ_SILENCE_TIMEOUT:g} s",
             "switch it off and on and give the same command again",
         )
 
-    def _identify(self) -> DataqIdentity:
+    def _identify(self) -> DataqInfo:
         identity = self._dialogue.identify()
-        version = firmware_of(identity.firmware)
-        if version is not None and version < OLDEST_FIRMWARE:
+        version = parse_firmware(identity.firmware)
+        if version is not None and version < MIN_FIRMWARE_VERSION:
             raise DeviceError(
                 f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}",
-                f"{OLDEST_FIRMWARE} or newer is needed: install it with the maker's upgrade tool",
+                f"{MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool",
             )
         return identity
 
-    def _configure(self, device: DataqIdentity, inputs: Sequence[SensorInput], wanted: float) -> float:
+    def _configure(self, device: DataqInfo, inputs: Sequence[SensorInput], wanted: float) -> float:
         """Send the set-up; the rate that results (Hz)."""
-        codes = [scan_code(sensor.number, range_code(device.model, sensor.channel.full_scale)) for sensor in inputs]
+        codes = [
+            encode_scan_entry(sensor.number, encode_range(device.model, sensor.channel.full_scale)) for sensor in inputs
+        ]
         if self.loss_detection != "none":
-            codes.append(DIGITAL_INPUTS)
+            codes.append(DIGITAL_INPUTS_CODE)
         setting = choose_rate(wanted, device.dividend)
         rate = setting.rate(device.dividend)
         commands = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
         commands += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
-        for command in (*commands, f"ps {choose_packet(2 * len(codes) * rate)}"):
-            self._dialogue.ask(command)
+        for command in (*commands, f"ps {choose_packet_code(2 * len(codes) * rate)}"):
+            self._dialogue.send_command(command)
         self._dialogue.drain()  # a NUL after the last echo would be taken for the first byte of the stream
         return rate

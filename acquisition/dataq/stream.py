@@ -1,4 +1,4 @@
-"""From the bare byte stream of a DATAQ device to scans; what is missing is found by the word of the digital inputs.
+"""Decode the byte stream of a DATAQ device into scans and detect lost ones.
 
 That word stands last in each scan and holds still; its low byte is always 0. Bytes that are lost move everything that
 follows, and another word appears in its place: the stream is then read on from where the word is found again. A loss of
@@ -10,15 +10,99 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.dataq.digital_clock import CLOCK_BIT, DigitalClock
-from acquisition.dataq.protocol import OVERFLOW, USB_PACKET
+from acquisition.dataq.protocol import OVERFLOW_REPLY, USB_PACKET_BYTES
+from acquisition.errors import DeviceError
 
-HELD_BACK = 32
+CLOCK_BIT = 0x0100
+"""Of the word of the digital inputs: input 0."""
+CLOCK_PERIOD_LIMITS = (6.0, 100.0)
+"""Shortest and longest that are followed (scans): an edge is known to one scan, a rate to one percent."""
+CLOCK_TRAINING_PERIODS = 16
+"""Periods from which their length is taken: what is lost within these is not seen."""
+CLOCK_PERIOD_TOLERANCE = 1.5
+"""Scans by which a period may differ from the length learnt; a packet holds more."""
+
+
+class DigitalClock:
+    """Follows the rising edges."""
+
+    def __init__(self) -> None:
+        """Nothing is known of the period."""
+        self._learning: list[int] = []
+        self._period = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """The scans that follow do not join on to those before."""
+        self._high = True
+        self._edge: int | None = None
+        self._waited = 0
+
+    def find_gap(self, high: NDArray[np.bool_]) -> tuple[int, int]:
+        """How many of these scans come before the next that is missing, and how many are missing there (0: none).
+
+        high: the input in consecutive scans, shape (n,), n >= 1. The place is that of the next edge, at most a period
+        late; the number is the smallest that fits, right but for whole periods. DeviceError where there is no wave.
+        """
+        before = np.concatenate(([self._high], high[:-1]))
+        for at in map(int, np.flatnonzero(high & ~before)):
+            missing = 0 if self._edge is None else self._missing(at - self._edge)
+            if missing:
+                self.restart()
+                self._high = False
+                return at, missing
+            self._edge, self._waited = at, -at
+        self._go_on(high)
+        return high.size, 0
+
+    def _missing(self, scans: int) -> int:
+        """How many are missing between two edges so far apart."""
+        if not self._period:
+            self._learn(scans)
+            return 0
+        if abs(scans - self._period) <= CLOCK_PERIOD_TOLERANCE:
+            return 0
+        missing = -scans % self._period
+        return round(missing if missing > CLOCK_PERIOD_TOLERANCE else missing + self._period)
+
+    def _learn(self, scans: int) -> None:
+        self._learning.append(scans)
+        if len(self._learning) < CLOCK_TRAINING_PERIODS:
+            return
+        even = [
+            length for length in self._learning if abs(length - np.median(self._learning)) <= CLOCK_PERIOD_TOLERANCE
+        ]
+        self._period = float(np.mean(even))
+        if (
+            len(even) < CLOCK_TRAINING_PERIODS - 2
+            or not CLOCK_PERIOD_LIMITS[0] <= self._period <= CLOCK_PERIOD_LIMITS[1]
+        ):
+            raise _make_clock_error()
+
+    def _go_on(self, high: NDArray[np.bool_]) -> None:
+        self._high = bool(high[-1])
+        self._waited += high.size
+        if self._edge is not None:
+            self._edge -= high.size
+        if self._waited > 3 * CLOCK_PERIOD_LIMITS[1]:
+            raise _make_clock_error()
+
+
+def _make_clock_error() -> DeviceError:
+    """Digital input 0 has no wave that can be followed."""
+    low, high = CLOCK_PERIOD_LIMITS
+    return DeviceError(
+        f"digital input 0 of the DAQ has no even square wave with a period of {low:g} to {high:g} scans",
+        "connect the generator again, or take digital_clock out of [daq]",
+    )
+
+
+HELD_BACK_BYTES = 32
 """Bytes that stay in hand: the end of a stream that has run over is text, not samples."""
-WINDOW = 32
+SYNC_WINDOW_SCANS = 32
 """Scans that must agree before a place in the stream is taken for that of the digital word."""
 
-Piece = tuple[NDArray[np.int32], int]
+CodeBlock = tuple[NDArray[np.int32], int]
 """Codes, shape (n_channels, n), and the scans lost before them."""
 
 
@@ -41,7 +125,7 @@ class ScanDecoder:
         self._lost = lost
         self._begin_clock()
 
-    def feed(self, data: bytes) -> list[Piece]:
+    def feed(self, data: bytes) -> list[CodeBlock]:
         """The scans that these bytes complete."""
         self._bytes += data
         pieces = []
@@ -49,17 +133,17 @@ class ScanDecoder:
             pieces.append(piece)
         return pieces
 
-    def ran_over(self) -> bool:
+    def has_overflowed(self) -> bool:
         """Whether the stream ends with the device's word that its buffer ran over."""
-        return OVERFLOW in self._bytes[-HELD_BACK:]
+        return OVERFLOW_REPLY in self._bytes[-HELD_BACK_BYTES:]
 
-    def _next_piece(self) -> Piece | None:
+    def _next_piece(self) -> CodeBlock | None:
         """Scans up to the next gap; None until more bytes have come."""
-        while (count := (len(self._bytes) - HELD_BACK) // self._scan_bytes) > 0:
+        while (count := (len(self._bytes) - HELD_BACK_BYTES) // self._scan_bytes) > 0:
             intact = self._intact(count)
             if intact:
                 return self._take(intact)
-            if count < WINDOW + 2:
+            if count < SYNC_WINDOW_SCANS + 2:
                 return None
             self._find_word()
         return None
@@ -74,7 +158,7 @@ class ScanDecoder:
         self._in_place = wrong.size == 0
         return count if self._in_place else int(wrong[0])
 
-    def _take(self, count: int) -> Piece:
+    def _take(self, count: int) -> CodeBlock:
         count, missing = self._until_gap(count)
         size = count * self._scan_bytes
         words = np.frombuffer(self._bytes[:size], "<i2").reshape(count, -1)
@@ -87,11 +171,11 @@ class ScanDecoder:
         if self._clock is None:
             return count, 0
         high = self._digital_words(0, count) & CLOCK_BIT != 0
-        until, missing = self._clock.until_gap(high)
+        until, missing = self._clock.find_gap(high)
         if until:
             return until, missing
         self._lost += missing
-        return self._clock.until_gap(high)
+        return self._clock.find_gap(high)
 
     def _find_word(self) -> None:
         """Put the next scan at the head of the bytes in hand; where it cannot be told, give one up."""
@@ -109,7 +193,7 @@ class ScanDecoder:
 
     def _begin_clock(self) -> None:
         if self._clock:
-            self._clock.begin()
+            self._clock.restart()
 
     def _shift(self) -> int | None:
         """Bytes to the next scan: the known word counts first, then a new one in the old place, then anywhere."""
@@ -121,7 +205,7 @@ class ScanDecoder:
         return next(iter(same or steady), None)
 
     def _steady_word(self, shift: int) -> int | None:
-        words = self._digital_words(shift, WINDOW) & self._steady
+        words = self._digital_words(shift, SYNC_WINDOW_SCANS) & self._steady
         first = int(words[0])
         return first if first & 0x80FF == 0 and np.all(words == first) else None
 
@@ -133,5 +217,5 @@ class ScanDecoder:
         """The fewest bytes whose loss moves the stream so far: whole USB packets, where these can."""
         if not shift:
             return 0
-        packets = (USB_PACKET * k for k in range(1, self._scan_bytes))
+        packets = (USB_PACKET_BYTES * k for k in range(1, self._scan_bytes))
         return next((n for n in packets if (n + shift) % self._scan_bytes == 0), self._scan_bytes - shift)

@@ -1,26 +1,29 @@
 """The drivers there are, and which device answers on a port."""
 
-from acquisition.devices.check_settings import check_settings
-from acquisition.devices.driver import DeviceSettings, Driver, SensorPlace, on_no_serial_port
-from acquisition.devices.probe_port import Answer, probe_port
-from acquisition.devices.registry import driver_names, find_driver, load_drivers, named_package
-from acquisition.devices.search_devices import search_devices
-from acquisition.devices.survey_ports import PortSurvey, SeenPort, survey_ports
+from acquisition.devices.drivers import DeviceSettings, Driver, SensorDataLocation, skip_serial_probe
+from acquisition.devices.port_scan import DeviceAnswer, PortScan, ScannedPort, probe_port, scan_ports, search_devices
+from acquisition.devices.registry import (
+    check_settings,
+    convert_driver_errors,
+    find_driver,
+    list_driver_names,
+    load_drivers,
+)
 
 __all__ = [
-    "Answer",
+    "DeviceAnswer",
     "DeviceSettings",
     "Driver",
-    "PortSurvey",
-    "SeenPort",
-    "SensorPlace",
+    "PortScan",
+    "ScannedPort",
+    "SensorDataLocation",
     "check_settings",
-    "driver_names",
+    "convert_driver_errors",
     "find_driver",
+    "list_driver_names",
     "load_drivers",
-    "named_package",
-    "on_no_serial_port",
     "probe_port",
+    "scan_ports",
     "search_devices",
-    "survey_ports",
+    "skip_serial_probe",
 ]

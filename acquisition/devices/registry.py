@@ -1,25 +1,25 @@
-"""All drivers there are: ours, and those that other packages register as `lobewatch.drivers`."""
+"""Find, load, query and check device drivers, including those of other packages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import queue
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import entry_points
 
-from acquisition.devices.built_in import BUILT_IN
-from acquisition.devices.driver import Driver
-from acquisition.errors import DataError, DeviceError
-from acquisition.plugin import FAILURES, load_plugin, not_usable, package_of, words_of
-from acquisition.remark import Remark
+from acquisition.devices.drivers import BUILT_IN_DRIVERS, DeviceSettings, Driver
+from acquisition.errors import DataError, DeviceError, Remark
+from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
 
-GROUP = "lobewatch.drivers"
+DRIVER_ENTRY_POINTS = "lobewatch.drivers"
 """Entry points of this group name a Driver each; the name is that of the driver."""
 
 
-def driver_names() -> tuple[str, ...]:
+def list_driver_names() -> tuple[str, ...]:
     """Names of all drivers that are installed, ours first; nothing is loaded."""
-    ours = [driver.name for driver in BUILT_IN]
-    return (*ours, *sorted({point.name for point in entry_points(group=GROUP)}.difference(ours)))
+    ours = [driver.name for driver in BUILT_IN_DRIVERS]
+    return (*ours, *sorted({point.name for point in entry_points(group=DRIVER_ENTRY_POINTS)}.difference(ours)))
 
 
 def find_driver(name: str) -> Driver:
@@ -32,7 +32,7 @@ def find_driver(name: str) -> Driver:
         ...
     acquisition.errors.DataError: driver='tap' is none of taps, dataq, lines, audio, nidaqmx, mcc172, ...
     """
-    driver = _find(name)
+    driver = _load_driver(name)
     if isinstance(driver, Remark):
         raise DataError(str(driver))
     return driver
@@ -40,41 +40,107 @@ def find_driver(name: str) -> Driver:
 
 def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
     """All drivers, and a remark on each that cannot be loaded."""
-    loaded = [_find(name) for name in driver_names()]
+    loaded = [_load_driver(name) for name in list_driver_names()]
     drivers = tuple(entry for entry in loaded if isinstance(entry, Driver))
     return drivers, tuple(entry for entry in loaded if isinstance(entry, Remark))
 
 
-def not_answering(name: str, text: str) -> Remark:
+def driver_failure_remark(name: str, text: str) -> Remark:
     """The remark on a driver whose package fails when it is asked."""
-    return not_usable(Driver, name, f"the package {_package(name)} {text}")
+    return make_unusable_remark(Driver, name, f"the package {_find_package(name)} {text}")
 
 
 @contextmanager
-def named_package(name: str, doing: str, kind: type[DeviceError | DataError] = DeviceError) -> Iterator[None]:
+def convert_driver_errors(name: str, doing: str, kind: type[DeviceError | DataError] = DeviceError) -> Iterator[None]:
     """Where a driver of another package is called: what it may not raise becomes such an error, with its name."""
     try:
         yield
     except (OSError, ValueError):
         raise
-    except FAILURES as error:
-        raise kind(str(not_answering(name, f"fails when {doing} ({words_of(error)})"))) from error
+    except PLUGIN_ERRORS as error:
+        raise kind(str(driver_failure_remark(name, f"fails when {doing} ({format_exception_line(error)})"))) from error
 
 
-def _package(name: str) -> str:
+def _find_package(name: str) -> str:
     """The package that brings a driver."""
-    return " and ".join(map(package_of, entry_points(group=GROUP, name=name))) or "lobewatch"
+    return " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
 
 
-def _find(name: str) -> Driver | Remark:
-    for driver in BUILT_IN:
+def _load_driver(name: str) -> Driver | Remark:
+    for driver in BUILT_IN_DRIVERS:
         if driver.name == name:
             return driver
-    points = sorted(entry_points(group=GROUP, name=name), key=package_of)
+    points = sorted(entry_points(group=DRIVER_ENTRY_POINTS, name=name), key=get_package_name)
     if not points:
-        text = f"driver={name!r} is none of {', '.join(driver_names())}"
+        text = f"driver={name!r} is none of {', '.join(list_driver_names())}"
         return Remark("driver-not-known", "", text, "correct the name, or install the package that brings it")
     if len(points) > 1:
-        packages = " and ".join(map(package_of, points))
-        return not_usable(Driver, name, f"the packages {packages} both bring it", "remove one of them")
+        packages = " and ".join(map(get_package_name, points))
+        return make_unusable_remark(Driver, name, f"the packages {packages} both bring it", "remove one of them")
     return load_plugin(points[0], Driver)
+
+
+DRIVER_ANSWER_TIMEOUT = 10.0
+"""Time within which a driver has said who is there (s), three times what ours take; chosen."""
+
+
+def query_driver(name: str, question: Callable[[], object], about: str) -> object:
+    """What a driver answers; None for a DeviceError (unplugged while it was asked), a Remark where it fails or hangs.
+
+    about: what it is asked, e.g. "who is on COM3".
+    """
+    answers = queue.SimpleQueue[object]()
+
+    def ask() -> None:
+        try:
+            answers.put(question())
+        except BaseException as error:  # noqa: BLE001  (of another package: it ends nothing of ours)
+            answers.put(error)
+
+    threading.Thread(target=ask, name=f"question to {name}", daemon=True).start()
+    try:
+        answer = answers.get(timeout=DRIVER_ANSWER_TIMEOUT)
+    except queue.Empty:
+        return driver_failure_remark(name, f"has not answered within {DRIVER_ANSWER_TIMEOUT:g} s {about}")
+    if isinstance(answer, DeviceError):
+        return None
+    if isinstance(answer, BaseException):
+        return driver_failure_remark(name, f"fails when asked {about} ({format_exception_line(answer)})")
+    return answer
+
+
+def check_settings(driver: Driver, settings: DeviceSettings) -> None:
+    """ValueError for sensors that are not asked for or make no tap test, and for what the driver itself refuses."""
+    if driver.sensor_data is None:
+        _check_sensors(driver, settings)
+    elif settings.inputs:
+        raise ValueError(
+            f"channel: {driver.title} names its own sensors: leave [[daq.channel]] out, or name another driver "
+            '("dataq" takes them)'
+        )
+    if settings.printing and not driver.prints_samples:
+        raise ValueError(f'printing: [daq.printing] is for driver = "lines"; leave it out for {driver.title}')
+    with convert_driver_errors(driver.name, "checking [daq]", DataError):
+        driver.check(settings)
+
+
+def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
+    quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
+    if quantities.count("acceleration") == 0 or quantities.count("force") > 1:
+        listed = ", ".join(quantities) or "nothing"
+        raise ValueError(
+            f'driver = "{driver.name}" needs two [[daq.channel]], one of force and one of acceleration; '
+            f'here are {listed}; with hammer = "none" in [tap] that of acceleration alone'
+        )
+    directions = [sensor.channel.direction for sensor in settings.inputs if sensor.channel.quantity == "acceleration"]
+    named = sorted(filter(None, directions))
+    if len(directions) > 1 and (not named or len(set(named)) < len(named)):
+        raise ValueError(
+            f"{len(directions)} channels of acceleration: each that is tapped along needs its own "
+            'direction = "x" or "y" in [[daq.channel]]'
+        )
+    numbers = [sensor.number for sensor in settings.inputs]
+    for second, number in enumerate(numbers):
+        if (first := numbers.index(number)) < second:
+            text = f"channel {second + 1}: input={number} is that of channel {first + 1}; each sensor needs its own"
+            raise ValueError(text)

@@ -1,33 +1,39 @@
 """What an emulated device is made of: a hammered structure or a milling cut, a wire, a thread that serves it."""
 
-from .bench import Bench
+from .emulated_device import (
+    EmulationSetup,
+    EmulatorThread,
+    PtyWire,
+    SignalFunction,
+    SimulatedSource,
+    TcpWire,
+    Wire,
+    quantise,
+)
 from .hammered_structure import HammeredStructure, Hammering, Structure
+from .housing_signal import Housing, HousingSignal, make_random_housing, sample_housing
 from .milling import TipMotion, simulate_cut, simulate_cuts
 from .milling_cut import MillingCut, Passage
-from .milling_housing import CutSound, Housing, hear, random_housing
-from .simulated_source import Signal, SimulatedSource, quantise
-from .thread import EmulatorThread
-from .wire import PtyWire, TcpWire, Wire
 
 __all__ = [
-    "Bench",
-    "CutSound",
+    "EmulationSetup",
     "EmulatorThread",
     "HammeredStructure",
     "Hammering",
     "Housing",
+    "HousingSignal",
     "MillingCut",
     "Passage",
     "PtyWire",
-    "Signal",
+    "SignalFunction",
     "SimulatedSource",
     "Structure",
     "TcpWire",
     "TipMotion",
     "Wire",
-    "hear",
+    "make_random_housing",
     "quantise",
-    "random_housing",
+    "sample_housing",
     "simulate_cut",
     "simulate_cuts",
 ]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-PIECE = 512
+NOISE_BLOCK_SCANS = 512
 """Scans whose noise is drawn at once: blocks of any multiple of so many have the same noise."""
-_HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
+_PULSE_HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
 """sin^4(pi t/T) = 3/8 - 1/2 cos(2 pi t/T) + 1/8 cos(4 pi t/T)."""
 
 
@@ -47,14 +47,14 @@ class Structure:
         decay = self.damping_ratio * w
         root = -decay + 1j * w * np.sqrt(1 - self.damping_ratio**2)
         r = nu / w[:, None]
-        forced = _HARMONICS / (self.stiffness[:, None] * (1 - r**2 + 2j * self.damping_ratio[:, None] * r))
+        forced = _PULSE_HARMONICS / (self.stiffness[:, None] * (1 - r**2 + 2j * self.damping_ratio[:, None] * r))
         start = -_free_amplitude(forced.sum(1).real, (forced * 1j * nu).sum(1).real, root)
         end = start * np.exp(root * width)
         after = _free_amplitude(forced.sum(1).real + end.real, (forced * 1j * nu).sum(1).real + (root * end).real, root)
         during, later = (time >= 0) & (time < width), time >= width
         result = np.zeros(time.shape)
         wave = np.exp(1j * np.outer(nu, time[during]))
-        quasi_static = (self.residual * _HARMONICS * -(nu**2)) @ wave
+        quasi_static = (self.residual * _PULSE_HARMONICS * -(nu**2)) @ wave
         result[during] = (
             ((forced * -(nu**2)).sum(0) @ wave).real
             + quasi_static.real
@@ -106,7 +106,7 @@ class HammeredStructure:
     """Source of every random number."""
     hammering: Hammering = field(default_factory=Hammering)
     """Way in which it is hit."""
-    beside: Sequence[Structure] = ()
+    cross_structures: Sequence[Structure] = ()
     """What further sensors feel of the same blows: modes from the hammer to each of them."""
     _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
@@ -130,9 +130,9 @@ class HammeredStructure:
         return signals
 
     def _noise_of(self, n_scans: int) -> NDArray[np.float64]:
-        rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.beside))]
-        pieces, rest = divmod(n_scans, PIECE)
-        whole = self._noise.standard_normal((pieces, len(rms), PIECE))
+        rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.cross_structures))]
+        pieces, rest = divmod(n_scans, NOISE_BLOCK_SCANS)
+        whole = self._noise.standard_normal((pieces, len(rms), NOISE_BLOCK_SCANS))
         drawn = np.concatenate([*whole, self._noise.standard_normal((len(rms), rest))], axis=1)
         return np.asarray(np.array(rms)[:, np.newaxis] * drawn)
 
@@ -152,10 +152,10 @@ class HammeredStructure:
 
     def _length(self, width: float) -> int:
         """Samples until the slowest mode has fallen to a millionth."""
-        felt = (self.structure, *self.beside)
+        felt = (self.structure, *self.cross_structures)
         slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in felt)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
     def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
-        return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.beside))])
+        return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.cross_structures))])

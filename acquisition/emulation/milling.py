@@ -1,4 +1,7 @@
-"""Milling stepped through time, many cuts at once: what the tool tip does.
+"""Simulate milling in the time domain, with even or uneven tooth pitch.
+
+As `acquisition.emulation.milling`, one cut at a time. A turn has a whole number of steps, and every pitch nearly so;
+the surface is kept by its angle, not by its time.
 
     chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r how far the tooth stands out
     surface  u <- u - feed sin(phi) + max(h, 0): the furthest material that all earlier teeth have left at this angle
@@ -17,22 +20,69 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.emulation.milling_cut import MillingCut, Passage
-from acquisition.emulation.milling_tables import ModeTables, ToothTables, steps_needed, tables
-from acquisition.emulation.uneven_milling import turn_tables, uneven_cutting
+from acquisition.emulation.milling_cut import (
+    MillingCut,
+    ModeTables,
+    Passage,
+    ToothTables,
+    build_tables,
+    count_steps_needed,
+)
 
 Floats = NDArray[np.float64]
 
-ALIKE = 1.25
+MAX_STEP_COUNT_FACTOR = 1.25
+"""Steps of a turn are up to this many times those needed, where pitches then are more nearly whole numbers of them."""
+
+
+def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
+    """Tables of one tooth over a turn."""
+    needed = count_steps_needed(cut) * cut.teeth
+    number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
+    steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
+    off = np.max(np.abs(steps - np.rint(steps)), axis=1) / number
+    single = replace(cut, teeth=1, pitch=(), runout=())
+    return build_tables([single], int(number[np.argmin(np.round(off, 9))]))
+
+
+def simulate_uneven_cutting(
+    cut: MillingCut, modes: ModeTables, tooth: ToothTables, passage: Passage
+) -> tuple[NDArray[np.complex128], Floats, NDArray[np.complex128]]:
+    """How modes swing after each step from first to last contact, what they gained in it (n, 1, m), and the last."""
+    cells, step = len(tooth.root), float(modes.step[0])
+    behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
+    share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
+    stands_out = np.array(cut.runout or np.zeros(cut.teeth))
+    thick, root, reach, push, rub = (
+        part[:, 0] for part in (tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain)
+    )
+    number = math.ceil(passage.cutting / step)
+    depth = passage.depth_at(np.asarray((np.arange(number) + 0.5) * step))
+    surface, swing = np.zeros_like(thick), np.zeros(modes.flight.shape[1], dtype=complex)
+    swings, gains = np.empty((number, swing.size), dtype=complex), np.empty((number, swing.size))
+    for n in range(number):
+        at = (n - behind) % cells
+        swing = swing * modes.flight[0]
+        feed = thick[at] * share[:, np.newaxis]
+        chip = feed + root[at] * stands_out[:, np.newaxis] + reach[at] @ swing.imag - surface[at]
+        np.maximum(chip, 0.0, out=chip)
+        surface[at] += chip - feed
+        gains[n] = depth[n] * (np.einsum("jme,je->m", push[at], chip) + np.sum(rub[at], axis=0))
+        swing = swing + gains[n]
+        swings[n] = swing
+    return swings[:, np.newaxis], gains[:, np.newaxis], swing
+
+
+MAX_TOOTH_PERIOD_RATIO = 1.25
 """Cuts are stepped together whose tooth periods differ by this factor at most ..."""
-TOGETHER = 48
+MAX_CUTS_PER_GROUP = 48
 """... and no more than so many."""
-TURNS = 8
+COMPARED_TURNS = 8
 """Turns of the spindle that are compared."""
 
 
@@ -44,7 +94,7 @@ class TipMotion:
     """Steps a second (Hz)."""
     acceleration: Floats
     """Acceleration along x and y of the machine (m/s^2), shape (2, n)."""
-    wander: float = 0.0
+    nonperiodic_share: float = 0.0
     """Part of the motion that did not repeat from turn to turn late at full depth, as a share of the rms: 0 for a
     stable cut, and for a flip of an even number of teeth. A cut above its limit may be stable where run-out keeps teeth
     out of it."""
@@ -60,28 +110,31 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
     passage = passage or Passage()
     for number, cut in enumerate(cuts):
         if cut.pitch:
-            yield number, _uneven_motion(cut, passage)
-    for group in _groups(cuts):
+            yield number, _simulate_uneven_cut(cut, passage)
+    for group in _group_cuts(cuts):
         members = [cuts[i] for i in group]
-        modes, teeth = tables(members, max(map(steps_needed, members)))
-        cutting, swing = _cutting(members, modes, teeth, passage)
+        modes, teeth = build_tables(members, max(map(count_steps_needed, members)))
+        cutting, swing = _simulate_group(members, modes, teeth, passage)
         for place, number in enumerate(group):
             turn = len(teeth.root) * cuts[number].teeth
-            yield number, _motion(cutting[:, place], swing[place], modes, place, passage, turn)
+            yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage, turn)
 
 
-def _uneven_motion(cut: MillingCut, passage: Passage) -> TipMotion:
-    modes, tooth = turn_tables(cut)
-    swings, gains, swing = uneven_cutting(cut, modes, tooth, passage)
-    cutting = _acceleration(swings, gains, modes)[:, 0].astype(np.float32)
-    return _motion(cutting, swing, modes, 0, passage, len(tooth.root))
+def _simulate_uneven_cut(cut: MillingCut, passage: Passage) -> TipMotion:
+    modes, tooth = build_turn_tables(cut)
+    swings, gains, swing = simulate_uneven_cutting(cut, modes, tooth, passage)
+    cutting = _tip_acceleration(swings, gains, modes)[:, 0].astype(np.float32)
+    return _assemble_motion(cutting, swing, modes, 0, passage, len(tooth.root))
 
 
-def _groups(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
+def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
     """Indices of cuts to step together, all whose teeth are evenly spaced."""
     group: list[int] = []
     for i in sorted((i for i, cut in enumerate(cuts) if not cut.pitch), key=lambda i: cuts[i].tooth_period):
-        if group and (len(group) == TOGETHER or cuts[i].tooth_period > ALIKE * cuts[group[0]].tooth_period):
+        if group and (
+            len(group) == MAX_CUTS_PER_GROUP
+            or cuts[i].tooth_period > MAX_TOOTH_PERIOD_RATIO * cuts[group[0]].tooth_period
+        ):
             yield group
             group = []
         group.append(i)
@@ -89,7 +142,7 @@ def _groups(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
         yield group
 
 
-def _cutting(
+def _simulate_group(
     cuts: Sequence[MillingCut], modes: ModeTables, teeth: ToothTables, passage: Passage
 ) -> tuple[NDArray[np.float32], NDArray[np.complex128]]:
     """Acceleration from first to last contact (n, c, 2) in m/s^2, and how the modes swing then (c, m)."""
@@ -99,24 +152,24 @@ def _cutting(
     runout = np.zeros((len(cuts), int(np.max(number))))
     for row, cut in zip(runout, cuts, strict=True):
         row[: len(cut.runout)] = cut.runout
-    surface, swing = np.zeros_like(teeth.thick), np.zeros(modes.flight.shape, dtype=complex)
+    surface, swing = np.zeros_like(teeth.rigid_chip), np.zeros(modes.flight.shape, dtype=complex)
     record = np.empty((periods * steps, len(cuts), 2), dtype=np.float32)
     for period in range(periods):
-        stands_out = np.take_along_axis(runout[np.newaxis], (teeth.place - period) % number, axis=2)
+        stands_out = np.take_along_axis(runout[np.newaxis], (teeth.pitch_index - period) % number, axis=2)
         time = (period * steps + np.arange(steps)[:, np.newaxis] + 0.5) * step
         depth = passage.depth_at(time)
-        push, rub = teeth.push, teeth.rub * depth[..., np.newaxis]
+        push, rub = teeth.chip_gain, teeth.edge_gain * depth[..., np.newaxis]
         if np.any(depth < 1):
             push = push * depth[..., np.newaxis, np.newaxis]
-        room = teeth.thick + teeth.root * stands_out - surface
-        swings, gains, chips = _period(swing, modes.flight, teeth.reach, push, rub, room)
-        surface += chips - teeth.thick
+        room = teeth.rigid_chip + teeth.root * stands_out - surface
+        swings, gains, chips = _step_tooth_period(swing, modes.flight, teeth.reach, push, rub, room)
+        surface += chips - teeth.rigid_chip
         swing = swings[-1]
-        record[period * steps : (period + 1) * steps] = _acceleration(swings, gains, modes)
+        record[period * steps : (period + 1) * steps] = _tip_acceleration(swings, gains, modes)
     return record, swing
 
 
-def _period(
+def _step_tooth_period(
     swing: NDArray[np.complex128],
     flight: NDArray[np.complex128],
     reach: Floats,
@@ -141,7 +194,7 @@ def _period(
     return swings, gains, chips
 
 
-def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
+def _tip_acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
     """q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), in the middle of the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
     acceleration: Floats = np.einsum(
@@ -150,7 +203,7 @@ def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTabl
     return acceleration
 
 
-def _motion(
+def _assemble_motion(
     cutting: NDArray[np.float32],
     swing: NDArray[np.complex128],
     modes: ModeTables,
@@ -165,12 +218,12 @@ def _motion(
     ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, left)))
     still = np.zeros((2, round(passage.before / step)))
     full = cutting[: round((passage.ramp + passage.steady) / step)]
-    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _wander(full, turn))
+    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _nonperiodic_share(full, turn))
 
 
-def _wander(acceleration: NDArray[np.float32], turn: int) -> float:
+def _nonperiodic_share(acceleration: NDArray[np.float32], turn: int) -> float:
     """What of the last turns differs from their mean, as a share of the rms; 0 for less than two."""
-    number = min(TURNS, len(acceleration) // turn)
+    number = min(COMPARED_TURNS, len(acceleration) // turn)
     if number < 2:
         return 0.0
     turns = acceleration[-number * turn :].reshape(number, -1).astype(float)

@@ -1,34 +1,36 @@
 """From hits to an averaged FRF."""
 
-from acquisition.estimation.estimate_frf import cross_spectra, estimate_frf, frf_of_spectra
-from acquisition.estimation.exponential_window import (
-    exponential_window,
-    time_after_hit,
-    time_of_hit,
-    windowed_receptance,
+from acquisition.estimation.estimate_frf import (
+    RunningMean,
+    compute_cross_spectra,
+    estimate_frf,
+    estimate_frf_from_spectra,
+    propagate_force_noise,
+    propagate_force_noise_through,
 )
-from acquisition.estimation.force_noise import force_noise, force_noise_through
-from acquisition.estimation.hidden_window import hidden_window
-from acquisition.estimation.infer_averages import infer_averages
-from acquisition.estimation.recorded_share import recorded_share
-from acquisition.estimation.running_mean import RunningMean
-from acquisition.estimation.smoothed_lines import is_smoothed
-from acquisition.estimation.without_mass import without_mass
+from acquisition.estimation.frf_corrections import (
+    apply_exponential_window,
+    correct_windowed_receptance,
+    find_hit_time,
+    measure_time_after_hit,
+    remove_sensor_mass,
+)
+from acquisition.estimation.infer_processing import infer_averages, infer_recorded_share, infer_window, is_smoothed
 
 __all__ = [
     "RunningMean",
-    "cross_spectra",
+    "apply_exponential_window",
+    "compute_cross_spectra",
+    "correct_windowed_receptance",
     "estimate_frf",
-    "exponential_window",
-    "force_noise",
-    "force_noise_through",
-    "frf_of_spectra",
-    "hidden_window",
+    "estimate_frf_from_spectra",
+    "find_hit_time",
     "infer_averages",
+    "infer_recorded_share",
+    "infer_window",
     "is_smoothed",
-    "recorded_share",
-    "time_after_hit",
-    "time_of_hit",
-    "windowed_receptance",
-    "without_mass",
+    "measure_time_after_hit",
+    "propagate_force_noise",
+    "propagate_force_noise_through",
+    "remove_sensor_mass",
 ]

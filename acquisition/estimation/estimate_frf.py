@@ -1,8 +1,8 @@
-"""Averaged FRF from hammer hits."""
+"""Estimate the averaged FRF of hits, its running mean and its errors from force noise."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.hits.windowed_force import windowed_force
+from acquisition.hits.pulse import window_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
 Spectra = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]
 
-ROUNDING = np.finfo(np.float64).eps ** 2
+EXCITATION_FLOOR = np.finfo(np.float64).eps ** 2
 """Share of the largest force power at or below which a line holds rounding alone: of few codes it can be exactly 0."""
 
 
@@ -42,29 +42,33 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """
     if estimator not in get_args(Estimator):
         raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
-    return frf_of_spectra(cross_spectra(hits), hits, estimator)
+    return estimate_frf_from_spectra(compute_cross_spectra(hits), hits, estimator)
 
 
-def frf_of_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
+def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """The same from the mean, or the sum, of the spectra of these hits."""
     s_ff, s_xx, s_fx = spectra
-    excited = s_ff > ROUNDING * np.max(s_ff)
+    excited = s_ff > EXCITATION_FLOOR * np.max(s_ff)
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
-        "H1": lambda: s_fx * _quotient(np.ones_like(s_ff), s_ff, excited),
-        "H2": lambda: _quotient(s_xx * s_fx, np.abs(s_fx) ** 2, excited),
-        "Hv": lambda: np.sqrt(_quotient(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
+        "H1": lambda: s_fx * _divide_where_excited(np.ones_like(s_ff), s_ff, excited),
+        "H2": lambda: _divide_where_excited(s_xx * s_fx, np.abs(s_fx) ** 2, excited),
+        "Hv": lambda: np.sqrt(_divide_where_excited(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
     }
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    coherence = np.minimum(_quotient(np.abs(s_fx) ** 2, s_ff * s_xx, excited), 1.0) if len(hits) > 1 else None
-    return from_accelerance(frequency, forms[estimator](), coherence, len(hits), usable_band(frequency, s_ff))
+    coherence = (
+        np.minimum(_divide_where_excited(np.abs(s_fx) ** 2, s_ff * s_xx, excited), 1.0) if len(hits) > 1 else None
+    )
+    return from_accelerance(frequency, forms[estimator](), coherence, len(hits), find_usable_band(frequency, s_ff))
 
 
-def _quotient(dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArray[np.bool_]) -> NDArray[Any]:
+def _divide_where_excited(
+    dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArray[np.bool_]
+) -> NDArray[Any]:
     """dividend / power at excited lines with any, else 0."""
     return np.asarray(np.divide(dividend, power, out=np.zeros_like(dividend), where=excited & (power > 0)))
 
 
-def cross_spectra(hits: Sequence[Hit]) -> Spectra:
+def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,).
 
     S_fx (N m/s^2) is the mean of conj(F) X, F the force tapered to zero after its pulse. Raises ValueError as
@@ -72,7 +76,7 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
 
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
-    >>> s_ff, s_xx, s_fx = cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
+    >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
     >>> round(float((s_fx[10] / s_ff[10]).real), 6)  # 1/kg
     0.5
     """
@@ -87,7 +91,7 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     parts = spectra.view(np.float64)
     s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
-        part = windowed_force(hit)
+        part = window_force(hit)
         backwards = -np.arange(part.samples.start, part.samples.stop)
         records[0, backwards] = part.force  # in time: its spectrum is conj(F)
         records[1] = hit.acceleration
@@ -95,19 +99,151 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
         records[0, backwards] = 0.0
         s_fx += spectra[0] * spectra[1]
         powers += np.square(parts, out=parts)
-    skew = _skew(hits[0])
+    skew = _get_response_skew(hits[0])
     if skew:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
     return s_ff, s_xx, s_fx * (1 / len(hits))
 
 
-def _skew(hit: Hit) -> float:
+def _get_response_skew(hit: Hit) -> float:
     """How much later the response is sampled than the force (s): its spectrum leads by 2 pi f skew."""
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
-def usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
+def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
     """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
     weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
     return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])
+
+
+MIN_CONVERGED_HITS = 4
+"""Under so many hits a mean is not called settled."""
+MAX_CONVERGED_ERROR = 0.005
+"""Standard error of |H| near the highest peak below which the mean has settled (-)."""
+NEAR_PEAK_SHARE = 0.5
+"""Near the peak is where |accelerance| is at least this share of its largest value in the usable band."""
+
+
+class RunningMean:
+    """H1 of hits of one set-up from the sum of their spectra; of hits without force the hits alone.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
+    >>> response = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7])).response(time, 1e-3)
+    >>> mean, random = RunningMean(), np.random.default_rng(1)
+    >>> for force in (180.0, 200.0, 220.0, 240.0, 260.0):
+    ...     mean.add(Hit(force * pulse, force * response + random.normal(0.0, 2.0, time.size), 10240.0, 100))
+    >>> mean.settled, f"{100 * mean.peak_error:.1f} %"
+    (True, '0.5 %')
+    """
+
+    def __init__(self) -> None:
+        """No hit yet."""
+        self.hits: tuple[Hit, ...] = ()
+        """The hits in it, in the order in which they came."""
+        self.frf: Frf | None = None
+        """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None where there is none."""
+        self._sums: Spectra | None = None
+        self._before: Frf | None = None
+
+    @property
+    def relative_change(self) -> float | None:
+        """By which share the last hit moved the mean; None under 2 hits.
+
+        rms of the difference of the accelerance with and without it over rms of the accelerance, in the usable band.
+        """
+        if self.frf is None or self._before is None:
+            return None
+        inside = _is_in_usable_band(self.frf)
+        now, before = (frf.accelerance[inside] for frf in (self.frf, self._before))
+        return float(np.linalg.norm(now - before) / np.linalg.norm(now))
+
+    @property
+    def has_converged(self) -> bool:
+        """Whether more hits would hardly change the peak: at least SETTLED_HITS of them, and the random error of |H|,
+        sqrt((1 - g2) / (2 n g2)), as rms over the lines near the highest peak, is below SETTLED_ERROR."""
+        return len(self.hits) >= MIN_CONVERGED_HITS and self.peak_error < MAX_CONVERGED_ERROR
+
+    @property
+    def peak_error(self) -> float:
+        """Standard error of |H| near the highest peak (-); inf under 3 hits, where coherence says nothing yet."""
+        frf = self.frf
+        if frf is None or frf.random_error is None:
+            return float("inf")
+        size = np.abs(frf.accelerance) * _is_in_usable_band(frf)
+        near = size >= NEAR_PEAK_SHARE * np.max(size)
+        return float(np.sqrt(np.mean(frf.random_error[near] ** 2)))
+
+    def add(self, hit: Hit) -> None:
+        """Take a good hit in; ValueError where it has no pulse, or another length or rate than those before."""
+        size = hit.acceleration.size
+        if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
+            raise ValueError(
+                f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
+                f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
+            )
+        if not hit.has_force:
+            self.hits = (*self.hits, hit)
+            return
+        spectra = compute_cross_spectra([hit])
+        sums, hits = self._sums, (*self.hits, hit)
+        sums = spectra if sums is None else (sums[0] + spectra[0], sums[1] + spectra[1], sums[2] + spectra[2])
+        self._before, self.frf = self.frf, estimate_frf_from_spectra(sums, hits)
+        self._sums, self.hits = sums, hits
+
+    def estimate_without(self, hit: Hit) -> Frf:
+        """H1 of the other hits; ValueError where this one is not in the mean, or alone in it."""
+        others = self._others(hit)
+        if not others:
+            raise ValueError("this hit is the only one in the mean; there is no mean of the others")
+        return estimate_frf(others)
+
+    def remove(self, hit: Hit) -> None:
+        """Take a hit back; ValueError where it is not in the mean."""
+        kept = self._others(hit)
+        self.hits, self.frf, self._sums = (), None, None
+        for remaining in kept:  # anew: subtraction would leave its rounding errors
+            self.add(remaining)
+
+    def _others(self, hit: Hit) -> list[Hit]:
+        kept = [counted for counted in self.hits if counted is not hit]
+        if len(kept) == len(self.hits):
+            raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
+        return kept
+
+
+def _is_in_usable_band(frf: Frf) -> NDArray[np.bool_]:
+    low, high = frf.usable_band or (0.0, np.inf)
+    return np.asarray((frf.frequency >= low) & (frf.frequency <= high))
+
+
+def propagate_force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator[NDArray[np.complex128]]:
+    """Errors that noise of the hammer brings into H1 at these lines (Hz), as shares of it; an array for each hit.
+
+    Column t of that of hit i, shape (n, samples in its force window + 1), is the error that one standard deviation of
+    the noise at sample t makes, to first order:
+
+        -sigma_i w_i(t) conj(F_i) exp(-2 pi j f t) / sum_k |F_k|^2
+
+    F_i(f) is the spectrum of the windowed force, w_i the window, sigma_i the rms of the baseline, in which the noise
+    is taken as white. The last column is that of the mean of the baseline, which is taken off all samples. Each column
+    has an independent real factor of variance one, and is smooth over lines closer than one over the window's length.
+
+    Source: H1 of `estimate_frf` with F + N for F, expanded in N. Raises ValueError for a hit without a pulse.
+    """
+    yield from propagate_force_noise_through(np.eye(frequency.size), hits, frequency)
+
+
+def propagate_force_noise_through(
+    rows: NDArray[np.complex128] | NDArray[np.float64], hits: Sequence[Hit], frequency: NDArray[np.float64]
+) -> Iterator[NDArray[np.complex128]]:
+    """What linear maps (k, n) make of each array of `propagate_force_noise`, without making that: shape (k, samples + 1)."""
+    parts = [window_force(hit) for hit in hits]
+    time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
+    waves = np.exp(-2j * np.pi * np.outer(frequency, time))
+    spectra = [waves[:, : part.force.size] @ part.force for part in parts]
+    power = np.sum(np.abs(spectra) ** 2, axis=0)
+    for part, spectrum in zip(parts, spectra, strict=True):
+        response = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
+        yield np.column_stack((response * (-part.noise * part.window), response @ (part.mean_noise * part.window)))

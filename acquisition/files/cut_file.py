@@ -12,20 +12,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.atomic import atomic_write
 from acquisition.channel import Channel
 from acquisition.errors import DataError
-from acquisition.files.readers.hdf5_in import HDF5, hdf5_in
-from acquisition.files.readers.unpacked import check_unpacked
-from acquisition.files.seal import is_sealed, sealed
-from acquisition.regular_file import read_regular
+from acquisition.file_io import atomic_write, read_regular_file
+from acquisition.files.hdf5_file import (
+    HDF5_SIGNATURE,
+    append_checksum,
+    check_unpacked_size,
+    has_valid_checksum,
+    open_hdf5,
+)
 
 if TYPE_CHECKING:
     import h5py
 
-FORMAT = "lobewatch-cut"
-VERSION = 1
-PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True, "chunks": True}
+CUT_FORMAT_NAME = "lobewatch-cut"
+CUT_FORMAT_VERSION = 1
+CUT_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True, "chunks": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ class CutSignal:
     """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
 
     @property
-    def seconds(self) -> float:
+    def duration(self) -> float:
         """How long it is."""
         return float(self.acceleration.shape[-1] / self.sample_rate)
 
@@ -63,11 +66,11 @@ class CutSignal:
         if self.overload or not self.acceleration.size:
             return np.full(self.acceleration.shape[-1], self.overload)
         if self.codes is not None and self.channel is not None:
-            low, high = self.channel.rails_in(self.codes)
+            low, high = self.channel.effective_rails(self.codes)
             return np.asarray((self.codes <= low) | (self.codes >= high))
-        return np.asarray(np.any([_at_extremes(axis) for axis in np.atleast_2d(self.acceleration)], axis=0))
+        return np.asarray(np.any([_find_extremes(axis) for axis in np.atleast_2d(self.acceleration)], axis=0))
 
-    def part(self, begin: float, end: float) -> CutSignal:
+    def slice_time(self, begin: float, end: float) -> CutSignal:
         """From one time to another (s)."""
         inside = slice(max(round(begin * self.sample_rate), 0), max(round(end * self.sample_rate), 0))
         codes = None if self.codes is None else self.codes[inside]
@@ -75,15 +78,15 @@ class CutSignal:
         return replace(self, acceleration=self.acceleration[..., inside], codes=codes, speed_rpm=speed)
 
 
-def _at_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _find_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Where one response stands three times in a row at its extreme value; nowhere where it has one value only."""
     top, bottom = np.max(values), np.min(values)
     if top == bottom:
         return np.zeros(values.size, dtype=np.bool_)
-    return _in_a_row(values == top) | _in_a_row(values == bottom)
+    return _find_runs_of_three(values == top) | _find_runs_of_three(values == bottom)
 
 
-def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _find_runs_of_three(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where three or more stand beside each other."""
     padded = np.pad(extreme, 2)
     three = padded[2:] & padded[1:-1] & padded[:-2]
@@ -92,47 +95,47 @@ def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def is_cut_file(path: Path) -> bool:
     """Whether it is a recording of ours, be it a damaged one."""
-    content = read_regular(path)
-    return content.startswith(HDF5) and FORMAT.encode() in content
+    content = read_regular_file(path)
+    return content.startswith(HDF5_SIGNATURE) and CUT_FORMAT_NAME.encode() in content
 
 
 def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:
     """Write it with what is known of the cut (JSON); the bytes of the file, on the disk when this returns."""
     memory = io.BytesIO()
-    with hdf5_in(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION, sample_rate_hz=signal.sample_rate)
+    with open_hdf5(memory, "w") as file:
+        file.attrs.update(format=CUT_FORMAT_NAME, version=CUT_FORMAT_VERSION, sample_rate_hz=signal.sample_rate)
         file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
         if signal.codes is not None and signal.channel is not None:
             word = np.int16 if signal.channel.adc_bits <= 16 else np.int32
-            _dataset(file, "codes", signal.codes.astype(word), "ADC code")
+            _write_dataset(file, "codes", signal.codes.astype(word), "ADC code")
             settings = {field.name: getattr(signal.channel, field.name) for field in fields(Channel)}
             file["codes"].attrs.update(settings)
         else:
-            _dataset(file, "acceleration", signal.acceleration, "m/s^2")
+            _write_dataset(file, "acceleration", signal.acceleration, "m/s^2")
         if signal.speed_rpm is not None:
-            _dataset(file, "speed", signal.speed_rpm, "rpm")
-    content = sealed(memory.getvalue())
+            _write_dataset(file, "speed", signal.speed_rpm, "rpm")
+    content = append_checksum(memory.getvalue())
     atomic_write(path, content)
     return content
 
 
 def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
     """What `write_cut_signal` has written; DataError where it is no such file, or a damaged one."""
-    content = read_regular(path)
-    if not is_sealed(content):  # HDF5 could hang on it
+    content = read_regular_file(path)
+    if not has_valid_checksum(content):  # HDF5 could hang on it
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        with hdf5_in(io.BytesIO(content), "r") as file:
-            if file.attrs.get("format") != FORMAT or int(file.attrs["version"]) > VERSION:
+        with open_hdf5(io.BytesIO(content), "r") as file:
+            if file.attrs.get("format") != CUT_FORMAT_NAME or int(file.attrs["version"]) > CUT_FORMAT_VERSION:
                 raise DataError(f"{path}: no recording of a cut that this lobewatch reads")
-            check_unpacked(file, len(content), path)
-            return _read(file), json.loads(file["about"][()])
+            check_unpacked_size(file, len(content), path)
+            return _read_signal(file), json.loads(file["about"][()])
     except (OSError, KeyError) as error:
         raise DataError(f"{path}: no readable recording of a cut ({error}); take it again from a backup") from error
 
 
-def _read(file: h5py.File) -> CutSignal:
+def _read_signal(file: h5py.File) -> CutSignal:
     rate, lost = float(file.attrs["sample_rate_hz"]), int(file.attrs["lost_scans"])
     overload = bool(file.attrs["overload"])
     if "acceleration" in file:
@@ -149,5 +152,5 @@ def _read(file: h5py.File) -> CutSignal:
     return CutSignal(values * channel.scale, rate, values, channel, lost, overload)
 
 
-def _dataset(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
-    file.create_dataset(name, data=values, **PACKED if values.size else {}).attrs["units"] = unit
+def _write_dataset(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
+    file.create_dataset(name, data=values, **CUT_COMPRESSION if values.size else {}).attrs["units"] = unit

@@ -14,17 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, ChannelQuantity
-from acquisition.event import Event
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
-from acquisition.hits.pulse import samples_before
-from acquisition.source import DeviceIdentity
+from acquisition.hits.pulse import count_pre_hit_samples
+from acquisition.source import DeviceIdentity, Event
 
-PAUSE = 1.0
+REPLAY_QUIET_TIME = 1.0
 """Quiet before, between and after the hits (s)."""
-SCANS_PER_BLOCK = 512
+REPLAY_BLOCK_SCANS = 512
 """Scans handed over at a time."""
-BITS = 24
+REPLAY_ADC_BITS = 24
 """Converter that recordings without codes are read through."""
 
 
@@ -51,7 +50,7 @@ class FileSource:
         """
         hits = read_hits(path)
         quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)
-        self.channels = hits[0].channels or tuple(_channel(quantity, hits) for quantity in quantities)
+        self.channels = hits[0].channels or tuple(_make_channel(quantity, hits) for quantity in quantities)
         """Channels of the recording."""
         self.sample_rate = hits[0].sample_rate
         """Scans a second (Hz)."""
@@ -97,15 +96,15 @@ class FileSource:
 
     def _pieces(self) -> Iterator[Block]:
         """Blocks without their index."""
-        pause = round(PAUSE * self.sample_rate)
+        pause = round(REPLAY_QUIET_TIME * self.sample_rate)
         for hit in self._hits:
             codes = self._codes(hit)
-            quiet = _quiet(hit, codes)
-            yield from _cut(np.resize(quiet, (pause, len(self.channels))).T)
+            quiet = _extract_quiet_scans(hit, codes)
+            yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
             middle = codes.shape[1] // 2
-            yield from _cut(codes[:, :middle], hit.overload)
-            yield from _cut(codes[:, middle:], hit.overload, hit.lost_scans)
-        yield from _cut(np.resize(quiet, (pause, len(self.channels))).T)
+            yield from _split_blocks(codes[:, :middle], hit.overload)
+            yield from _split_blocks(codes[:, middle:], hit.overload, hit.lost_scans)
+        yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
 
     def _codes(self, hit: Hit) -> NDArray[np.int32]:
         if hit.codes is not None:
@@ -113,23 +112,23 @@ class FileSource:
         return np.stack([channel.encode(values) for channel, values in zip(self.channels, hit.signals, strict=True)])
 
 
-def _channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
+def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
     """A channel of 1 V per unit whose rail is the largest value, of the sign that this has."""
     values = np.concatenate([getattr(hit, quantity) for hit in hits])
     largest = float(values[np.argmax(np.abs(values))])
-    top = 2 ** (BITS - 1)
+    top = 2 ** (REPLAY_ADC_BITS - 1)
     full_scale = largest * top / (top - 1) if largest > 0 else -largest
-    return Channel(quantity, 1.0, full_scale or 1.0, BITS)
+    return Channel(quantity, 1.0, full_scale or 1.0, REPLAY_ADC_BITS)
 
 
-def _quiet(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
+def _extract_quiet_scans(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
     """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, channels)."""
-    before = int(0.8 * samples_before(hit))
+    before = int(0.8 * count_pre_hit_samples(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])
 
 
-def _cut(codes: NDArray[np.int32], overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
-    for first in range(0, codes.shape[1], SCANS_PER_BLOCK):
-        block = codes[:, first : first + SCANS_PER_BLOCK]
+def _split_blocks(codes: NDArray[np.int32], overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
+    for first in range(0, codes.shape[1], REPLAY_BLOCK_SCANS):
+        block = codes[:, first : first + REPLAY_BLOCK_SCANS]
         yield Block(0, block, overload, lost_before if first == 0 else 0)

@@ -14,10 +14,10 @@ from acquisition.hit import Hit, HitFlags
 if TYPE_CHECKING:
     import h5py
 
-PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
+HDF5_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 
 
-class SetUp(NamedTuple):
+class HitSettings(NamedTuple):
     """What all hits of a test are recorded with."""
 
     sample_rate: float
@@ -28,26 +28,26 @@ class SetUp(NamedTuple):
     """Channels of the codes; empty where the hits are samples."""
 
     @classmethod
-    def of(cls, hit: Hit) -> SetUp:
+    def from_hit(cls, hit: Hit) -> HitSettings:
         """That of a hit."""
         return cls(hit.sample_rate, hit.pre_trigger, (hit.channels or ()) if hit.codes is not None else ())
 
 
-def dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:
+def write_dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:
     """A dataset with its units."""
     group.create_dataset(name, data=data, **options).attrs["units"] = units
 
 
-def write_raw(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
+def write_raw_hits(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
     """Hits and the verdict on each, as a group of their own; nothing where there are none."""
     if not hits:
         return
     raw = file.create_group("raw")
-    write_set_up(raw, SetUp.of(hits[0]))
+    write_hit_settings(raw, HitSettings.from_hit(hits[0]))
     write_hits(raw, hits, flags)
 
 
-def write_set_up(raw: h5py.Group, set_up: SetUp) -> None:
+def write_hit_settings(raw: h5py.Group, set_up: HitSettings) -> None:
     """The set-up of hits."""
     raw.attrs.update(sample_rate_hz=set_up.sample_rate, pre_trigger_samples=set_up.pre_trigger)
     for i, channel in enumerate(set_up.channels):
@@ -62,24 +62,24 @@ def write_hits(raw: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
     if first.codes is not None and first.channels is not None:
         word = np.int16 if max(channel.adc_bits for channel in first.channels) <= 16 else np.int32
         codes = np.stack([hit.codes for hit in hits if hit.codes is not None]).astype(word)
-        dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **PACKED)
+        write_dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **HDF5_COMPRESSION)
     else:
         samples = np.stack([hit.signals for hit in hits])
-        dataset(
+        write_dataset(
             raw,
             "samples",
             samples,
             "N, m/s^2" if first.has_force else "m/s^2",
             chunks=(1, *samples.shape[1:]),
-            **PACKED,
+            **HDF5_COMPRESSION,
         )
-    dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
-    dataset(raw, "overload", [hit.overload for hit in hits], "1")
-    dataset(raw, "accepted", [not flag for flag in flags], "1")
+    write_dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
+    write_dataset(raw, "overload", [hit.overload for hit in hits], "1")
+    write_dataset(raw, "accepted", [not flag for flag in flags], "1")
     raw["verdict"] = [flag.words for flag in flags]
 
 
-def read_raw(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
+def read_raw_hits(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
     """Hits and the verdicts of then; KeyError where something is missing."""
     if "raw" not in file:
         return (), ()
@@ -102,9 +102,9 @@ def read_raw(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
 
 
 def _read_channel(group: h5py.Group) -> Channel:
-    return Channel(**plain(group.attrs))
+    return Channel(**convert_to_plain(group.attrs))
 
 
-def plain(attributes: h5py.AttributeManager) -> dict[str, Any]:
+def convert_to_plain(attributes: h5py.AttributeManager) -> dict[str, Any]:
     """Attributes as values of Python."""
     return {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}

@@ -1,33 +1,115 @@
-"""Recorded files of other programs and our own, told apart by their content."""
+"""Detect the format of a recorded file and read its hits or its FRF."""
 
 from __future__ import annotations
 
+import functools
+import logging
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TypeVar
 
-from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents
-from acquisition.files.contents.description import Description
-from acquisition.files.contents.joined import joined
-from acquisition.files.contents.ledger import Fact
-from acquisition.files.contents.recording import Recording, understood
-from acquisition.files.formats import broken_formats, format_of
-from acquisition.files.readers.format import Format
+from acquisition.errors import DataError, Remark
+from acquisition.file_io import open_regular_file
+from acquisition.files.contents.contents import Contents, Format, append_force_signals
+from acquisition.files.contents.description import Description, Fact
+from acquisition.files.contents.recording import Recording, resolve_recording
+from acquisition.files.readers.read_arrays import FOREIGN_HDF5_FORMAT, MAT_FORMAT, NUMPY_FORMAT, SEP005_FORMAT
+from acquisition.files.readers.read_audio import AUDIO_FORMAT
+from acquisition.files.readers.read_labview import LVM_FORMAT, TDMS_FORMAT
+from acquisition.files.readers.read_text_tables import PULSE_FORMAT, TEXT_TABLE_FORMAT
+from acquisition.files.readers.read_uff import UFF_FORMAT
+from acquisition.files.tap_file import TAP_FILE_FORMAT
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.tap import Circumstances
-from acquisition.verdicts.average_good import average_good
+from acquisition.hit_quality.evaluate_hit import average_good_hits
+from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
+from acquisition.tap_test import Circumstances
+
+FORMATS_ENTRY_POINT_GROUP = "lobewatch.formats"
+"""Entry points that each name one Format."""
+BUILT_IN_FORMATS = (
+    TAP_FILE_FORMAT,
+    UFF_FORMAT,
+    MAT_FORMAT,
+    LVM_FORMAT,
+    TDMS_FORMAT,
+    AUDIO_FORMAT,
+    SEP005_FORMAT,
+    NUMPY_FORMAT,
+    FOREIGN_HDF5_FORMAT,
+    PULSE_FORMAT,
+    TEXT_TABLE_FORMAT,
+)
+"""The table last: it takes any text."""
+FORMAT_HEAD_SIZE = 4096
+"""Bytes at the start of a file that a format is asked with."""
+
+_log = logging.getLogger(__name__)
+
+
+def list_formats() -> tuple[Format, ...]:
+    """All formats in the order in which they are asked: those of other packages, which know their own files, first."""
+    return (*_load_plugin_formats()[0], *BUILT_IN_FORMATS)
+
+
+def detect_format(path: Path) -> Format:
+    """The format of a file by its content; DataError for one that is empty or of no known format."""
+    with open_regular_file(path, math.inf) as file:
+        head = file.read(FORMAT_HEAD_SIZE)
+    if not head:
+        raise DataError(f"{path}: the file is empty")
+    for file_format in list_formats():
+        if _matches_format(file_format, head, path):
+            return file_format
+    titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
+    raise DataError(
+        f"{path}: of no format that is known here; export it as one of these: {titles}{describe_broken_formats()}"
+    )
+
+
+def describe_broken_formats() -> str:
+    """What is wrong with formats of other packages, to be added to the error of a file; empty where nothing is."""
+    return "".join(f"; {fault}" for fault in _load_plugin_formats()[1])
+
+
+def _matches_format(file_format: Format, head: bytes, path: Path) -> bool:
+    try:
+        return file_format.matches(head, path)
+    except PLUGIN_ERRORS as error:  # code of others may raise anything; the other formats are asked still
+        _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, format_exception_line(error))
+        return False
+
+
+@functools.cache
+def _load_plugin_formats() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
+    """Formats of other packages, and a remark on each that cannot be used."""
+    formats: dict[str, Format] = {}
+    remarks: list[Remark] = []
+    taken = {built_in.name for built_in in BUILT_IN_FORMATS}
+    for point in sorted(entry_points(group=FORMATS_ENTRY_POINT_GROUP), key=lambda point: point.name):
+        plugin = load_plugin(point, Format)
+        if isinstance(plugin, Format) and plugin.name not in taken | formats.keys():
+            formats[plugin.name] = plugin
+        elif isinstance(plugin, Format):
+            remarks.append(
+                make_unusable_remark(Format, point.name, f"{get_package_name(point)} is not the only one to bring it")
+            )
+        else:
+            remarks.append(plugin)
+    return tuple(formats.values()), tuple(remarks)
+
 
 Result = TypeVar("Result")
-NOTHING = Description()
+EMPTY_DESCRIPTION = Description()
 """A person who says nothing."""
 DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
 """Decimal signs of a text by what a person calls them."""
 
 
-def look(path: Path | str, said: Description = NOTHING) -> Recording:
+def inspect_file(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Recording:
     """A recorded file as it is understood, what is missing or wrong in it told as its `complaint`.
 
     DataError for a file that is damaged or of no format that is known.
@@ -35,51 +117,55 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     >>> from tempfile import TemporaryDirectory
     >>> line = np.arange(400.0, 500.0)
     >>> with TemporaryDirectory() as folder:
-    ...     table = np.column_stack([line, 0 * line, 0 * line - 1e-6])
-    ...     np.savetxt(f"{folder}/frf.csv", table, delimiter=",", header="frequency [Hz],real,imag", comments="")
-    ...     unclear = look(f"{folder}/frf.csv")
-    ...     clear = look(f"{folder}/frf.csv", Description(unit="m/N"))
+    ...     new_table = np.column_stack([line, 0 * line, 0 * line - 1e-6])
+    ...     np.savetxt(f"{folder}/frf.csv", new_table, delimiter=",", header="frequency [Hz],real,imag", comments="")
+    ...     unclear = inspect_file(f"{folder}/frf.csv")
+    ...     clear = inspect_file(f"{folder}/frf.csv", Description(unit="m/N"))
     >>> print(unclear.complaint)
     it does not say: the unit of real (--unit, such as m/N, um/N, g/N)
     >>> clear.complaint, clear.frf.frequency.size
     ('', 100)
     """
     path = Path(path)
-    file_format = format_of(path)
-    held = contents_of(file_format, path, said)
+    file_format = detect_format(path)
+    held = read_contents(file_format, path, said)
     if isinstance(held, Contents):
-        contents = held if said.force is None else joined(held, _force_contents(said.force, said), said.force)
-        return _guarded(file_format, path, lambda: understood(path, file_format.title, contents, said))
-    about = file_format.recorded_as(path)
+        contents = (
+            held
+            if said.force is None
+            else append_force_signals(held, _read_force_contents(said.force, said), said.force)
+        )
+        return _convert_errors(file_format, path, lambda: resolve_recording(path, file_format.title, contents, said))
+    about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
-    options = said.of_signals()
+    options = said.list_signal_options()
     complaint = f"a {file_format.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
-    recording = Recording(path, file_format.title, hits, frf, tuple(_facts(hits, frf)), complaint)
-    return recording if about is None else _labelled(recording, about)
+    recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), complaint)
+    return recording if about is None else _add_circumstances(recording, about)
 
 
-def contents_of(file_format: Format, path: Path, said: Description) -> Contents | list[Hit] | Frf:
+def read_contents(file_format: Format, path: Path, said: Description) -> Contents | list[Hit] | Frf:
     """What a file of this format holds, behind the lines that are passed over of a text; DataError where it is none."""
     read_from, option = file_format.read_from, f"--skip {said.skip}" if said.skip else f"--decimal {said.decimal}"
     if not said.skip and not said.decimal:
-        return _guarded(file_format, path, lambda: file_format.read(path))
+        return _convert_errors(file_format, path, lambda: file_format.read(path))
     if read_from is None:
         raise DataError(f"{path}: {option}: a {file_format.title} is no text of lines; leave the option out")
     if said.decimal not in DECIMAL_SIGNS:
         raise DataError(f"{path}: {option}: is no decimal sign; give comma or point")
     sign = DECIMAL_SIGNS[said.decimal]
-    return _guarded(file_format, path, lambda: read_from(path, said.skip or 0, sign))
+    return _convert_errors(file_format, path, lambda: read_from(path, said.skip or 0, sign))
 
 
-def _force_contents(path: Path, said: Description) -> Contents:
-    file_format = format_of(path)
-    held = contents_of(file_format, path, said if file_format.read_from else NOTHING)
+def _read_force_contents(path: Path, said: Description) -> Contents:
+    file_format = detect_format(path)
+    held = read_contents(file_format, path, said if file_format.read_from else EMPTY_DESCRIPTION)
     if not isinstance(held, Contents):
         raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
     return held
 
 
-def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
+def read_hits(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit]:
     """The hits in a recorded file of any known format, bad ones too (see `check_hit`); DataError where there are none.
 
     >>> from tempfile import TemporaryDirectory
@@ -87,9 +173,9 @@ def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> with TemporaryDirectory() as folder:
-    ...     table = np.column_stack([time, force, 200 * structure.response(time, 1e-3) / STANDARD_GRAVITY])
+    ...     new_table = np.column_stack([time, force, 200 * structure.response(time, 1e-3) / STANDARD_GRAVITY])
     ...     names = "time [s],force [N],response [g]"
-    ...     np.savetxt(f"{folder}/hit.csv", table, delimiter=",", header=names, comments="")
+    ...     np.savetxt(f"{folder}/hit.csv", new_table, delimiter=",", header=names, comments="")
     ...     (hit,) = read_hits(f"{folder}/hit.csv")
     >>> f"{hit.sample_rate:.0f} Hz, {hit.force.max():.0f} N, {abs(hit.acceleration).max():.1f} m/s^2"
     '10240 Hz, 199 N, 102.1 m/s^2'
@@ -100,7 +186,7 @@ def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
     return recording
 
 
-def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
+def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
     """The FRF that a recorded file holds, or that estimated (H1) from its good hits.
 
     DataError where it holds neither, or no good hit.
@@ -108,22 +194,22 @@ def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     >>> from tempfile import TemporaryDirectory
     >>> line = np.arange(400.0, 500.0)
     >>> with TemporaryDirectory() as folder:
-    ...     table = np.column_stack([line, 0 * line, 0 * line - 1.0])
+    ...     new_table = np.column_stack([line, 0 * line, 0 * line - 1.0])
     ...     names = "frequency [Hz],real [um/N],imag [um/N]"
-    ...     np.savetxt(f"{folder}/frf.csv", table, delimiter=",", header=names, comments="")
+    ...     np.savetxt(f"{folder}/frf.csv", new_table, delimiter=",", header=names, comments="")
     ...     frf = read_frf(f"{folder}/frf.csv")
     >>> complex(frf.receptance[0])  # m/N
     -1e-06j
     """
     path = Path(path)
-    file_format = format_of(path)
+    file_format = detect_format(path)
     if file_format.read_frf is not None:
         return file_format.read_frf(path)
     recording = read_recording(path, said)
     if isinstance(recording, Frf):
         return recording
     try:
-        frf = average_good(recording)[0]
+        frf = average_good_hits(recording)[0]
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     if frf is None:
@@ -131,18 +217,18 @@ def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     return frf
 
 
-def read_recording(path: Path | str, said: Description = NOTHING) -> list[Hit] | Frf:
+def read_recording(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
     """Hits where the file holds time histories, an FRF where it holds one; DataError where it holds neither."""
-    recording = look(path, said).checked()
+    recording = inspect_file(path, said).require_valid()
     return list(recording.hits) if recording.frf is None else recording.frf
 
 
-def _guarded(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
+def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
     """What some work on a file gives; DataError for whatever goes wrong in it."""
     try:
         return work()
     except DataError as error:
-        raise DataError(f"{error}{broken_formats()}") from error
+        raise DataError(f"{error}{describe_broken_formats()}") from error
     except OSError:
         raise
     except Exception as error:
@@ -152,7 +238,7 @@ def _guarded(file_format: Format, path: Path, work: Callable[[], Result]) -> Res
         ) from error
 
 
-def _facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
+def _list_facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
     if frf is not None:
         span = f"{frf.frequency.size}, {frf.frequency[0]:.4g} to {frf.frequency[-1]:.6g} Hz"
         return [Fact("lines", span, "file"), Fact("unit", f"m/N, from {frf.measured_as}", "file")]
@@ -160,7 +246,7 @@ def _facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
     return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), *([force] if hits[0].has_force else []), unit]
 
 
-def _labelled(recording: Recording, about: Circumstances) -> Recording:
+def _add_circumstances(recording: Recording, about: Circumstances) -> Recording:
     return replace(
         recording,
         created=about.created,

@@ -1,4 +1,4 @@
-"""Tap tests as HDF5 files, one file a test, written whole and never rewritten.
+"""Tap tests as HDF5 files, one file per test, written whole and never rewritten.
 
 Built in memory, then temporary name + fsync + rename: a file of this name is always complete. Every dataset has a
 `units` attribute; no pickles, so that h5dump, MATLAB and Julia read it.
@@ -19,25 +19,38 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.atomic import atomic_write
-from acquisition.channel import tap_direction
+from acquisition.channel import parse_direction
 from acquisition.errors import DataError
-from acquisition.files.raw_hits import PACKED, SetUp, dataset, plain, read_raw, write_hits, write_raw, write_set_up
-from acquisition.files.readers.hdf5_in import hdf5_in
-from acquisition.files.readers.unpacked import check_unpacked
-from acquisition.files.seal import is_broken, sealed
+from acquisition.file_io import atomic_write, read_regular_file
+from acquisition.files.contents.contents import Format
+from acquisition.files.hdf5_file import (
+    HDF5_SIGNATURE,
+    append_checksum,
+    check_unpacked_size,
+    has_wrong_checksum,
+    open_hdf5,
+)
+from acquisition.files.raw_hits import (
+    HDF5_COMPRESSION,
+    HitSettings,
+    convert_to_plain,
+    read_raw_hits,
+    write_dataset,
+    write_hit_settings,
+    write_hits,
+    write_raw_hits,
+)
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
-from acquisition.regular_file import read_regular
-from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
+from acquisition.tap_test import Circumstances, Conditions, SourceFile, TapTest
 
 if TYPE_CHECKING:
     import h5py
 
-FORMAT = "lobewatch-tap"
-VERSION, WITHOUT_FORCE = 1, 2
+TAP_FORMAT_NAME = "lobewatch-tap"
+TAP_FORMAT_VERSION, TAP_FORMAT_VERSION_WITHOUT_FORCE = 1, 2
 """Version of a file, and that of one without force and FRF, which older programs cannot read."""
-CHUNK = 1_000_000
+SOURCE_CHUNK_SIZE = 1_000_000
 """Bytes of a replayed file that are packed together."""
 
 
@@ -54,36 +67,38 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
     >>> again.circumstances.tool, again.frf.frequency.size
     ('D16', 100)
     """
-    content = tap_content(tap)
+    content = encode_tap(tap)
     atomic_write(Path(path), content)
     return content
 
 
-def tap_content(tap: TapTest) -> bytes:
+def encode_tap(tap: TapTest) -> bytes:
     """The bytes of the file of a tap test."""
     memory = io.BytesIO()
-    with hdf5_in(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=_version(tap.hits), software=_software(), id=tap.id)
+    with open_hdf5(memory, "w") as file:
+        file.attrs.update(
+            format=TAP_FORMAT_NAME, version=_choose_version(tap.hits), software=_get_software_name(), id=tap.id
+        )
         _write_circumstances(file, tap.circumstances)
-        write_raw(file, tap.hits, tap.flags)
+        write_raw_hits(file, tap.hits, tap.flags)
         if tap.frf is not None:
             _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
             _write_source(file, tap.source)
-    return sealed(memory.getvalue())
+    return append_checksum(memory.getvalue())
 
 
-def _version(hits: Sequence[Hit]) -> int:
-    return VERSION if not hits or hits[0].has_force else WITHOUT_FORCE
+def _choose_version(hits: Sequence[Hit]) -> int:
+    return TAP_FORMAT_VERSION if not hits or hits[0].has_force else TAP_FORMAT_VERSION_WITHOUT_FORCE
 
 
 @functools.cache
-def _software() -> str:
+def _get_software_name() -> str:
     """Reading the metadata of the package takes as long as writing an FRF."""
     return f"lobewatch {version('lobewatch')}"
 
 
-def as_written(tap: TapTest) -> TapTest:
+def round_as_stored(tap: TapTest) -> TapTest:
     """The tap test as it is read from its file: where the hits are there the coherence is rounded to float32."""
     if not tap.hits or tap.frf is None or tap.frf.coherence is None:
         return tap
@@ -92,9 +107,9 @@ def as_written(tap: TapTest) -> TapTest:
 
 def read_tap(path: Path | str) -> TapTest:
     """A tap test from its file; DataError where it is none or damaged."""
-    with _open(Path(path)) as file:
+    with _open_tap_file(Path(path)) as file:
         try:
-            hits, flags = read_raw(file)
+            hits, flags = read_raw_hits(file)
             return TapTest(
                 file.attrs["id"], _read_circumstances(file), _read_frf(file), hits, flags, _read_source(file)
             )
@@ -105,58 +120,60 @@ def read_tap(path: Path | str) -> TapTest:
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
     """One hit of a test in progress, as each sensor felt it, and the verdict on it, sealed; on the disk when this
     returns, else OSError."""
-    memory = io.BytesIO(_without_hit(circumstances, _version([hit]), SetUp.of(hit)))
-    with hdf5_in(memory, "r+") as file:
+    memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), HitSettings.from_hit(hit)))
+    with open_hdf5(memory, "r+") as file:
         file.attrs["file"] = Path(path).name
         write_hits(file["raw"], [hit], [flags])
-        if hit.beside is not None:
-            write_raw(file.create_group("beside"), [hit.beside], [flags])
-    atomic_write(Path(path), sealed(memory.getvalue()))
+        if hit.cross_hit is not None:
+            write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags])
+    atomic_write(Path(path), append_checksum(memory.getvalue()))
 
 
 @functools.lru_cache(maxsize=1)
-def _without_hit(about: Circumstances, version: int, set_up: SetUp) -> bytes:
+def _encode_without_hit(about: Circumstances, version: int, set_up: HitSettings) -> bytes:
     """The file of a hit of this test before the hit is in it, which is a third of the work."""
     memory = io.BytesIO()
-    with hdf5_in(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=version)
+    with open_hdf5(memory, "w") as file:
+        file.attrs.update(format=TAP_FORMAT_NAME, version=version)
         _write_circumstances(file, about)
-        write_set_up(file.create_group("raw"), set_up)
+        write_hit_settings(file.create_group("raw"), set_up)
     return memory.getvalue()
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
     """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then; DataError as read_tap."""
-    with _open(Path(path)) as file:
-        hits, flags = read_raw(file)
+    with _open_tap_file(Path(path)) as file:
+        hits, flags = read_raw_hits(file)
         if "beside" in file:
-            pairs = zip(hits, read_raw(file["beside"])[0], strict=True)
-            hits = tuple(replace(hit, beside=beside) for hit, beside in pairs)
+            pairs = zip(hits, read_raw_hits(file["beside"])[0], strict=True)
+            hits = tuple(replace(hit, cross_hit=beside) for hit, beside in pairs)
         return hits, _read_circumstances(file), flags
 
 
 def read_hit_name(path: Path | str) -> str:
     """The name that a hit file was written under; empty in the first ones."""
-    with _open(Path(path)) as file:
+    with _open_tap_file(Path(path)) as file:
         return str(file.attrs.get("file", ""))
 
 
-def _open(path: Path) -> h5py.File:
-    content = read_regular(path)
-    if is_broken(content):
+def _open_tap_file(path: Path) -> h5py.File:
+    content = read_regular_file(path)
+    if has_wrong_checksum(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        file = hdf5_in(io.BytesIO(content), "r")
+        file = open_hdf5(io.BytesIO(content), "r")
     except OSError as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
     try:
-        if file.attrs.get("format") != FORMAT:
-            raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
-        newest = int(file.attrs.get("version", VERSION))
-        if newest > WITHOUT_FORCE:
-            versions = f"a tap file of version {newest}, this lobewatch reads up to {WITHOUT_FORCE}"
+        if file.attrs.get("format") != TAP_FORMAT_NAME:
+            raise DataError(
+                f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
+            )
+        newest = int(file.attrs.get("version", TAP_FORMAT_VERSION))
+        if newest > TAP_FORMAT_VERSION_WITHOUT_FORCE:
+            versions = f"a tap file of version {newest}, this lobewatch reads up to {TAP_FORMAT_VERSION_WITHOUT_FORCE}"
             raise DataError(f"{path}: {versions}; update lobewatch")
-        check_unpacked(file, len(content), path)
+        check_unpacked_size(file, len(content), path)
     except (OSError, LookupError, RuntimeError) as error:
         file.close()
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
@@ -171,17 +188,17 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
     for name in ("machine", "tool", "direction", "operator", "device"):
         file.attrs[name] = getattr(about, name).replace("\0", "")  # HDF5 text ends there, and a device may send it
-    file.attrs.update(about.conditions.known)
+    file.attrs.update(about.conditions.specified)
     file["machine_toml"] = about.machine_toml
 
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
     named = {name: str(file.attrs[name]) for name in ("machine", "tool", "operator")}
-    direction = tap_direction(str(file.attrs["direction"]))
+    direction = parse_direction(str(file.attrs["direction"]))
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
     text = file["machine_toml"][()].decode()
-    under = Conditions.of(plain(file.attrs))  # none in the first files
+    under = Conditions.from_mapping(convert_to_plain(file.attrs))  # none in the first files
     return Circumstances(
         created=created, direction=direction, machine_toml=text, device=device, conditions=under, **named
     )
@@ -201,16 +218,16 @@ def _write_lines(
     group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
 ) -> None:
     """Arrays over frequency, which becomes their dimension scale."""
-    dataset(group, "frequency", frequency, "Hz", **PACKED)
+    write_dataset(group, "frequency", frequency, "Hz", **HDF5_COMPRESSION)
     group["frequency"].make_scale("frequency")
     for name, (data, units) in arrays.items():
         if data is not None:
-            dataset(group, name, data, units, **PACKED)
+            write_dataset(group, name, data, units, **HDF5_COMPRESSION)
             group[name].dims[0].attach_scale(group["frequency"])
 
 
 def _read_frf(file: h5py.File) -> Frf | None:
-    if "frf" not in file and int(file.attrs.get("version", VERSION)) == WITHOUT_FORCE:
+    if "frf" not in file and int(file.attrs.get("version", TAP_FORMAT_VERSION)) == TAP_FORMAT_VERSION_WITHOUT_FORCE:
         return None
     group = file["frf"]
     coherence = group["coherence"][()] if "coherence" in group else None
@@ -227,7 +244,12 @@ def _read_frf(file: h5py.File) -> Frf | None:
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
     content = np.frombuffer(source.content, np.uint8)
-    packed = {"chunks": (min(content.size, CHUNK),), "compression": "gzip", "compression_opts": 1, "fletcher32": True}
+    packed = {
+        "chunks": (min(content.size, SOURCE_CHUNK_SIZE),),
+        "compression": "gzip",
+        "compression_opts": 1,
+        "fletcher32": True,
+    }
     stored = file.create_dataset("source", data=content, **packed if content.size else {})
     stored.attrs.update(name=source.name, sha256=source.sha256, units="byte")
 
@@ -238,3 +260,48 @@ def _read_source(file: h5py.File) -> SourceFile | None:
     stored = file["source"]
     content = stored[()].tobytes()
     return SourceFile(str(stored.attrs["name"]), content, "" if content else str(stored.attrs["sha256"]))
+
+
+_NON_SIGNAL_FLAGS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_EVALUATED
+
+
+def read_tap_recording(path: Path) -> list[Hit] | Frf:
+    """The hits of a tap file but for those that their own time signals do not speak against and that were refused all
+    the same: taken back, of another spot, of a force that does not reach far enough, not judged. The FRF where none is
+    left."""
+    hits, _, flags = read_tap_hits(path)
+    kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _NON_SIGNAL_FLAGS]
+    return kept or read_tap(path).required_frf
+
+
+def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
+    """Whether a file is a live tap test of ours, and hits read from it are all of its hits: no signal is lost without
+    the file."""
+    if not hits or not read_regular_file(path).startswith(HDF5_SIGNATURE):
+        return False
+    tap = read_tap(path)
+    return tap.source is None and len(tap.hits) == len(hits)
+
+
+def _is_lobewatch_file(head: bytes, path: Path) -> bool:
+    """Whether an HDF5 file is one of lobewatch, though perhaps not a tap file: told from its bytes, as damage is."""
+    return head.startswith(HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
+
+
+def _read_file_circumstances(path: Path) -> Circumstances:
+    return read_tap_hits(path)[1]
+
+
+def _read_file_frf(path: Path) -> Frf:
+    return read_tap(path).required_frf
+
+
+TAP_FILE_FORMAT = Format(
+    "tap-file",
+    "tap file of lobewatch",
+    (".h5",),
+    _is_lobewatch_file,
+    read_tap_recording,
+    _read_file_circumstances,
+    read_frf=_read_file_frf,
+)

@@ -1,27 +1,24 @@
 """From a stream of scans to single hits, and what a hit is made of: rest, pulse, ringing, window."""
 
-from acquisition.hits.capture_hits import HitSearch, Trigger, capture_hits
-from acquisition.hits.free_decay import HIT_ENDS, free_decay, resting_noise
-from acquisition.hits.hits_in_record import hits_in_record
-from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
-from acquisition.hits.ring_down import ring_down
-from acquisition.hits.tap_inputs import TapInputs, input_channels
-from acquisition.hits.windowed_force import windowed_force
+from acquisition.hit import TapInputs, select_input_channels
+from acquisition.hits.capture_hits import HitSearch, Trigger, capture_hits, split_record
+from acquisition.hits.free_decay import MAX_CONTACT_TIME, estimate_decay_time, extract_free_decay, measure_rest_noise
+from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, find_pulse, window_force
 
 __all__ = [
-    "HIT_ENDS",
+    "MAX_CONTACT_TIME",
     "HitSearch",
     "Pulse",
     "TapInputs",
     "Trigger",
-    "baseline",
     "capture_hits",
+    "count_pre_hit_samples",
+    "estimate_decay_time",
+    "extract_baseline",
+    "extract_free_decay",
     "find_pulse",
-    "free_decay",
-    "hits_in_record",
-    "input_channels",
-    "resting_noise",
-    "ring_down",
-    "samples_before",
-    "windowed_force",
+    "measure_rest_noise",
+    "select_input_channels",
+    "split_record",
+    "window_force",
 ]

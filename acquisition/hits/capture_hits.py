@@ -1,23 +1,59 @@
-"""From a stream of scans to single hits: trigger on a crossing, with hysteresis and real pre-trigger samples, armed
-again when the structure is at rest."""
+"""Capture hits from a stream of scans or from one long record.
+
+again when the structure is at rest.
+"""
 
 from __future__ import annotations
 
 import functools
 import operator
+from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, ChannelQuantity
-from acquisition.hit import Hit
-from acquisition.hits.rest import Rest
-from acquisition.hits.tap_inputs import TapInputs
+from acquisition.hit import Hit, TapInputs
 from acquisition.source import Source
 
-PATIENCE = 2.0
+MAX_REST_RMS_RATIO = 2.0
+"""The response is at rest where its rms is at most this many times that of the baseline ..."""
+MAX_REST_CODES = 2.0
+"""... or this many steps of the converter."""
+STEADY_RMS_SHARE = 0.8
+"""A response does not fall where the median rms of the second half of what was seen is this share of the first's."""
+
+
+class RestDetector:
+    """The level of rest of one response, in steps of the converter."""
+
+    def __init__(self, rms: float, patience: int) -> None:
+        """rms: of the baseline (steps); patience: after how many stretches that do not fall they are the new baseline,
+        e.g. because of a machine started next door."""
+        self._rms = rms
+        self._seen: deque[float] = deque(maxlen=patience)
+
+    def is_at_rest(self, response: NDArray[np.int32]) -> bool:
+        """Whether the structure is at rest over these samples."""
+        return bool(np.std(response) <= max(MAX_REST_RMS_RATIO * self._rms, MAX_REST_CODES))
+
+    def update(self, response: NDArray[np.int32]) -> bool:
+        """The same, for the next of successive stretches that rest is waited for in."""
+        self._seen.append(float(np.std(response)))
+        if len(self._seen) == self._seen.maxlen:
+            half = len(self._seen) // 2
+            first, second = (np.median(list(self._seen)[part]) for part in (slice(half), slice(half, None)))
+            if second >= STEADY_RMS_SHARE * first:
+                self._rms = max(self._rms, float(second))
+        if not self.is_at_rest(response):
+            return False
+        self._seen.clear()
+        return True
+
+
+NEW_BASELINE_TIME = 2.0
 """A response that has not fallen for so long is no ringing but the new baseline (s)."""
 
 
@@ -75,8 +111,8 @@ class HitSearch:
     def __init__(
         self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger, direction: str = ""
     ) -> None:
-        """Search a stream of these channels from its next scan on; direction: as for `input_channels`."""
-        self._inputs = TapInputs.of(channels, trigger.quantity, direction)
+        """Search a stream of these channels from its next scan on; direction: as for `select_input_channels`."""
+        self._inputs = TapInputs.select(channels, trigger.quantity, direction)
         self._used = self._inputs.channels
         self._rate, self._trigger = sample_rate, trigger
         self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
@@ -89,10 +125,10 @@ class HitSearch:
         self._crossing: int | None = None
         self._gaps: list[tuple[int, int]] = []
         self._overloads: list[tuple[int, int, int]] = []
-        self._rest: Rest | None = None
+        self._rest: RestDetector | None = None
         if trigger.rest_rms is not None:
-            patience = max(round(PATIENCE * sample_rate / trigger.pre_trigger), 2)
-            self._rest = Rest(trigger.rest_rms / abs(self._used[-1].scale), patience)
+            patience = max(round(NEW_BASELINE_TIME * sample_rate / trigger.pre_trigger), 2)
+            self._rest = RestDetector(trigger.rest_rms / abs(self._used[-1].scale), patience)
         self._settled = self._rest is None
         self.too_early = 0
         """Hits passed over because the structure was not at rest."""
@@ -114,7 +150,7 @@ class HitSearch:
         self._add(block)
         while (record := self._next_record()) is not None:
             codes, lost, overload = record
-            yield self._inputs.hit(codes, self._rate, self._trigger.pre_trigger, lost, overload)
+            yield self._inputs.make_hit(codes, self._rate, self._trigger.pre_trigger, lost, overload)
 
     def _add(self, block: Block) -> None:
         overload = sum((block.overload >> row & 1) << i for i, row in enumerate(self._inputs.rows))
@@ -162,7 +198,7 @@ class HitSearch:
                 return False
             # The pulse may begin before its crossing.
             quiet = self._codes[-1, crossing - before : crossing - before // 5]
-            if self._rest is None or self._rest.holds(quiet):
+            if self._rest is None or self._rest.is_at_rest(quiet):
                 self._crossing = crossing
                 return True
             self.too_early += 1
@@ -177,7 +213,7 @@ class HitSearch:
             heard = self._heard(max(start - 1, 0), self._from)
             above = heard >= self._level
             self.too_early += int(np.count_nonzero(above[1:] & ~above[:-1]))
-            still = self._rest.wait(self._codes[-1, start : self._from])
+            still = self._rest.update(self._codes[-1, start : self._from])
             if still and np.max(heard) < self._trigger.hysteresis * self._level:
                 self._settled, self._quiet = True, width
                 return True
@@ -219,3 +255,72 @@ class HitSearch:
         self._from -= count
         self._gaps = [(position - count, lost) for position, lost in self._gaps if position > count]
         self._overloads = [(first - count, last - count, mask) for first, last, mask in self._overloads if last > count]
+
+
+MIN_HIT_SPACING = 0.2
+"""A pulse that comes sooner after the one before is a second touch: a hammer bounces within 0.1 s (s)."""
+PULSE_LEVEL_SHARE = 0.1
+"""A pulse is one where the force is above this share of the largest ..."""
+PULSE_NOISE_RATIO = 10.0
+"""... and so many times its noise."""
+PRE_HIT_TIME = 0.02
+"""Kept before each pulse, at rest (s)."""
+REST_RESPONSE_SHARE = 0.02
+"""The response is at rest where its rms over BEFORE is at most this share of the loudest after the hit before ..."""
+REST_NOISE_RATIO = 2.0
+"""... or so many times that of the quietest tenth of the record."""
+MIN_LAST_HIT_SHARE = 0.5
+"""The last hit is left out where the record ends sooner after it than after this share of the others."""
+
+
+def split_record(record: Hit) -> list[Hit]:
+    """Each hit of a record by itself, all of one length; the record itself where it holds one hit or none.
+
+    A hit begins where the force rises at least 0.2 s after the pulse before and the response has come to rest; what
+    comes sooner belongs to the hit before it, which is then a double hit, or has not decayed. All are as long as the
+    shortest; nothing is interpolated.
+    """
+    starts = _find_hit_starts(record)
+    if len(starts) < 2:
+        return [record]
+    before = min(round(PRE_HIT_TIME * record.sample_rate), int(starts[0]))
+    begins = starts - before
+    lengths = np.diff(begins, append=record.acceleration.size)
+    n = int(np.min(lengths[:-1]))
+    if lengths[-1] < MIN_LAST_HIT_SHARE * n:
+        begins = begins[:-1]
+    n = min(n, int(np.min(record.acceleration.size - begins)))
+    return [_cut_hit(record, int(a), n, before) for a in begins]
+
+
+def _cut_hit(record: Hit, begin: int, size: int, before: int) -> Hit:
+    inside = slice(begin, begin + size)
+    force = record.force[inside] if record.has_force else record.force
+    return replace(record, force=force, acceleration=record.acceleration[inside], pre_trigger=before)
+
+
+def _find_hit_starts(record: Hit) -> NDArray[np.intp]:
+    """Samples at which the force rises at the beginning of a hit, or without one the response."""
+    force, rate = record.signals[0] - np.median(record.signals[0]), record.sample_rate
+    force = force if record.has_force else np.abs(force)
+    noise = 1.4826 * float(np.median(np.abs(force)))
+    loud = np.flatnonzero(force > max(PULSE_LEVEL_SHARE * float(np.max(force)), PULSE_NOISE_RATIO * noise))
+    rises = loud[np.diff(loud, prepend=-force.size) > MIN_HIT_SPACING * rate]
+    if rises.size < 2:
+        return rises
+    width = max(round(PRE_HIT_TIME * rate), 8)
+    levels = _compute_stretch_rms(record.acceleration, width)
+    quiet = REST_NOISE_RATIO * float(np.quantile(levels, 0.1))
+    kept = [rises[0]]
+    for rise in rises[1:]:
+        since = levels[int(kept[-1]) // width : max(int(rise) // width, int(kept[-1]) // width + 1)]
+        now = float(np.std(record.acceleration[max(rise - width, 0) : max(rise - width // 5, 8)]))
+        if now <= max(REST_RESPONSE_SHARE * float(np.max(since)), quiet):
+            kept.append(rise)
+    return np.array(kept)
+
+
+def _compute_stretch_rms(response: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """rms about its mean of each stretch of so many samples; at least one."""
+    count = max(response.size // width, 1)
+    return np.array([float(np.std(part)) for part in np.array_split(response[: count * width], count)])

@@ -1,4 +1,4 @@
-"""What rings after a hit whose force nobody measured."""
+"""Extract the free decay after a hit and estimate its time constant."""
 
 from __future__ import annotations
 
@@ -6,20 +6,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.hit import Hit
-from acquisition.hits.pulse import baseline, samples_before
+from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, find_pulse
 
-HIT_ENDS = 1.5e-3
+MAX_CONTACT_TIME = 1.5e-3
 """Time after the beginning of a hit at which a decay begins (s): a hammer touches for 0.3 to 3 ms, and what is left of
 its force then moves no mode (`modal.decay_spectra`)."""
 
 
-def free_decay(hit: Hit) -> NDArray[np.float64]:
+def extract_free_decay(hit: Hit) -> NDArray[np.float64]:
     """Acceleration (m/s^2) from HIT_ENDS after the hit began to the end of the record, less what it is at rest."""
-    before = samples_before(hit)
-    rest = float(np.mean(baseline(hit.acceleration, before)))
-    return hit.acceleration[before + round(HIT_ENDS * hit.sample_rate) :] - rest
+    before = count_pre_hit_samples(hit)
+    rest = float(np.mean(extract_baseline(hit.acceleration, before)))
+    return hit.acceleration[before + round(MAX_CONTACT_TIME * hit.sample_rate) :] - rest
 
 
-def resting_noise(hit: Hit) -> float:
+def measure_rest_noise(hit: Hit) -> float:
     """rms of the acceleration about its mean at rest (m/s^2)."""
-    return float(np.std(baseline(hit.acceleration, samples_before(hit))))
+    return float(np.std(extract_baseline(hit.acceleration, count_pre_hit_samples(hit))))
+
+
+FINE_ENVELOPE_PIECES, COARSE_ENVELOPE_PIECES = 200, 8
+"""Pieces of what is looked at whose rms make the envelope: many for a fast decay, few for one that outlasts them."""
+ENVELOPE_NOISE_RATIO = 3.0
+"""The envelope counts while its rms is above this many times that of the baseline."""
+
+
+def estimate_decay_time(hit: Hit) -> float:
+    """Time constant of the slowest decay that stands out of the noise in the response of a hit (s).
+
+    The slope of the logarithm of the response's envelope over the later half of what is visible; inf where nothing
+    falls, 0 where nothing rings. Raises ValueError for a hit without a pulse.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> response = 200 * structure.response(time, 1e-3)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.1, time.size)
+    >>> tau = estimate_decay_time(Hit(force, response + noise, 10240.0, pre_trigger=100))
+    >>> round(tau * 1e3), round(1e3 / (0.02 * 2 * np.pi * 500.0))  # ms; 1 / (zeta w)
+    (16, 16)
+    """
+    start, end = _locate_hit(hit)
+    quiet = hit.acceleration[: max(start, 1)]
+    ringing = hit.acceleration[min(end, hit.acceleration.size - 1) :] - np.mean(quiet)
+    noise = ENVELOPE_NOISE_RATIO * float(np.std(quiet))
+    width = max(hit.acceleration.size // FINE_ENVELOPE_PIECES, 8)
+    loud = np.flatnonzero(_compute_rms_envelope(ringing, width) > noise)
+    if not loud.size:
+        return 0.0
+    visible = ringing[: (int(loud[-1]) + 1) * width]
+    constant = _fit_time_constant(visible, width)
+    wide = visible.size // COARSE_ENVELOPE_PIECES
+    if constant > 2 * wide:  # a slow mode: pieces shorter than its period would ripple
+        constant = _fit_time_constant(visible, wide)
+    return constant / hit.sample_rate
+
+
+def _locate_hit(hit: Hit) -> tuple[int, int]:
+    """First sample of the hit, and the first after it."""
+    if not hit.has_force:
+        before = count_pre_hit_samples(hit)
+        return int(0.8 * before), before + round(MAX_CONTACT_TIME * hit.sample_rate)
+    pulse = find_pulse(hit)
+    if pulse is None:
+        raise ValueError("a hit has no force pulse; its ring-down cannot be seen")
+    return pulse.start, pulse.end
+
+
+def _compute_rms_envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    pieces = signal[: signal.size // width * width].reshape(-1, width)
+    return np.asarray(np.sqrt(np.mean(pieces**2, axis=1)))
+
+
+def _fit_time_constant(signal: NDArray[np.float64], width: int) -> float:
+    """Of the later half of a ringing (samples)."""
+    rms = _compute_rms_envelope(signal, width)
+    late = rms[rms.size // 2 :] if rms.size >= 4 else rms
+    if late.size < 2:
+        return float(width)
+    slope = np.polyfit(np.arange(late.size) * width, np.log(np.maximum(late, 1e-300)), 1)[0]
+    return float(-1 / slope) if slope < 0 else float("inf")

@@ -1,22 +1,28 @@
 """Whether hammer, accelerometer and DAQ are right: rate, skew, mass calibration, plausibility."""
 
-from acquisition.sensors.mass_calibration import AGREES, MassCalibration, calibrate_by_mass
-from acquisition.sensors.measure_rate import MeasuredRate, check_rate, measure_rate, rate_doubt
-from acquisition.sensors.measure_skew import MeasuredSkew, measure_skew
-from acquisition.sensors.plausibility import calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
+from acquisition.sensors.daq_timing import (
+    MeasuredRate,
+    MeasuredSkew,
+    check_rate,
+    measure_rate,
+    measure_skew,
+    rate_remark,
+)
+from acquisition.sensors.mass_calibration import MAX_SENSITIVITY_DEVIATION, MassCalibration, calibrate_by_mass
+from acquisition.sensors.plausibility import calibration_remark, channel_remarks, stiffness_remark, unit_mistake_remark
 
 __all__ = [
-    "AGREES",
+    "MAX_SENSITIVITY_DEVIATION",
     "MassCalibration",
     "MeasuredRate",
     "MeasuredSkew",
     "calibrate_by_mass",
-    "calibration_doubt",
-    "channel_doubts",
+    "calibration_remark",
+    "channel_remarks",
     "check_rate",
     "measure_rate",
     "measure_skew",
-    "rate_doubt",
-    "stiffness_doubt",
-    "unit_mistake",
+    "rate_remark",
+    "stiffness_remark",
+    "unit_mistake_remark",
 ]

@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Channel
-from acquisition.estimation.estimate_frf import cross_spectra, estimate_frf
+from acquisition.errors import Remark
+from acquisition.estimation.estimate_frf import compute_cross_spectra, estimate_frf
 from acquisition.hit import Hit
-from acquisition.remark import Remark
-from acquisition.sensors.plausibility import unit_mistake
+from acquisition.sensors.plausibility import unit_mistake_remark
 
-LOWEST = 50.0
+MIN_CALIBRATION_FREQUENCY = 50.0
 """Below it the pendulum (about 1 Hz) and the conditioner's high pass show (Hz)."""
-FLATNESS = 0.05
+MAX_RATIO_DEVIATION = 0.05
 """The band ends where F/(m a) has left its low-frequency value by this share: mount or block resonate."""
-SMOOTHED = 200.0
+RATIO_SMOOTHING_WIDTH = 200.0
 """Width over which F/(m a) is averaged before its end is looked for (Hz)."""
-FEWEST_LINES = 20
+MIN_CALIBRATION_LINES = 20
 """Lines needed in the band."""
-AGREES = 0.05
+MAX_SENSITIVITY_DEVIATION = 0.05
 """Share by which both sensitivities together may be off; the stiffness K is off by the same share."""
-STRAIGHT = 10.0
+MAX_RIGID_PHASE = 10.0
 """Largest phase of F/(m a) of a rigid mass (deg)."""
 
 
@@ -60,7 +60,7 @@ class MassCalibration:
     @property
     def sizes_agree(self) -> bool:
         """The same without the signs."""
-        return abs(self.ratio - 1) <= AGREES
+        return abs(self.ratio - 1) <= MAX_SENSITIVITY_DEVIATION
 
     @property
     def force_sensitivity(self) -> float | None:
@@ -80,7 +80,7 @@ class MassCalibration:
 
     @property
     def _phase_remark(self) -> Remark | None:
-        if abs(self.phase) <= STRAIGHT:
+        if abs(self.phase) <= MAX_RIGID_PHASE:
             return None
         return Remark(
             "phase-not-rigid",
@@ -112,7 +112,7 @@ class MassCalibration:
 
     @property
     def _mistakes(self) -> tuple[Remark | None, ...]:
-        return () if self.sizes_agree else (unit_mistake(self.ratio),)
+        return () if self.sizes_agree else (unit_mistake_remark(self.ratio),)
 
     def __str__(self) -> str:
         """All of it, a sentence a line."""
@@ -123,7 +123,7 @@ class MassCalibration:
             *map(str, self.remarks),
         ]
         if self.sizes_agree:
-            lines.append(f"Both sensitivities agree within {AGREES:.0%}.")
+            lines.append(f"Both sensitivities agree within {MAX_SENSITIVITY_DEVIATION:.0%}.")
         elif self.channels is not None:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
             lines.append(
@@ -161,19 +161,19 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
         raise ValueError(f"{len(hits)} good hits; at least 3 are needed for a standard error")
     upper = (estimate_frf(hits).usable_band or (0.0, 0.0))[1]
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    inside = (frequency >= LOWEST) & (frequency <= upper)
-    spectra = [cross_spectra([hit]) for hit in hits]
+    inside = (frequency >= MIN_CALIBRATION_FREQUENCY) & (frequency <= upper)
+    spectra = [compute_cross_spectra([hit]) for hit in hits]
     s_ff = np.array([force[inside] for force, _, _ in spectra])
     s_fa = mass * np.array([cross[inside] for _, _, cross in spectra])
-    n = _flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
-    if n < FEWEST_LINES:
+    n = _count_flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
+    if n < MIN_CALIBRATION_LINES:
         raise ValueError(
-            f"force and acceleration of this mass keep no fixed ratio: {n} lines from {LOWEST:g} Hz up, {FEWEST_LINES} "
+            f"force and acceleration of this mass keep no fixed ratio: {n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} "
             "are needed; hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
         )
     f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]
     sign = float(np.sign(np.sum(s_fa).real))
-    fits = np.array([_fit(f, force, sign * cross.real) for force, cross in zip(s_ff, s_fa, strict=True)])
+    fits = np.array([_fit_ratio(f, force, sign * cross.real) for force, cross in zip(s_ff, s_fa, strict=True)])
     q0, q2 = np.mean(fits, axis=0)
     return MassCalibration(
         ratio=float(np.mean(1 / fits[:, 0])),
@@ -188,19 +188,21 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     )
 
 
-def _flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.complex128]) -> int:
+def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.complex128]) -> int:
     """How many lines there are before m A/F leaves the value of the first ones by 5 % of it."""
-    if f.size < FEWEST_LINES:
+    if f.size < MIN_CALIBRATION_LINES:
         return f.size
-    near = max(FEWEST_LINES, round(SMOOTHED / (f[1] - f[0])))
+    near = max(MIN_CALIBRATION_LINES, round(RATIO_SMOOTHING_WIDTH / (f[1] - f[0])))
     window = np.ones(min(near, f.size))
     smooth = np.convolve(s_fa, window, "same") / np.convolve(s_ff, window, "same")
     start = s_fa[:near].sum() / s_ff[:near].sum()
-    off = np.flatnonzero(np.abs(np.abs(smooth / start) - 1) > FLATNESS)
+    off = np.flatnonzero(np.abs(np.abs(smooth / start) - 1) > MAX_RATIO_DEVIATION)
     return int(off[0]) if off.size else f.size
 
 
-def _fit(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fit_ratio(
+    f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
     root = np.sqrt(s_ff)
     return np.asarray(

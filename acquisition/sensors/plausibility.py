@@ -6,26 +6,26 @@ from collections.abc import Mapping
 from datetime import date
 
 from acquisition.channel import Channel, ChannelQuantity
+from acquisition.errors import Remark
 from acquisition.files.contents.units import POUND_FORCE, STANDARD_GRAVITY
-from acquisition.remark import Remark
 
-SENSITIVITIES: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {
+SENSITIVITY_LIMITS: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {
     "force": (0.1e-3, 25e-3, 1.0, "hammers have 0.1 to 25 mV/N without gain"),
     "acceleration": (1e-3, 1.0, STANDARD_GRAVITY, "accelerometers have 1 to 1000 mV/g without gain"),
 }
 """Lowest and highest sensitivity on the market (V per shop unit), SI units in one shop unit, and both in words."""
-FULL_SCALES = (0.01, 100.0)
+FULL_SCALE_LIMITS = (0.01, 100.0)
 """Smallest and largest range of a converter (V)."""
-STIFFNESSES = (1e5, 1e10)
+STIFFNESS_LIMITS = (1e5, 1e10)
 """Modal stiffness at a tool tip or holder (N/m), from a thin end mill to a bare spindle nose."""
-SPREAD = 1.2
+SENSITIVITY_SPREAD = 1.2
 """Single sensors lie this factor beside their nominal sensitivity."""
-NEAR = 0.15
+UNIT_MISTAKE_TOLERANCE = 0.15
 """How near to the factor of a unit mistake a ratio must be."""
 DAYS_PER_MONTH = 365.25 / 12
 
 _LBF = POUND_FORCE
-_MISTAKES: Mapping[float, tuple[str, str]] = {
+_UNIT_MISTAKES: Mapping[float, tuple[str, str]] = {
     STANDARD_GRAVITY: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
     1 / STANDARD_GRAVITY: (
         "1/9.81",
@@ -41,57 +41,66 @@ _MISTAKES: Mapping[float, tuple[str, str]] = {
 }
 
 
-def unit_mistake(ratio: float) -> Remark | None:
+def unit_mistake_remark(ratio: float) -> Remark | None:
     """The unit mistake that explains F/(m a) of a known mass, within 15 %; None where none does.
 
-    >>> print(unit_mistake(STANDARD_GRAVITY).text)
+    >>> print(unit_mistake_remark(STANDARD_GRAVITY).text)
     the ratio 9.807 is near 9.81
-    >>> unit_mistake(1.05) is None
+    >>> unit_mistake_remark(1.05) is None
     True
     """
-    for factor, (value, question) in _MISTAKES.items():
-        if abs(ratio / factor - 1) < NEAR:
+    for factor, (value, question) in _UNIT_MISTAKES.items():
+        if abs(ratio / factor - 1) < UNIT_MISTAKE_TOLERANCE:
             return Remark("unit-mistake", "", f"the ratio {ratio:.4g} is near {value}", question)
     return None
 
 
-def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
+def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
     """What speaks against a channel's sensitivity and range; nothing where both are of this world.
 
     >>> millivolts = Channel("acceleration", sensitivity=10.2, full_scale=5.0)  # taken for volts
-    >>> [doubt.code for doubt in channel_doubts(millivolts)]
+    >>> [doubt.code for doubt in channel_remarks(millivolts)]
     ['sensitivity-not-believed']
-    >>> channel_doubts(Channel("acceleration", sensitivity=10.2e-3 / 9.81, full_scale=5.0))
+    >>> channel_remarks(Channel("acceleration", sensitivity=10.2e-3 / 9.81, full_scale=5.0))
     ()
     """
-    low, high, unit, usual = SENSITIVITIES[channel.quantity]
+    low, high, unit, usual = SENSITIVITY_LIMITS[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
     doubts = []
     sensitivity = abs(channel.sensitivity) * unit
-    if not low / SPREAD <= sensitivity <= high * SPREAD:
+    if not low / SENSITIVITY_SPREAD <= sensitivity <= high * SENSITIVITY_SPREAD:
         text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
         doubts.append(
-            Remark("sensitivity-not-believed", channel.name, text, _slip(sensitivity, low / SPREAD, high * SPREAD))
+            Remark(
+                "sensitivity-not-believed",
+                channel.name,
+                text,
+                _explain_slip(sensitivity, low / SENSITIVITY_SPREAD, high * SENSITIVITY_SPREAD),
+            )
         )
-    if not FULL_SCALES[0] <= channel.full_scale <= FULL_SCALES[1]:
+    if not FULL_SCALE_LIMITS[0] <= channel.full_scale <= FULL_SCALE_LIMITS[1]:
         text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
-        doubts.append(Remark("input-range-not-believed", channel.name, text, _slip(channel.full_scale, *FULL_SCALES)))
+        doubts.append(
+            Remark(
+                "input-range-not-believed", channel.name, text, _explain_slip(channel.full_scale, *FULL_SCALE_LIMITS)
+            )
+        )
     return tuple(doubts)
 
 
-def _slip(value: float, low: float, high: float) -> str:
+def _explain_slip(value: float, low: float, high: float) -> str:
     """The slip by 1000 that explains a value outside its bounds, as a question; empty where it does not."""
     slips = {value / 1e3: "did you mean mV?", value * 1e3: "was it divided by 1000 twice?"}
     return next((words for corrected, words in slips.items() if low <= corrected <= high), "")
 
 
-def stiffness_doubt(stiffness: float) -> Remark | None:
+def stiffness_remark(stiffness: float) -> Remark | None:
     """A modal stiffness (N/m) outside what machine tools have; None inside.
 
-    >>> stiffness_doubt(2e7) is None, stiffness_doubt(20.0).code  # N/m; 20 N/um is 2e7
+    >>> stiffness_remark(2e7) is None, stiffness_remark(20.0).code  # N/m; 20 N/um is 2e7
     (True, 'stiffness-not-believed')
     """
-    low, high = STIFFNESSES
+    low, high = STIFFNESS_LIMITS
     if low <= abs(stiffness) <= high:
         return None
     shown = f"{stiffness:.0f} N/m" if abs(stiffness) < low else f"{stiffness / 1e6:.0f} N/um"
@@ -103,12 +112,12 @@ def stiffness_doubt(stiffness: float) -> Remark | None:
     )
 
 
-def calibration_doubt(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
+def calibration_remark(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
     """A sensor's calibration that is not known, longer ago than the interval, or of a day that cannot be; else None.
 
-    >>> from datetime import date
+    >>> from datetime import date_of_days
     >>> sensor = Channel("force", 2.25e-3, 5.0, serial_number="4711", calibration_date="2024-02-01")
-    >>> calibration_doubt(sensor, date(2026, 3, 2)).code, calibration_doubt(sensor, date(2024, 6, 1))
+    >>> calibration_remark(sensor, date_of_days(2026, 3, 2)).code, calibration_remark(sensor, date_of_days(2024, 6, 1))
     ('calibration-old', None)
     """
     if not channel.calibration_date:

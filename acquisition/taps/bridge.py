@@ -9,31 +9,33 @@ from typing import Any
 import numpy as np
 
 from acquisition.channel import Block
-from acquisition.emulation.wire import TcpWire
+from acquisition.emulation.emulated_device import TcpWire
 from acquisition.errors import DeviceError
 from acquisition.source import Device
-from acquisition.taps.device_end import Commands, configured_bits, info_of
-from acquisition.taps.event import encode_event
 from acquisition.taps.protocol import (
-    LOST_BEFORE,
+    LOST_BEFORE_FLAG,
     NO_TEMPERATURE,
     SAMPLE_BITS,
     STATUS_INTERVAL,
+    DeviceCommands,
+    DeviceStatus,
     Frame,
     FrameDecoder,
     MessageType,
-    Status,
+    build_info,
     encode_data,
+    encode_event,
     encode_frame,
+    parse_sample_bits,
 )
 
-BUFFER_BYTES = 4 << 20
+BRIDGE_BUFFER_BYTES = 4 << 20
 """Bytes kept for a host that is late, 20 s of two channels at 51.2 kHz and 16 bits; then scans are dropped and told."""
-AHEAD_BYTES = 1 << 16
+MAX_UNCLOCKED_BACKLOG_BYTES = 1 << 16
 """Bytes that a device without a clock may be ahead of its host: it waits, and nothing is dropped."""
-RETRY_TIME = 0.5
+REOPEN_INTERVAL = 0.5
 """Time between two tries to find the device again (s)."""
-UNNUMBERED = "no-number"
+NO_SERIAL_NUMBER = "no-number"
 """Serial number in INFO of a device that has none."""
 
 
@@ -81,7 +83,7 @@ class TapsBridge:
         try:
             while not self._stopping:
                 try:
-                    _Link(self._device, self._wire).serve(lambda: self._stopping)
+                    _BridgeSession(self._device, self._wire).serve(lambda: self._stopping)
                 except DeviceError as error:
                     self._wire.close()
                     self._device.close()
@@ -97,7 +99,7 @@ class TapsBridge:
     def _wait(self) -> None:
         """Until the device is there again."""
         while not self._stopping:
-            time.sleep(RETRY_TIME)
+            time.sleep(REOPEN_INTERVAL)
             try:
                 self._device = self._open()
             except DeviceError:
@@ -107,12 +109,12 @@ class TapsBridge:
             return
 
 
-class _Link:
+class _BridgeSession:
     """One device and the wire to its host."""
 
     def __init__(self, device: Device, wire: TcpWire) -> None:
         self._device, self._wire, self._decoder = device, wire, FrameDecoder()
-        self._commands = Commands(self._info, self._configure, self._start, self._stop)
+        self._commands = DeviceCommands(self._info, self._configure, self._start, self._stop)
         self._bits, self._per_frame = SAMPLE_BITS[0], 512
         self._shift = [max(channel.adc_bits for channel in device.channels) - c.adc_bits for c in device.channels]
         self._seq = self._session = self._limit = 0
@@ -128,7 +130,7 @@ class _Link:
             for block in self._device.blocks():
                 self._send_block(block)
                 self._answer(0.0)
-                while not self._device.follows_clock and len(self._wire.pending) > AHEAD_BYTES:
+                while not self._device.follows_clock and len(self._wire.pending) > MAX_UNCLOCKED_BACKLOG_BYTES:
                     self._answer(0.05)
                 if is_over() or not self._streaming or session != self._session:
                     break
@@ -149,13 +151,13 @@ class _Link:
 
     def _info(self) -> dict[str, Any]:
         device = self._device
-        info = info_of(device.identity, device.channels, device.sample_rate, follows_clock=device.follows_clock)
-        return info | {"serial": info["serial"] or UNNUMBERED}
+        info = build_info(device.identity, device.channels, device.sample_rate, follows_clock=device.follows_clock)
+        return info | {"serial": info["serial"] or NO_SERIAL_NUMBER}
 
     def _configure(self, wish: dict[str, Any]) -> None:
         if self._streaming:
             raise ValueError("CONFIG while streaming; send STOP first")
-        self._bits = configured_bits(wish, self._device.channels, self._device.sample_rate)
+        self._bits = parse_sample_bits(wish, self._device.channels, self._device.sample_rate)
         self._per_frame = int(wish["samples_per_frame"])
 
     def _start(self, n_scans: int) -> None:
@@ -180,12 +182,12 @@ class _Link:
             codes = codes[:, : max(self._limit - self._next, 0)]
         for begin in range(0, codes.shape[1], self._per_frame):
             part = codes[:, begin : begin + self._per_frame]
-            if len(self._wire.pending) > BUFFER_BYTES:
+            if len(self._wire.pending) > BRIDGE_BUFFER_BYTES:
                 self._overruns += not self._lost
                 self._lost = True
             else:
                 body = encode_data(self._next, part, self._bits, block.overload)
-                self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+                self._send(MessageType.DATA, body, LOST_BEFORE_FLAG if self._lost else 0)
                 self._lost = False
                 self._sent += part.shape[1]
             self._next += part.shape[1]
@@ -197,8 +199,8 @@ class _Link:
         """What has happened at the device, and now and then how it fares."""
         while self._device.events:
             self._send(MessageType.EVENT, encode_event(self._device.events.popleft()))
-        self._peak = max(self._peak, min(100 * len(self._wire.pending) // BUFFER_BYTES, 100))
+        self._peak = max(self._peak, min(100 * len(self._wire.pending) // BRIDGE_BUFFER_BYTES, 100))
         if time.monotonic() >= self._status_due:
             self._status_due = time.monotonic() + STATUS_INTERVAL
-            status = Status(self._next, self._sent, self._peak, self._overruns, NO_TEMPERATURE)
+            status = DeviceStatus(self._next, self._sent, self._peak, self._overruns, NO_TEMPERATURE)
             self._send(MessageType.STATUS, status.encode())

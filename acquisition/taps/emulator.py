@@ -1,36 +1,85 @@
-"""A TAPS/1 device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+"""Emulate a TAPS/1 device and its faults on a pseudo-terminal or TCP port."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from acquisition.channel import Channel
-from acquisition.emulation.simulated_source import Signal, quantise
-from acquisition.emulation.thread import EmulatorThread
-from acquisition.event import Event, EventKind
-from acquisition.source import DeviceIdentity
-from acquisition.taps.device_end import Commands, configured_bits, info_of
-from acquisition.taps.event import encode_event
-from acquisition.taps.faults import NOISE, Faults
+from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction, quantise
+from acquisition.source import DeviceIdentity, Event, EventKind
 from acquisition.taps.protocol import (
-    LOST_BEFORE,
+    LOST_BEFORE_FLAG,
     SAMPLE_BITS,
     STATUS_INTERVAL,
+    DeviceCommands,
+    DeviceStatus,
     Frame,
     FrameDecoder,
     MessageType,
-    Status,
+    build_info,
     encode_data,
+    encode_event,
     encode_frame,
+    parse_sample_bits,
 )
 
-IDENTITY = DeviceIdentity("lobewatch emulator", "EMU-1", "1.0")
+NOISE_BYTES = bytes(range(7, 71)) + b"\x00" + bytes(range(200, 230))
+"""Bytes that are no frame; the end of them spoils the frame that follows."""
+
+
+@dataclass(frozen=True)
+class TapsFaults:
+    """What goes wrong on purpose; all off."""
+
+    unplug_after: int | None = None
+    """Hang up after so many scans of a stream, in the middle of a frame."""
+    stall_after: int | None = None
+    """Send nothing more after so many scans."""
+    restart_after: int | None = None
+    """Begin another session unasked after so many scans, once."""
+    drop_every: int | None = None
+    """Every so many DATA frames, one is lost on the wire."""
+    corrupt_every: int | None = None
+    """Every so many, one byte of one is altered."""
+    duplicate_every: int | None = None
+    """Every so many, one comes twice."""
+    cut_every: int | None = None
+    """Every so many, one lacks its second half with the delimiter, which spoils the next frame too."""
+    noise_every: int | None = None
+    """Every so many, noise stands before one and spoils it."""
+    noise_at_start: bool = False
+    """Noise stands before the first answer."""
+    start_streaming: bool = False
+    """The device streams already when the host connects."""
+    cut_infos: int = 0
+    """Number of INFO answers that lack their second half."""
+    overload: int = 0
+    """Mask of the channels that every DATA frame reports as overloaded."""
+
+    def apply(self, encoded: bytes, count: int) -> bytes:
+        """What arrives of the count-th DATA frame."""
+        if _is_due(self.drop_every, count):
+            return b""
+        if _is_due(self.corrupt_every, count):
+            encoded = encoded[:40] + bytes([encoded[40] ^ 0x55 or 1]) + encoded[41:]
+        if _is_due(self.cut_every, count):
+            encoded = encoded[: len(encoded) // 2]
+        if _is_due(self.duplicate_every, count):
+            encoded *= 2
+        return NOISE_BYTES + encoded if _is_due(self.noise_every, count) else encoded
+
+
+def _is_due(period: int | None, count: int) -> bool:
+    return period is not None and count % period == 0
+
+
+EMULATOR_IDENTITY = DeviceIdentity("lobewatch emulator", "EMU-1", "1.0")
 """Who it says it is."""
-BUFFER_SECONDS = 1.0
+TAPS_BUFFER_SECONDS = 1.0
 """What the device keeps for a slow host before it drops scans (s)."""
 
 
@@ -49,14 +98,14 @@ class TapsEmulator(EmulatorThread):
 
     def __init__(
         self,
-        signal: Signal,
+        signal: SignalFunction,
         channels: tuple[Channel, ...],
         sample_rate: float,
         *,
         realtime: bool = True,
         tcp: bool = False,
         link: Path | None = None,
-        faults: Faults | None = None,
+        faults: TapsFaults | None = None,
     ) -> None:
         """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
 
@@ -64,7 +113,7 @@ class TapsEmulator(EmulatorThread):
         """
         super().__init__(tcp, link)
         self._signal, self._channels, self._rate = signal, channels, sample_rate
-        self._realtime, self._faults = realtime, faults or Faults()
+        self._realtime, self._faults = realtime, faults or TapsFaults()
         self._clock = 0
         self._restarted = False
         self._pressed: deque[Event] = deque()
@@ -79,7 +128,7 @@ class TapsEmulator(EmulatorThread):
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
         self._per_frame, self._bits = 512, SAMPLE_BITS[0]
         if self._faults.noise_at_start:
-            self.wire.pending += NOISE
+            self.wire.pending += NOISE_BYTES
         if self._faults.start_streaming:
             self._start(0)
 
@@ -102,7 +151,7 @@ class TapsEmulator(EmulatorThread):
     def serve_once(self) -> bool:
         """See EmulatorThread."""
         for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
-            self._send(*Commands(self._info, self._configure, self._start, self._stop).answer(frame))
+            self._send(*DeviceCommands(self._info, self._configure, self._start, self._stop).answer(frame))
         while self._pressed:
             self._tell(self._pressed.popleft())
         if self._streaming:
@@ -124,7 +173,7 @@ class TapsEmulator(EmulatorThread):
         self._seq += 1
         if kind == MessageType.DATA:
             self._frames += 1
-            encoded = self._faults.on_wire(encoded, self._frames)
+            encoded = self._faults.apply(encoded, self._frames)
         elif kind == MessageType.INFO:
             self._infos += 1
             encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
@@ -136,12 +185,12 @@ class TapsEmulator(EmulatorThread):
         self._send(MessageType.EVENT, encode_event(replace(event, scan=self._scan)))
 
     def _info(self) -> dict[str, Any]:
-        return info_of(IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
+        return build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
 
     def _configure(self, wish: dict[str, Any]) -> None:
         if self._streaming:
             raise ValueError("CONFIG while streaming; send STOP first")
-        self._bits = configured_bits(wish, self._channels, self._rate)
+        self._bits = parse_sample_bits(wish, self._channels, self._rate)
         self._per_frame = int(wish["samples_per_frame"])
 
     def _stop(self) -> None:
@@ -165,7 +214,9 @@ class TapsEmulator(EmulatorThread):
             self._send_scans(overrun=not self._has_room())
         if now >= self._status_due:
             self._status_due = now + STATUS_INTERVAL
-            self._send(MessageType.STATUS, Status(self._scan, self._sent, self._peak, self._overruns, 31.5).encode())
+            self._send(
+                MessageType.STATUS, DeviceStatus(self._scan, self._sent, self._peak, self._overruns, 31.5).encode()
+            )
         if self._realtime:
             time.sleep(0.5 * self._per_frame / self._rate)
 
@@ -183,7 +234,7 @@ class TapsEmulator(EmulatorThread):
 
     def _buffer_bytes(self) -> int:
         scan_bytes = self._bits // 8 * len(self._channels)
-        return int(BUFFER_SECONDS * self._rate) * scan_bytes if self._realtime else 1 << 16
+        return int(TAPS_BUFFER_SECONDS * self._rate) * scan_bytes if self._realtime else 1 << 16
 
     def _send_scans(self, overrun: bool) -> None:
         codes = quantise(self._signal(self._clock, self._per_frame), self._channels)
@@ -193,7 +244,7 @@ class TapsEmulator(EmulatorThread):
             self._overruns += 1
         else:
             body = encode_data(self._scan, codes, self._bits, self._faults.overload)
-            self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+            self._send(MessageType.DATA, body, LOST_BEFORE_FLAG if self._lost else 0)
             self._sent += self._per_frame
             self._lost = False
             self._peak = max(self._peak, min(100 * len(self.wire.pending) // self._buffer_bytes(), 100))

@@ -1,4 +1,4 @@
-"""TAPS/1, the open frame for data acquisition boards: frames and their bodies, byte by byte.
+"""TAPS/1 protocol: frames and their bodies, events, and the answers of a device.
 
 Frame = COBS( type u8 | flags u8 | session u16 | seq u32 | body | crc32 u32 ) 0x00, little-endian. The CRC is
 zlib.crc32 of all before it. seq counts all frames of one sender; session changes at each START.
@@ -7,19 +7,24 @@ zlib.crc32 of all before it. seq counts all frames of one sender; session change
 from __future__ import annotations
 
 import enum
+import json
 import struct
 import zlib
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from cobs import cobs
 from numpy.typing import NDArray
 
-from acquisition.channel import Block
+from acquisition.channel import Block, Channel
+from acquisition.source import DeviceIdentity, Event, EventKind
 
 MAX_FRAME = 8192
 """Longest decoded frame (bytes)."""
-LOST_BEFORE = 0x01
+LOST_BEFORE_FLAG = 0x01
 """Flag of a DATA frame: the device lost samples before it."""
 SAMPLE_BITS = (16, 24, 32)
 """ADC word of DATA formats 0 (i16), 1 (i24 packed) and 2 (i32)."""
@@ -29,11 +34,11 @@ NO_TEMPERATURE = -327.68
 """In STATUS, of a device without a thermometer (degC)."""
 STATUS_INTERVAL = 0.5
 """Time between STATUS frames (s)."""
-MAX_ENCODED = MAX_FRAME + -(-MAX_FRAME // 254)
+MAX_ENCODED_FRAME = MAX_FRAME + -(-MAX_FRAME // 254)
 """The same in COBS, without its delimiter (bytes)."""
-_HEADER = struct.Struct("<BBHI")
-_DATA = struct.Struct("<QHBBI")
-_STATUS = struct.Struct("<QQIIh")
+_FRAME_HEADER = struct.Struct("<BBHI")
+_DATA_HEADER = struct.Struct("<QHBBI")
+_STATUS_BODY = struct.Struct("<QQIIh")
 
 
 class MessageType(enum.IntEnum):
@@ -68,7 +73,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Status:
+class DeviceStatus:
     """Body of a STATUS frame."""
 
     samples_taken: int
@@ -85,18 +90,18 @@ class Status:
     def encode(self) -> bytes:
         """The body."""
         numbers = (self.samples_taken, self.samples_sent, self.buffer_peak_percent, self.overruns)
-        return _STATUS.pack(*numbers, round(self.temperature * 100))
+        return _STATUS_BODY.pack(*numbers, round(self.temperature * 100))
 
     @classmethod
-    def decode(cls, body: bytes) -> Status:
+    def decode(cls, body: bytes) -> DeviceStatus:
         """The status in a body; struct.error for one of the wrong length."""
-        taken, sent, peak, overruns, centidegrees = _STATUS.unpack(body)
+        taken, sent, peak, overruns, centidegrees = _STATUS_BODY.unpack(body)
         return cls(taken, sent, peak, overruns, centidegrees / 100)
 
 
 def encode_frame(frame: Frame) -> bytes:
     """The bytes of a frame, delimiter included; ValueError for one that is too long."""
-    raw = _HEADER.pack(frame.type, frame.flags, frame.session, frame.seq) + frame.body
+    raw = _FRAME_HEADER.pack(frame.type, frame.flags, frame.session, frame.seq) + frame.body
     if len(raw) + 4 > MAX_FRAME:
         raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}; send fewer scans a frame")
     return bytes(cobs.encode(raw + struct.pack("<I", zlib.crc32(raw)))) + b"\x00"
@@ -104,16 +109,18 @@ def encode_frame(frame: Frame) -> bytes:
 
 def decode_frame(encoded: bytes) -> Frame | None:
     """The frame in COBS bytes without their delimiter; None where length, COBS or CRC do not fit."""
-    if len(encoded) > MAX_ENCODED:
+    if len(encoded) > MAX_ENCODED_FRAME:
         return None
     try:
         raw = cobs.decode(encoded)
     except cobs.DecodeError:
         return None
-    if not _HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != int.from_bytes(raw[-4:], "little"):
+    if not _FRAME_HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != int.from_bytes(
+        raw[-4:], "little"
+    ):
         return None
-    kind, flags, session, seq = _HEADER.unpack_from(raw)
-    return Frame(kind, seq, bytes(raw[_HEADER.size : -4]), session, flags)
+    kind, flags, session, seq = _FRAME_HEADER.unpack_from(raw)
+    return Frame(kind, seq, bytes(raw[_FRAME_HEADER.size : -4]), session, flags)
 
 
 class FrameDecoder:
@@ -128,7 +135,7 @@ class FrameDecoder:
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that are complete with these bytes."""
         *pieces, unfinished = (self._rest + data).split(b"\x00")
-        self._rest = unfinished[: MAX_ENCODED + 1]  # what is too long stays too long until its delimiter comes
+        self._rest = unfinished[: MAX_ENCODED_FRAME + 1]  # what is too long stays too long until its delimiter comes
         frames = [decode_frame(piece) for piece in pieces if piece]
         good = [frame for frame in frames if frame is not None]
         self.dropped += len(frames) - len(good)
@@ -143,18 +150,18 @@ def encode_data(first_scan: int, codes: NDArray[np.int32], bits: int = 16, overl
         samples = words.astype("<i2").tobytes()
     else:
         samples = words.astype("<i4").view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes()
-    return _DATA.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload) + samples
+    return _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload) + samples
 
 
 def decode_data(body: bytes) -> Block:
     """The block in the body of a DATA frame; ValueError where length and header disagree."""
-    if len(body) < _DATA.size:
-        raise ValueError(f"a DATA body of {len(body)} bytes is shorter than its header of {_DATA.size}")
-    first, n_scans, n_channels, form, overload = _DATA.unpack_from(body)
+    if len(body) < _DATA_HEADER.size:
+        raise ValueError(f"a DATA body of {len(body)} bytes is shorter than its header of {_DATA_HEADER.size}")
+    first, n_scans, n_channels, form, overload = _DATA_HEADER.unpack_from(body)
     n_words = n_scans * n_channels
-    if form >= len(SAMPLE_BITS) or len(body) - _DATA.size != n_words * SAMPLE_BITS[form] // 8:
+    if form >= len(SAMPLE_BITS) or len(body) - _DATA_HEADER.size != n_words * SAMPLE_BITS[form] // 8:
         raise ValueError(f"a DATA body of {len(body)} bytes does not hold {n_words} samples of format {form}")
-    codes = _decode_words(body[_DATA.size :], SAMPLE_BITS[form])
+    codes = _decode_words(body[_DATA_HEADER.size :], SAMPLE_BITS[form])
     return Block(first, codes.reshape(n_scans, n_channels).T, overload)
 
 
@@ -167,3 +174,134 @@ def _decode_words(samples: bytes, bits: int) -> NDArray[np.int32]:
     words = np.zeros((len(packed), 4), np.uint8)
     words[:, 1:] = packed
     return words.view("<i4").ravel().astype(np.int32) >> 8
+
+
+MAX_PENDING_EVENTS = 256
+"""Events kept for one who does not take them."""
+_EVENT_BODY = struct.Struct("<BBBQ")
+_NO_CHANNEL = 0xFF
+
+_FAULT_TEXTS = {
+    EventKind.CABLE: "the cable of the {} sensor is broken or not plugged in: check it at both ends",
+    EventKind.SENSOR_BIAS: "the {} sensor has no proper supply (bias voltage out of range): check the sensor, "
+    "its cable and the IEPE switch",
+}
+
+
+def encode_event(event: Event) -> bytes:
+    """The body of an EVENT frame."""
+    channel = _NO_CHANNEL if event.channel is None else event.channel
+    return _EVENT_BODY.pack(event.kind, channel, event.begins, event.scan)
+
+
+def decode_event(body: bytes) -> Event:
+    """The event in a body; struct.error for one of the wrong length."""
+    kind, channel, begins, scan = _EVENT_BODY.unpack(body)
+    return Event(kind, bool(begins), None if channel == _NO_CHANNEL else channel, scan)
+
+
+class EventLog:
+    """Events not yet taken, and the faults that stand; one thread adds, any other may take and look."""
+
+    def __init__(self) -> None:
+        """Nothing has happened."""
+        self.new: deque[Event] = deque(maxlen=MAX_PENDING_EVENTS)
+        self._standing: tuple[Event, ...] = ()
+        self._last: tuple[int, int] | None = None
+
+    def add(self, frame: Frame) -> None:
+        """Take in an EVENT frame; one that came before, or that is none, changes nothing."""
+        if self._last == (frame.session, frame.seq):
+            return
+        self._last = frame.session, frame.seq
+        try:
+            event = decode_event(frame.body)
+        except struct.error:
+            return
+        self.new.append(event)
+        remaining = (fault for fault in self._standing if (fault.kind, fault.channel) != (event.kind, event.channel))
+        self._standing = (*remaining, event) if event.begins and event.kind in _FAULT_TEXTS else tuple(remaining)
+
+    def fault(self, channels: Mapping[int, Channel]) -> str:
+        """One sentence on the faults that stand; empty where all is well. channels: by their i in INFO."""
+        return "; ".join(
+            _FAULT_TEXTS[EventKind(event.kind)].format(_sensor_name(event, channels)) for event in self._standing
+        )
+
+
+def _sensor_name(event: Event, channels: Mapping[int, Channel]) -> str:
+    if event.channel is None:
+        return "force or acceleration"
+    return channels[event.channel].quantity if event.channel in channels else f"(channel {event.channel})"
+
+
+@dataclass(frozen=True)
+class DeviceCommands:
+    """What a device does at the commands of its host; ValueError, LookupError and TypeError refuse one."""
+
+    info: Callable[[], dict[str, Any]]
+    """Function that gives the body of INFO."""
+    configure: Callable[[dict[str, Any]], None]
+    """Function that takes the body of CONFIG."""
+    start: Callable[[int], None]
+    """Function that begins a session of so many scans, 0 for endless."""
+    stop: Callable[[], None]
+    """Function that ends it."""
+
+    def answer(self, frame: Frame) -> tuple[MessageType, bytes]:
+        """Do what a frame asks for; type and body of the answer."""
+        about = frame.seq.to_bytes(4, "little")
+        try:
+            if frame.type == MessageType.HELLO:
+                return MessageType.INFO, json.dumps(self.info()).encode()
+            if frame.type == MessageType.CONFIG:
+                self.configure(json.loads(frame.body))
+            elif frame.type == MessageType.START:
+                self.start(int.from_bytes(frame.body, "little"))
+            elif frame.type == MessageType.STOP:
+                self.stop()
+            else:
+                raise ValueError(f"unknown command {frame.type:#04x}")
+        except (ValueError, LookupError, TypeError) as error:
+            return MessageType.NACK, about + b"\x01\x00" + str(error).encode()
+        return MessageType.ACK, about + b"\x00\x00"
+
+
+def build_info(
+    identity: DeviceIdentity, channels: Sequence[Channel], rate: float, *, follows_clock: bool
+) -> dict[str, Any]:
+    """The body of INFO of a device of one sample rate (Hz)."""
+    return {
+        "proto": 1,
+        "model": identity.model,
+        "serial": identity.serial,
+        "fw": identity.firmware,
+        "adc_bits": max(channel.adc_bits for channel in channels),
+        "fs_choices": [rate],
+        "simultaneous": True,
+        "clock_ppm": 0 if follows_clock else None,
+        "channels": [
+            {
+                "i": i,
+                "name": channel.quantity,
+                "quantity": channel.quantity,
+                "sens_V_per_EU": channel.sensitivity,
+                "sens_date": channel.calibration_date,
+                "sensor_serial": channel.serial_number,
+                "direction": channel.direction,
+                "fs_V": channel.full_scale,
+                "gain": 1.0,
+                "coupling": "IEPE",
+                "skew_s": channel.skew,
+                "delay_s": 0.0,
+            }
+            for i, channel in enumerate(channels)
+        ],
+    }
+
+
+def parse_sample_bits(wish: dict[str, Any], channels: Sequence[Channel], rate: float) -> int:
+    """Bits of the samples that a CONFIG asks for; ValueError where it asks for what such a device does not have."""
+    if wish["fs"] != rate or wish["channels"] != list(range(len(channels))):
+        raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
+    return SAMPLE_BITS[wish["format"]]

@@ -1,4 +1,4 @@
-"""A TAPS/1 device on a serial port as a source of scans."""
+"""Read scans from a TAPS/1 device on a serial port or TCP."""
 
 from __future__ import annotations
 
@@ -13,31 +13,97 @@ from typing import Any, Self
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
-from acquisition.event import Event
-from acquisition.ports.serial_link import SerialLink
-from acquisition.taps.event import EventLog
-from acquisition.taps.probe import identity_in
+from acquisition.ports.serial_ports import SerialLink
+from acquisition.source import DeviceIdentity, Event
 from acquisition.taps.protocol import (
     FRAME_OVERHEAD,
+    LOST_BEFORE_FLAG,
     MAX_FRAME,
     SAMPLE_BITS,
+    DeviceStatus,
+    EventLog,
     Frame,
     FrameDecoder,
     MessageType,
-    Status,
+    decode_data,
     encode_frame,
 )
-from acquisition.taps.stream import ScanStream
 
-ANSWER_TIME = 1.0
+TAPS_PROBE_TIMEOUT = 1.0
+"""How long an answer is waited for (s)."""
+
+
+def probe_taps(link: SerialLink) -> DeviceIdentity | None:
+    """Who answers to one HELLO; None where nobody does."""
+    decoder = FrameDecoder()
+    link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
+    deadline = time.monotonic() + TAPS_PROBE_TIMEOUT
+    while (left := deadline - time.monotonic()) > 0:
+        for frame in decoder.feed(link.read(left)):
+            if frame.type == MessageType.INFO:
+                return _parse_identity_json(frame.body)
+    return None
+
+
+def parse_identity(info: dict[str, Any]) -> DeviceIdentity:
+    """Who the device is that sends this INFO."""
+    return DeviceIdentity(*(str(info.get(key) or "") for key in ("model", "serial", "fw")))
+
+
+def _parse_identity_json(body: bytes) -> DeviceIdentity | None:
+    try:
+        return parse_identity(json.loads(body))
+    except (ValueError, AttributeError):
+        return None
+
+
+class ScanStream:
+    """Blocks from the DATA frames of one session, in order."""
+
+    def __init__(self, session: int, n_channels: int) -> None:
+        """The session that the ACK of START names, and the number of channels asked for in CONFIG."""
+        self._session, self._n_channels = session, n_channels
+        self._next_scan = 0
+        self.lost_scans = 0
+        """Scans that never came."""
+        self.refused = 0
+        """DATA frames of this session that came twice or late, or contradict their own header."""
+        self.foreign = 0
+        """DATA frames of other sessions since the last one of this."""
+
+    def accept(self, frame: Frame) -> Block | None:
+        """The block of a DATA frame with the scans lost before it; None where it is refused.
+
+        An index that jumps tells how many scans are missing. Where the device says that it lost some and the index
+        does not jump, one is counted, so that no hit with that joint in it passes.
+        """
+        if frame.session != self._session:
+            self.foreign += 1
+            return None
+        try:
+            block = decode_data(frame.body)
+        except ValueError:
+            self.refused += 1
+            return None
+        if block.codes.shape[0] != self._n_channels or block.first_scan < self._next_scan:
+            self.refused += 1
+            return None
+        lost = block.first_scan - self._next_scan or int(bool(frame.flags & LOST_BEFORE_FLAG))
+        self._next_scan = block.first_scan + block.codes.shape[1]
+        self.lost_scans += lost
+        self.foreign = 0
+        return Block(block.first_scan, block.codes, block.overload, lost)
+
+
+TAPS_ANSWER_TIMEOUT = 1.0
 """How long a command may stay unanswered before it is sent again (s)."""
-TRIES = 3
+TAPS_COMMAND_TRIES = 3
 """How often a command is sent."""
-SILENCE = 3.0
+TAPS_SILENCE_TIMEOUT = 3.0
 """A streaming device that sends no scans for so long has failed (s); it reports itself every 0.5 s."""
-SCANS_PER_FRAME = 512
+MIN_SCANS_PER_FRAME = 512
 """Asked of the device at least, where so many fit into a frame; more ..."""
-FRAME_TIME = 0.01
+TARGET_FRAME_TIME = 0.01
 """... where they come faster than so (s)."""
 
 
@@ -46,7 +112,7 @@ class TapsSource:
 
     loss_detection = "scan numbers"
     """How lost scans are found."""
-    _frame_time = FRAME_TIME
+    _frame_time = TARGET_FRAME_TIME
 
     def __init__(self, port: str, sample_rate: float | None = None) -> None:
         """Open a port: a device name or socket://host:port. sample_rate None takes the device's highest (Hz).
@@ -60,12 +126,12 @@ class TapsSource:
         self._events = EventLog()
         self._stream: ScanStream | None = None
         self._streaming = False
-        self.status: Status | None = None
+        self.status: DeviceStatus | None = None
         """What the device has last reported of itself (every 0.5 s of a stream)."""
         try:
             self._command(MessageType.STOP)
             self._info, self.channels = self._identify()
-            self.identity = identity_in(self._info)
+            self.identity = parse_identity(self._info)
             self.follows_clock = self._info.get("clock_ppm", 0) is not None
             self.sample_rate = self._configure(sample_rate)
         except BaseException:
@@ -139,12 +205,14 @@ class TapsSource:
                 if block is not None:
                     yield block
                     heard = time.monotonic()  # not before: a slow consumer is no silent device
-            if time.monotonic() - heard > SILENCE:
+            if time.monotonic() - heard > TAPS_SILENCE_TIMEOUT:
                 raise self._silent()
 
     def _silent(self) -> DeviceError:
         restarted = self._stream is not None and self._stream.foreign
-        reason = "has begun another stream by itself" if restarted else f"has sent no samples for {SILENCE:g} s"
+        reason = (
+            "has begun another stream by itself" if restarted else f"has sent no samples for {TAPS_SILENCE_TIMEOUT:g} s"
+        )
         return DeviceError(
             f"the DAQ on {self._link.port} {reason}", "switch it off and on and give the same command again"
         )
@@ -153,8 +221,8 @@ class TapsSource:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
         try:
             info = json.loads(body)
-            channels = _channels(info)
-            info["fs_choices"] = _rates(info["fs_choices"])
+            channels = _parse_channels(info)
+            info["fs_choices"] = _check_rates(info["fs_choices"])
             for key in ("model", "serial"):
                 if not info[key]:
                     raise ValueError(f"{key} is empty; the measured sample rate is kept by it")
@@ -178,7 +246,7 @@ class TapsSource:
             "fs": rate,
             "channels": channels,
             "format": form,
-            "samples_per_frame": min(max(SCANS_PER_FRAME, round(self._frame_time * rate)), fit),
+            "samples_per_frame": min(max(MIN_SCANS_PER_FRAME, round(self._frame_time * rate)), fit),
         }
         self._command(MessageType.CONFIG, json.dumps(wish).encode())
         return float(rate)
@@ -189,15 +257,15 @@ class TapsSource:
 
     def _command(self, kind: MessageType, body: bytes = b"", answer: MessageType = MessageType.ACK) -> Frame:
         """Send, and wait for ACK of this command, or for the one frame it asks for."""
-        for _ in range(TRIES):
+        for _ in range(TAPS_COMMAND_TRIES):
             self._link.write(self._encode(kind, body))
-            deadline = time.monotonic() + ANSWER_TIME
+            deadline = time.monotonic() + TAPS_ANSWER_TIMEOUT
             while (left := deadline - time.monotonic()) > 0:
                 frame = self._next_frame(left)
                 if frame is not None and self._answers(frame, answer):
                     return frame
         raise DeviceError(
-            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TRIES} tries)",
+            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TAPS_COMMAND_TRIES} tries)",
             "check that this is the DAQ's port and that it is switched on",
         )
 
@@ -212,7 +280,7 @@ class TapsSource:
             self._events.add(frame)
         elif frame.type == MessageType.STATUS:
             with contextlib.suppress(struct.error):
-                self.status = Status.decode(frame.body)
+                self.status = DeviceStatus.decode(frame.body)
         return frame
 
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
@@ -224,14 +292,14 @@ class TapsSource:
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
 
 
-def _rates(choices: list[float]) -> list[float]:
+def _check_rates(choices: list[float]) -> list[float]:
     rates = [float(rate) for rate in choices]
     if not rates or not all(0 < rate < float("inf") for rate in rates):
         raise ValueError(f"fs_choices={choices} are no sample rates > 0")
     return rates
 
 
-def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
+def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:
     """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain.
 
     Raises KeyError, TypeError or ValueError where they are none.

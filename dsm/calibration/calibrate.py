@@ -1,24 +1,160 @@
-"""Bearing stiffness from one measured natural frequency."""
+"""Calibrate bearing stiffness to one measured natural frequency."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from dsm.calibration.bearing_eigenproblem import BearingEigenproblem, bearing_eigenproblem
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
-from dsm.calibration.stiffness_groups import parts_stiffness, scale_parts
-from dsm.modes.find_modes import MOST_MODES
+from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness, scale_parts
+from dsm.matrix.assemble import assemble
+from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies, count_modes_of_factor, symmetric_factor
+from dsm.modes.find_modes import MAX_MODES
 from dsm.modes.natural_frequencies import natural_frequencies
-from dsm.spindle.spindle import Spindle
+from dsm.spindle.spindle import Spindle, require_support
 
-LOOSE = 1e-9
+_Float = NDArray[np.float64]
+
+
+DOFS_ACROSS_JOINT = 4
+"""Dofs from one side of a joint to the other, with force and moment between them."""
+
+
+class CalibratedSprings(NamedTuple):
+    """The springs that have a common factor, m of them, and the shaft without them."""
+
+    parts: tuple[int, ...]
+    """Places in (*bearings, *joints) of what the springs belong to; a joint has two."""
+    model: DynamicStiffness
+    """The shaft without these springs."""
+    forces: _Float
+    """Pairs of forces across the springs, times the roots of their stiffness and the model's scale, (n_dofs, m)."""
+    housing: _Float
+    """Compliance of the housings with the same weights, shape (m, m), diagonal."""
+
+
+@dataclass(frozen=True, eq=False)
+class BearingEigenproblem:
+    """Eigenpairs of the compliance at the calibrated springs of bearings and joints, these springs taken away.
+
+    With R = B^T K(w)^-1 B + 1/k_housing, each spring weighted with the root of its stiffness, w is a natural frequency
+    where -1/factor is an eigenvalue of R.
+    """
+
+    springs: CalibratedSprings
+    """The calibrated springs."""
+    w2: _Float
+    """Square of the angular frequency ((rad/s)^2), shape (n,)."""
+    below: NDArray[np.int_]
+    """Number of modes of the shaft without these springs below each frequency, shape (n,)."""
+    response: _Float
+    """K^-1 B with the weights, over the scale of the model: response of all dofs, shape (n, n_dofs, n_springs)."""
+    values: _Float
+    """Eigenvalues, rising, shape (n, n_springs)."""
+    vectors: _Float
+    """Eigenvectors in columns, shape (n, n_springs, n_springs)."""
+
+    def pick(self, mode: int) -> NDArray[np.int_]:
+        """Index of the eigenvalue that belongs to a mode (1 is the lowest), shape (n,); -1 where there is none.
+
+        Of the eigenvalues in rising order it is number N - mode (0 is the first), N the number of modes of the shaft
+        without these springs below w: each factor that passes through such a value moves one mode past w.
+        """
+        index = self.below - mode
+        found = (index >= 0) & (index < self.values.shape[1])
+        value = self.values[np.arange(index.size), np.where(found, index, 0)]
+        return np.where(found & (value < 0), index, -1)
+
+    def sensitivity(self, index: int) -> float:
+        """d ln f / d ln k for an eigenvalue at the first frequency.
+
+        With -1/factor = v^T R v it is d(v^T R v)/d(w^2) = -phi^T (dK/d w^2) phi, phi = K^-1 B v.
+        """
+        slope = self.springs.model.slope_of(self.w2[:1], self.response[0] @ self.vectors[0, :, index])
+        return float(self.values[0, index] / (2 * self.w2[0] * slope[0]))
+
+
+def bearing_eigenproblem(spindle: Spindle, frequency: _Float, group: str | None = None) -> BearingEigenproblem:
+    """The eigenproblem of the parts of a group (see calibrated_parts) at frequencies (Hz, (n,), > 0).
+
+    One factor of K a frequency gives the response and, by its negative pivots, the count of modes. Raises ValueError
+    where there is no such part, for a rigid bearing, and for a shaft not held.
+    """
+    springs = _calibrated_springs(spindle, 2.0 ** (math.ceil(4 * math.log2(np.max(frequency, initial=1.0))) / 4), group)
+    w2 = (2 * np.pi * frequency) ** 2
+    factors = [symmetric_factor(matrix) for matrix in springs.model.scaled(w2)]
+    below = np.array([count_modes_of_factor(springs.model, factor) for factor in factors], dtype=int)
+    solved = [factor.solve(springs.forces) for factor in factors]
+    response = np.array(solved).reshape(w2.size, *springs.forces.shape)
+    values, vectors = np.linalg.eigh(springs.forces.T @ response + springs.housing)
+    return BearingEigenproblem(springs, w2, below, response, values, vectors)
+
+
+@lru_cache(maxsize=32)
+def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | None) -> CalibratedSprings:
+    """Springs of the same spindle are not looked up twice."""
+    require_support(spindle)
+    chosen = calibrated_parts(spindle, group)
+    model = assemble(spindle, top_frequency, left_out=chosen)
+    count = len(spindle.bearings)
+    bearings = [spindle.bearings[index] for index in chosen if index < count]
+    joints = [spindle.joints[index - count] for index in chosen if index >= count]
+    forces = np.zeros((model.scale.size, len(bearings) + 2 * len(joints)))
+    number = np.arange(len(bearings))
+    forces[model.dofs(bearings), number] = np.sqrt([bearing.stiffness for bearing in bearings])
+    for dof, name in enumerate(("stiffness", "rotational_stiffness")):
+        number = len(bearings) + dof + 2 * np.arange(len(joints))
+        roots, near = np.sqrt([getattr(joint, name) for joint in joints]), model.dofs(joints) + dof
+        forces[near, number], forces[near + DOFS_ACROSS_JOINT, number] = -roots, roots
+    softness = [bearing.stiffness / bearing.housing_stiffness for bearing in bearings] + [0.0] * (2 * len(joints))
+    return CalibratedSprings(tuple(chosen), model, forces * model.scale[:, np.newaxis], np.diag(softness))
+
+
+def stiffness_factor(
+    spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None
+) -> NDArray[np.float64]:
+    """Factor on the bearing stiffnesses that puts a mode (1 is the lowest) at each frequency; NaN where none does.
+
+    frequency: (n,) Hz, > 0; shape of the result (n,). group: the bearings that the factor is for; None: all that have
+    a group. One eigenproblem of the order of the number of bearings for each frequency.
+    """
+    f = check_frequencies(frequency)
+    if np.any(f == 0):
+        raise ValueError("frequency=0 Hz is not > 0")
+    problem = bearing_eigenproblem(spindle, f, group)
+    index = problem.pick(mode)
+    value = problem.values[np.arange(f.size), np.where(index < 0, 0, index)]
+    return np.where(index < 0, np.nan, -1 / value)
+
+
+def stiffness_curve(
+    spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None
+) -> NDArray[np.float64]:
+    """Bearing stiffness (N/m) for which each frequency is that mode, shape (n,); NaN where it cannot be.
+
+    frequency: (n,) Hz, > 0. The stiffnesses keep their given ratios; what is returned is their mean over the group
+    (None: over all bearings that have one), the common stiffness where all are equal. Raises ValueError for
+    frequencies that are not > 0, and as calibrate for the bearings. Figure 8 of Gaber & Hashemi, Shock and Vibration,
+    2015, is such a curve.
+
+    >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> f = natural_frequencies(spindle, 1)[0]
+    >>> (stiffness_curve(spindle, [f, 0.9 * f, 3 * f]) / 1e6).round(1).tolist()  # N/um; no bearing gives the last one
+    [250.0, 196.9, nan]
+    """
+    mean = parts_stiffness(spindle, calibrated_parts(spindle, group))
+    return mean * stiffness_factor(spindle, frequency, mode, group)
+
+
+LOOSE_JOINT_FACTOR = 1e-9
 """Factor on the stiffness of a joint that stands for none."""
-IN_95_PERCENT = 1.96
+STANDARD_ERRORS_95_PERCENT = 1.96
 """Standard errors either way that 95 % stay within."""
 
 
@@ -47,17 +183,17 @@ def calibrate(
     >>> new = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> measured = 0.95 * natural_frequencies(new, 1)[0]
     >>> now = calibrate(new, measured, frequency_std=2.0)
-    >>> plus_minus(now.bearing_stiffness, now.bearing_stiffness_std, 1e6, "N/um"), round(now.factor, 3)
+    >>> format_with_error(now.bearing_stiffness, now.bearing_stiffness_std, 1e6, "N/um"), round(now.factor, 3)
     ('222.2 ± 1.0 N/um', 0.889)
     >>> abs(now.residual) < 1e-6  # Hz: solved anew
     True
     """
-    _check(frequency, frequency_std, mode)
-    problem = bearing_eigenproblem(spindle, _with_ends(frequency, frequency_std), group)
+    _check_frequency(frequency, frequency_std, mode)
+    problem = bearing_eigenproblem(spindle, _with_interval_ends(frequency, frequency_std), group)
     index = int(problem.pick(mode)[0])
     chosen = problem.springs.parts
     if index < 0:
-        raise _unreachable(spindle, frequency, mode, chosen)
+        raise _unreachable_error(spindle, frequency, mode, chosen)
     factor, sensitivity = float(-1 / problem.values[0, index]), problem.sensitivity(index)
     stiffness = factor * parts_stiffness(spindle, chosen)
     return Calibration(
@@ -66,7 +202,9 @@ def calibrate(
         mode=mode,
         bearing_stiffness=stiffness,
         bearing_stiffness_std=None if frequency_std is None else stiffness * frequency_std / frequency / sensitivity,
-        bearing_stiffness_interval=None if frequency_std is None else _interval(problem, mode, stiffness / factor),
+        bearing_stiffness_interval=None
+        if frequency_std is None
+        else _stiffness_interval(problem, mode, stiffness / factor),
         factor=factor,
         sensitivity=sensitivity,
         given=spindle,
@@ -74,24 +212,24 @@ def calibrate(
     )
 
 
-def _check(frequency: float, frequency_std: float | None, mode: int) -> None:
+def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -> None:
     if not (math.isfinite(frequency) and frequency > 0):
         raise ValueError(f"frequency={frequency} Hz is not a finite number > 0")
     if frequency_std is not None and not (math.isfinite(frequency_std) and frequency_std >= 0):
         raise ValueError(f"frequency_std={frequency_std} Hz is not a finite number >= 0")
-    if not 1 <= mode <= MOST_MODES:
-        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MOST_MODES}")
+    if not 1 <= mode <= MAX_MODES:
+        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
 
 
-def _with_ends(frequency: float, frequency_std: float | None) -> NDArray[np.float64]:
+def _with_interval_ends(frequency: float, frequency_std: float | None) -> NDArray[np.float64]:
     """The frequency, and the ends of its 95 % interval (Hz)."""
     if frequency_std is None:
         return np.array([frequency])
-    half = IN_95_PERCENT * frequency_std
-    return np.array([frequency, max(frequency - half, LOOSE * frequency), frequency + half])
+    half = STANDARD_ERRORS_95_PERCENT * frequency_std
+    return np.array([frequency, max(frequency - half, LOOSE_JOINT_FACTOR * frequency), frequency + half])
 
 
-def _interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
+def _stiffness_interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
     """Stiffnesses (N/m) for the second and third frequency; 0 and inf where none is as soft or stiff as that."""
     low, high = problem.pick(mode)[1:].tolist()
     return (
@@ -100,8 +238,10 @@ def _interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[fl
     )
 
 
-def _unreachable(spindle: Spindle, frequency: float, mode: int, chosen: Sequence[int]) -> UnreachableFrequencyError:
-    low, high = (float(natural_frequencies(limit, mode)[-1]) for limit in _limits(spindle, chosen))
+def _unreachable_error(
+    spindle: Spindle, frequency: float, mode: int, chosen: Sequence[int]
+) -> UnreachableFrequencyError:
+    low, high = (float(natural_frequencies(limit, mode)[-1]) for limit in _limit_spindles(spindle, chosen))
     return UnreachableFrequencyError(
         f"no bearing stiffness puts mode {mode} at {frequency:g} Hz: it lies between {low:.1f} Hz (without these "
         f"bearings) and {high:.1f} Hz (rigid bearings); check the geometry, and which mode was measured",
@@ -109,11 +249,11 @@ def _unreachable(spindle: Spindle, frequency: float, mode: int, chosen: Sequence
     )
 
 
-def _limits(spindle: Spindle, chosen: Sequence[int]) -> tuple[Spindle, Spindle]:
+def _limit_spindles(spindle: Spindle, chosen: Sequence[int]) -> tuple[Spindle, Spindle]:
     """Without the calibrated parts and with rigid ones; a joint is next to nothing, or not there."""
     count = len(spindle.bearings)
     soft = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
     hard = [replace(b, stiffness=math.inf) if i in chosen else b for i, b in enumerate(spindle.bearings)]
-    loose = scale_parts(spindle, [index for index in chosen if index >= count], LOOSE).joints
+    loose = scale_parts(spindle, [index for index in chosen if index >= count], LOOSE_JOINT_FACTOR).joints
     fast = [joint for index, joint in enumerate(spindle.joints, count) if index not in chosen]
     return replace(spindle, bearings=soft, joints=loose), replace(spindle, bearings=hard, joints=fast)

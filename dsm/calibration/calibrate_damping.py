@@ -11,21 +11,21 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.report_text import format_with_error
 from dsm.calibration.stiffness_groups import calibrated_bearings
-from dsm.modes.damped_shaft import DampedMode, DampedShaft
+from dsm.modes.damped_modes import DampedMode, DampedShaft
+from dsm.spindle.attachments import Damping, damping_of_bearings
 from dsm.spindle.spindle import Spindle
-from dsm.spindle.supports import Damping, given_damping
 
 _Float = NDArray[np.float64]
 
-FIRST_STEP = 0.3
+FIRST_DAMPER_STEP = 0.3
 """Longest first step: the damper's share in the force of its spring (-), far from holding the bearing still."""
-GROWTH = 0.5
+MAX_DAMPER_GROWTH = 0.5
 """Longest later step, in parts of the dampers: the damping ratio may fall and rise again."""
-LOCKED = 3e3
+MAX_DAMPER_SHARE = 3e3
 """The damper's share in the force of its spring beyond which nothing is sought."""
-ROUNDS = 100
+MAX_DAMPING_STEPS = 100
 """Most steps towards the measured damping ratio."""
 
 
@@ -68,8 +68,8 @@ class DampingCalibration:
 
     def __str__(self) -> str:
         """The report."""
-        damping = plus_minus(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
-        measured = plus_minus(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
+        damping = format_with_error(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
+        measured = format_with_error(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
         return "\n".join(
             [
                 f"bearing damping  {damping} each on average",
@@ -81,7 +81,7 @@ class DampingCalibration:
         )
 
 
-class _Point(NamedTuple):
+class _DampingPoint(NamedTuple):
     """The mode at one amount of the dampers."""
 
     amount: float
@@ -102,12 +102,12 @@ class _Dampers(NamedTuple):
     def at(self, amount: float) -> Damping:
         return Damping(self.fixed.viscous + amount * self.ratio, self.fixed.loss_factor)
 
-    def point(self, amount: float, mode: DampedMode) -> _Point:
+    def point(self, amount: float, mode: DampedMode) -> _DampingPoint:
         """With d zeta = cos(arg w) Im(dw/w), as zeta = sin(arg w)."""
-        change = complex(self.shaft.by_damper(self.at(amount), mode) @ self.ratio) / mode.w
-        return _Point(amount, mode, mode.w.real / abs(mode.w) * change.imag)
+        change = complex(self.shaft.damper_sensitivity(self.at(amount), mode) @ self.ratio) / mode.w
+        return _DampingPoint(amount, mode, mode.w.real / abs(mode.w) * change.imag)
 
-    def go(self, start: _Point, amount: float) -> _Point:
+    def follow(self, start: _DampingPoint, amount: float) -> _DampingPoint:
         mode = self.shaft.follow(self.number, start.mode, self.at(start.amount), self.at(amount))
         return self.point(amount, mode)
 
@@ -140,15 +140,15 @@ def calibrate_damping(
     >>> damped_modes(damped.spindle, 1).damping_ratio.round(6).tolist()
     [0.03]
     """
-    _check(damping_ratio, damping_ratio_std, mode)
+    _check_damping(damping_ratio, damping_ratio_std, mode)
     chosen = calibrated_bearings(spindle, group)
-    given = given_damping(spindle.bearings, loss_factor)
+    given = damping_of_bearings(spindle.bearings, loss_factor)
     fixed = given.viscous.copy()
     fixed[chosen] = 0.0
     shaft = DampedShaft.of(spindle, mode)
-    dampers = _Dampers(shaft, mode, Damping(fixed, loss_factor), _ratio(spindle, chosen))
-    start = dampers.point(0.0, shaft.follow(mode, shaft.start(mode), shaft.none, dampers.fixed))
-    damped = _reach(dampers, start, damping_ratio)
+    dampers = _Dampers(shaft, mode, Damping(fixed, loss_factor), _start_dampers(spindle, chosen))
+    start = dampers.point(0.0, shaft.follow(mode, shaft.start(mode), shaft.no_damping, dampers.fixed))
+    damped = _find_damping(dampers, start, damping_ratio)
     viscous = dampers.at(damped.amount).viscous
     mean, per_amount = float(np.mean(viscous[chosen])), float(np.mean(dampers.ratio[chosen]))
     return DampingCalibration(
@@ -168,7 +168,7 @@ def calibrate_damping(
     )
 
 
-def _check(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> None:
+def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> None:
     if not 0 < damping_ratio < 1:
         raise ValueError(f"damping_ratio={damping_ratio} is not between 0 and 1")
     if damping_ratio_std is not None and not (math.isfinite(damping_ratio_std) and damping_ratio_std >= 0):
@@ -177,7 +177,7 @@ def _check(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> 
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
 
 
-def _ratio(spindle: Spindle, chosen: list[int]) -> _Float:
+def _start_dampers(spindle: Spindle, chosen: list[int]) -> _Float:
     """Dampers to start from: those given, or such that damper over stiffness is 1 us in each bearing."""
     ratio = np.zeros(len(spindle.bearings))
     damped = [index for index in chosen if spindle.bearings[index].damping > 0]
@@ -192,7 +192,7 @@ def _ratio(spindle: Spindle, chosen: list[int]) -> _Float:
     return ratio
 
 
-def _reach(dampers: _Dampers, start: _Point, target: float) -> _Point:
+def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _DampingPoint:
     """The weakest dampers with the damping ratio `target`."""
     without_dampers = start.mode.damping_ratio
     if without_dampers >= target:
@@ -201,32 +201,32 @@ def _reach(dampers: _Dampers, start: _Point, target: float) -> _Point:
             f"other bearings alone give {without_dampers:.6g}; lower them, or check the measurement",
             without_dampers,
         )
-    low, high = _bracket(dampers, start, target)
-    amount = _zero(
-        lambda value: dampers.go(low, value).mode.damping_ratio - target,
+    low, high = _bracket_target(dampers, start, target)
+    amount = _find_root(
+        lambda value: dampers.follow(low, value).mode.damping_ratio - target,
         low.amount,
         high.amount,
         xtol=1e-15 * high.amount,
         rtol=1e-13,
     )
-    return dampers.go(low, amount)
+    return dampers.follow(low, amount)
 
 
-def _bracket(dampers: _Dampers, low: _Point, target: float) -> tuple[_Point, _Point]:
+def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tuple[_DampingPoint, _DampingPoint]:
     """Two points with the target between them; where the curve has several humps, on the first that is high enough."""
     springs = np.array([bearing.stiffness for bearing in dampers.shaft.spindle.bearings])
     unit = 1 / (abs(low.mode.w) * float(np.max(dampers.ratio / springs)))
     longest, most = math.inf, low.mode.damping_ratio
-    for _ in range(ROUNDS):
-        if low.amount > LOCKED * unit:
+    for _ in range(MAX_DAMPING_STEPS):
+        if low.amount > MAX_DAMPER_SHARE * unit:
             break
-        step = min(_step(low, target), max(FIRST_STEP * unit, GROWTH * low.amount), longest)
+        step = min(_damper_step(low, target), max(FIRST_DAMPER_STEP * unit, MAX_DAMPER_GROWTH * low.amount), longest)
         try:
-            high = dampers.go(low, low.amount + step)
+            high = dampers.follow(low, low.amount + step)
         except ArithmeticError:
             longest = step / 2
             continue
-        top = _highest(dampers, low, high) if low.slope > 0 >= high.slope else high
+        top = _find_maximum(dampers, low, high) if low.slope > 0 >= high.slope else high
         if top.mode.damping_ratio >= target:
             return low, top
         low, most = high, max(most, top.mode.damping_ratio)
@@ -237,16 +237,18 @@ def _bracket(dampers: _Dampers, low: _Point, target: float) -> tuple[_Point, _Po
     )
 
 
-def _step(low: _Point, target: float) -> float:
+def _damper_step(low: _DampingPoint, target: float) -> float:
     """Twice the step of Newton, which falls short where the curve bends down."""
     return 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
 
 
-def _highest(dampers: _Dampers, low: _Point, high: _Point) -> _Point:
+def _find_maximum(dampers: _Dampers, low: _DampingPoint, high: _DampingPoint) -> _DampingPoint:
     """The point with the largest damping ratio between one where it rises and one where it falls."""
-    return dampers.go(low, _zero(lambda value: dampers.go(low, value).slope, low.amount, high.amount, rtol=1e-10))
+    return dampers.follow(
+        low, _find_root(lambda value: dampers.follow(low, value).slope, low.amount, high.amount, rtol=1e-10)
+    )
 
 
-def _zero(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
+def _find_root(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
 
     return float(scipy.optimize.brentq(function, low, high, **tolerances))

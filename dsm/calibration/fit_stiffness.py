@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.calibration import UnreachableFrequencyError
-from dsm.calibration.fit_remark import FitRemark
 from dsm.calibration.identifiability import (
-    CURE,
-    FARTHEST,
-    LEAST_SHARE,
-    Allowed,
-    Surroundings,
-    identifiability,
-    surroundings,
+    IDENTIFIABILITY_REMEDY,
+    MAX_LOG_INTERVAL,
+    MIN_ENERGY_SHARE,
+    AllowedExcess,
+    ProfileScan,
+    identifiability_remarks,
+    scan_profiles,
 )
-from dsm.calibration.least_squares import LIMIT, Iterate, Problem, minimize
-from dsm.calibration.measured import check_measured
+from dsm.calibration.least_squares import MAX_LOG_FACTOR, Iterate, StiffnessProblem, check_measured_modes, minimize
+from dsm.calibration.report_text import FitRemark
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
 from dsm.modes.natural_frequencies import natural_frequencies
@@ -29,13 +28,13 @@ from dsm.spindle.spindle import Spindle, require_support
 
 _Float = NDArray[np.float64]
 
-OTHER_STARTS = 8
+EXTRA_STARTS = 8
 """Further starts, about a factor of e around the given one, where that leads to no minimum or to a poor one."""
-BACK = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0)
+BACKTRACK_SHARES = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0)
 """Parts of the way to where an unfelt stiffness has run off, at which it is tried to stay."""
-WORST_CONDITION = 30.0
+MAX_CONDITION_NUMBER = 30.0
 """A larger condition number is reported."""
-NEAR = 0.01
+CLOSE_MODE_SHARE = 0.01
 """Modes nearer to each other than this part of their frequency are reported."""
 
 
@@ -84,41 +83,41 @@ def fit_stiffness(
     >>> fit = fit_stiffness(new, natural_frequencies(worn, 3), frequency_std=[1.0, 1.0, 1.0])
     >>> fit.groups, fit.factor.round(4).tolist(), fit.remarks
     (('front', 'rear'), [0.6, 0.8], ())
-    >>> [plus_minus(k, std, 1e6, "N/um") for k, std in zip(fit.stiffness, fit.stiffness_std, strict=True)]
+    >>> [format_with_error(k, std, 1e6, "N/um") for k, std in zip(fit.stiffness, fit.stiffness_std, strict=True)]
     ['150.00 ± 0.41 N/um', '200.00 ± 0.46 N/um']
     """
     spindles = (spindle,) if isinstance(spindle, Spindle) else tuple(spindle)
     for model in spindles:
         require_support(model)
     names = chosen_groups(spindles, groups)
-    measured = check_measured(len(spindles), frequency, frequency_std, mode, shaft)
+    measured = check_measured_modes(len(spindles), frequency, frequency_std, mode, shaft)
     if measured.frequency.size < len(names):
         raise ValueError(
             f"{measured.frequency.size} measured mode(s) cannot give the stiffness of {len(names)} groups "
             f"({', '.join(names)}); measure more modes, or name fewer groups"
         )
-    problem = Problem(spindles, names, measured)
+    problem = StiffnessProblem(spindles, names, measured)
     state, found = _search(problem, None if start is None else np.log(start))
     if tolerance > 0 and measured.std is not None:
         problem = problem.with_drawing(state, tolerance)
         state, found = _search(problem, state.log_factor)
-    state, around = _better(problem, state) if found else (state, None)
+    state, around = _improve(problem, state) if found else (state, None)
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(problem)
-    result = _result(problem, state, around, tolerance)
+    result = _build_result(problem, state, around, tolerance)
     if not found:
-        raise StiffnessFitError(_why(result), result)
+        raise StiffnessFitError(_failure_text(result), result)
     return result
 
 
-def _search(problem: Problem, begin: _Float | None) -> tuple[Iterate, bool]:
+def _search(problem: StiffnessProblem, begin: _Float | None) -> tuple[Iterate, bool]:
     """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
     size = len(problem.names)
     state, found = minimize(problem, np.zeros(size) if begin is None else begin)
     if not found:
-        state, found = _without_unfelt(problem, state)
-    for start in np.random.default_rng(0).normal(size=(OTHER_STARTS, size)):
+        state, found = _restore_unfelt(problem, state)
+    for start in np.random.default_rng(0).normal(size=(EXTRA_STARTS, size)):
         if begin is not None or (found and problem.fits(state)):
             break
         other, other_found = minimize(problem, start)
@@ -127,16 +126,16 @@ def _search(problem: Problem, begin: _Float | None) -> tuple[Iterate, bool]:
     return state, found
 
 
-def _without_unfelt(problem: Problem, state: Iterate) -> tuple[Iterate, bool]:
+def _restore_unfelt(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, bool]:
     """A fit with the factors of which next to nothing is felt at what was given, or as near as the frequencies allow.
 
     Such factors run off, to the end of what is allowed or to where rounding ends the search. What was given and False
     where there are none, or nothing fits.
     """
-    away = np.flatnonzero(np.max(state.share, axis=0) < LEAST_SHARE)
+    away = np.flatnonzero(np.max(state.share, axis=0) < MIN_ENERGY_SHARE)
     if away.size == 0:
         return state, False
-    for part in BACK:
+    for part in BACKTRACK_SHARES:
         start = state.log_factor.copy()
         start[away] *= part
         other, found = minimize(problem, start, away.tolist())
@@ -145,23 +144,25 @@ def _without_unfelt(problem: Problem, state: Iterate) -> tuple[Iterate, bool]:
     return state, False
 
 
-def _better(problem: Problem, state: Iterate) -> tuple[Iterate, Surroundings | None]:
+def _improve(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, ProfileScan | None]:
     """The solution, or another that fits better by more than 95 % intervals allow; with it what lies around."""
-    for _ in range(OTHER_STARTS):
+    for _ in range(EXTRA_STARTS):
         covariance = _covariance(problem, state)
         if covariance is None:
             return state, None
-        around = surroundings(problem, state, covariance)
-        if not around.rivals or around.rivals[0].cost + Allowed.of(problem, around.rivals[0]).limit > state.cost:
+        around = scan_profiles(problem, state, covariance)
+        if not around.rivals or around.rivals[0].cost + AllowedExcess.of(problem, around.rivals[0]).limit > state.cost:
             break
         state = around.rivals[0]
     return state, around
 
 
-def _result(problem: Problem, state: Iterate, around: Surroundings | None, tolerance: float) -> StiffnessFit:
+def _build_result(
+    problem: StiffnessProblem, state: Iterate, around: ProfileScan | None, tolerance: float
+) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
-    unsure = identifiability(problem, state, covariance, around)
+    unsure = identifiability_remarks(problem, state, covariance, around)
     return StiffnessFit(
         groups=problem.names,
         mode=measured.mode,
@@ -171,7 +172,12 @@ def _result(problem: Problem, state: Iterate, around: Surroundings | None, toler
         factor=np.exp(state.log_factor),
         log_covariance=covariance,
         energy_share=state.share,
-        remarks=(*unsure, *_alike(problem, state), *_close_modes(problem, state), *_misfit(problem, state)),
+        remarks=(
+            *unsure,
+            *_collinear_group_remarks(problem, state),
+            *_close_mode_remarks(problem, state),
+            *_misfit_remarks(problem, state),
+        ),
         shaft=measured.shaft,
         given=problem.spindles,
         spindles=state.spindles,
@@ -180,47 +186,47 @@ def _result(problem: Problem, state: Iterate, around: Surroundings | None, toler
     )
 
 
-def _covariance(problem: Problem, state: Iterate) -> _Float | None:
+def _covariance(problem: StiffnessProblem, state: Iterate) -> _Float | None:
     """(J^T J)^-1, times the variance of the residuals where no standard errors were given.
 
     A group that is not felt, known to a factor of 30 at best, counts as known to that and independent of all others.
     """
     given = problem.measured.std is not None
-    if not given and problem.spare == 0:
+    if not given and problem.degrees_of_freedom == 0:
         return None
-    variance = 1.0 if given else state.cost / problem.spare
-    covariance = variance * _inverse(state.slope)
-    felt = (np.max(state.share, axis=0) >= LEAST_SHARE) | (np.diag(covariance) < FARTHEST**2)
+    variance = 1.0 if given else state.cost / problem.degrees_of_freedom
+    covariance = variance * _inverse_normal_matrix(state.slope)
+    felt = (np.max(state.share, axis=0) >= MIN_ENERGY_SHARE) | (np.diag(covariance) < MAX_LOG_INTERVAL**2)
     if np.all(felt):
         return covariance
-    limited = np.diag(np.full(felt.size, FARTHEST**2))
+    limited = np.diag(np.full(felt.size, MAX_LOG_INTERVAL**2))
     if np.any(felt):
-        limited[np.ix_(felt, felt)] = variance * _inverse(state.slope[:, felt])
+        limited[np.ix_(felt, felt)] = variance * _inverse_normal_matrix(state.slope[:, felt])
     return limited
 
 
-def _inverse(slope: _Float) -> _Float:
+def _inverse_normal_matrix(slope: _Float) -> _Float:
     """(J^T J)^-1, large where J is singular."""
     _, values, vectors = np.linalg.svd(slope, full_matrices=False)
     root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
     return np.asarray(root @ root.T)
 
 
-def _alike(problem: Problem, state: Iterate) -> list[FitRemark]:
+def _collinear_group_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     """Groups that change the frequencies in the same ratio, however much they do."""
-    if np.any(np.max(state.share, axis=0) < LEAST_SHARE):
+    if np.any(np.max(state.share, axis=0) < MIN_ENERGY_SHARE):
         return []
     ratio = state.share / np.linalg.norm(state.share, axis=0)
     condition = float(np.linalg.cond(ratio))
-    if condition <= WORST_CONDITION:
+    if condition <= MAX_CONDITION_NUMBER:
         return []
     weakest = np.abs(np.linalg.svd(ratio)[2][-1])
     mixed = ", ".join(name for name, part in zip(problem.names, weakest, strict=True) if part > 0.3)
     text = f"the measured modes hardly tell their stiffness apart (condition number {condition:.2g})"
-    return [FitRemark("groups-alike", mixed, text, CURE)]
+    return [FitRemark("groups-alike", mixed, text, IDENTIFIABILITY_REMEDY)]
 
 
-def _close_modes(problem: Problem, state: Iterate) -> list[FitRemark]:
+def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     """Pairs of neighbours with a measured one among them."""
     measured = problem.measured
     remarks = []
@@ -236,12 +242,12 @@ def _close_modes(problem: Problem, state: Iterate) -> list[FitRemark]:
                 "check which of them was measured",
             )
             for low in range(1, frequency.size)
-            if gap[low - 1] < NEAR and np.any((numbers == low) | (numbers == low + 1))
+            if gap[low - 1] < CLOSE_MODE_SHARE and np.any((numbers == low) | (numbers == low + 1))
         ]
     return remarks
 
 
-def _misfit(problem: Problem, state: Iterate) -> list[FitRemark]:
+def _misfit_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     if problem.fits(state):
         return []
     measured = problem.measured
@@ -250,13 +256,13 @@ def _misfit(problem: Problem, state: Iterate) -> list[FitRemark]:
     return [FitRemark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 
 
-def _require_reachable(problem: Problem) -> None:
+def _require_reachable(problem: StiffnessProblem) -> None:
     """Raise UnreachableFrequencyError for a mode measured outside of what the factors can do; all raise all modes."""
     measured, names = problem.measured, problem.names
     ends = np.empty((2, measured.mode.size))
     for number, spindle in enumerate(problem.spindles):
         here = measured.shaft == number
-        for row, end in enumerate((-LIMIT, LIMIT)):
+        for row, end in enumerate((-MAX_LOG_FACTOR, MAX_LOG_FACTOR)):
             scaled = scale_groups(spindle, dict.fromkeys(names, math.exp(end)))
             ends[row, here] = natural_frequencies(scaled, int(np.max(measured.mode[here])))[measured.mode[here] - 1]
     for mode, frequency, low, high in zip(measured.mode, measured.frequency, *ends.tolist(), strict=True):
@@ -268,7 +274,7 @@ def _require_reachable(problem: Problem) -> None:
             )
 
 
-def _why(result: StiffnessFit) -> str:
+def _failure_text(result: StiffnessFit) -> str:
     factors = ", ".join(f"{name} {factor:.3g}" for name, factor in zip(result.groups, result.factor, strict=True))
     residual = float(np.max(np.abs(result.residual)))
     return (

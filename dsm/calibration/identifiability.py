@@ -12,52 +12,54 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from dsm.calibration.fit_remark import FitRemark
-from dsm.calibration.least_squares import Iterate, Problem, minimize
+from dsm.calibration.least_squares import Iterate, StiffnessProblem, minimize
+from dsm.calibration.report_text import FitRemark
 
 _Float = NDArray[np.float64]
 
-CONFIDENCE = 0.95
+PROFILE_CONFIDENCE = 0.95
 """Of the intervals that are compared."""
-FARTHEST = math.log(30.0)
+MAX_LOG_INTERVAL = math.log(30.0)
 """An interval wider than this, in the logarithm of the factor, is none."""
-STEPS = 0.2, 0.7, 1.7, 3.4
+PROFILE_STEPS = 0.2, 0.7, 1.7, 3.4
 """Distances beyond the interval of first order, in the logarithm of the factor, at which S(v) is looked at."""
-NEARER = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
+RIVAL_START_DISTANCES = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
 """Distances, in the logarithm of a factor, of starts along the direction that is known least."""
-LEAST_HELD = 1 - 2 * (1 - CONFIDENCE)
+MIN_INTERVAL_COVERAGE = 1 - 2 * (1 - PROFILE_CONFIDENCE)
 """What an interval must hold by the likelihood."""
-NEARLY = 0.8
+MIN_INTERVAL_RISE = 0.8
 """Ends at which the sum of squares rises by this part of what it should, or more, are as good as those of S(v)."""
-TOLERANCE = 0.1
+PROFILE_TOLERANCE = 0.1
 """Other factors are found anew until a step would change no frequency by more than this part of the least error."""
-SHARP = 1e-6
+MIN_PROFILE_WIDTH = 1e-6
 """Intervals and distances smaller than this, as of computed frequencies, are not looked at."""
-FAR = 4.0
+MIN_RIVAL_DISTANCE = 4.0
 """Standard errors of a factor that another solution is away at least."""
-LITTLE_SHARE = 0.1
+LOW_ENERGY_SHARE = 0.1
 """Below this part of the strain energy of every measured mode, stiffness far from what was found is tried."""
-LEAST_SHARE = 0.01
+MIN_ENERGY_SHARE = 0.01
 """A group with less than this part of the strain energy of every measured mode is reported."""
-CURE = "measure more or other modes, or leave the group out"
+IDENTIFIABILITY_REMEDY = "measure more or other modes, or leave the group out"
 
 
-class Allowed(NamedTuple):
+class AllowedExcess(NamedTuple):
     """By how much a sum of squares may exceed the least one with a factor still inside its 95 % interval."""
 
     variance: float
     """Variance of the scaled residuals: 1, or from their scatter where no standard errors were given."""
     rise: float
     """Student's t^2."""
-    spare: float
+    degrees_of_freedom: float
     """Degrees of freedom of the variance: inf where it is known."""
 
     @classmethod
-    def of(cls, problem: Problem, best: Iterate) -> Allowed:
+    def of(cls, problem: StiffnessProblem, best: Iterate) -> AllowedExcess:
         """For a fit with a covariance."""
         given = problem.measured.std is not None
-        variance, spare = (1.0, math.inf) if given else (best.cost / problem.spare, problem.spare)
-        return cls(variance, float(scipy.special.stdtrit(spare, (1 + CONFIDENCE) / 2)) ** 2, spare)
+        variance, spare = (
+            (1.0, math.inf) if given else (best.cost / problem.degrees_of_freedom, problem.degrees_of_freedom)
+        )
+        return cls(variance, float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2, spare)
 
     @property
     def limit(self) -> float:
@@ -67,7 +69,11 @@ class Allowed(NamedTuple):
     def log_density(self, excess: float) -> float:
         """Logarithm of the likelihood of so much excess, over that of none: normal, or Student's."""
         square = excess / self.variance
-        return -square / 2 if math.isinf(self.spare) else -(self.spare + 1) / 2 * math.log1p(square / self.spare)
+        return (
+            -square / 2
+            if math.isinf(self.degrees_of_freedom)
+            else -(self.degrees_of_freedom + 1) / 2 * math.log1p(square / self.degrees_of_freedom)
+        )
 
 
 class Profile(NamedTuple):
@@ -84,16 +90,16 @@ class Profile(NamedTuple):
             yield end, *further
 
 
-class Surroundings(NamedTuple):
+class ProfileScan(NamedTuple):
     """What lies around a fit over the whole range of factors."""
 
-    ways: tuple[Profile | None, ...]
+    profiles: tuple[Profile | None, ...]
     """Along each factor; None where its interval is too small to be looked at, or the model cannot be solved there."""
     rivals: tuple[Iterate, ...]
     """Other minima to which these ways lead, the lowest first; they may be lower than the fit."""
 
 
-def surroundings(problem: Problem, best: Iterate, log_covariance: _Float) -> Surroundings:
+def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: _Float) -> ProfileScan:
     """Along each factor: its interval, and up to a factor of 30 beyond and through the given stiffness.
 
     Beyond it is looked at of a group that has little energy in all measured modes at what was found, at what was given,
@@ -101,20 +107,22 @@ def surroundings(problem: Problem, best: Iterate, log_covariance: _Float) -> Sur
     on the way, and nearer by along the direction that is known least.
     """
     ways: list[Profile | None] = []
-    for index, felt in enumerate(_felt(problem, best).tolist()):
+    for index, felt in enumerate(_min_group_shares(problem, best).tolist()):
         try:
-            ways.append(_profile(problem, best, log_covariance, index, felt < LITTLE_SHARE))
+            ways.append(_likelihood_profile(problem, best, log_covariance, index, felt < LOW_ENERGY_SHARE))
         except ArithmeticError:
             ways.append(None)
-    falling = [state.log_factor for way in ways if way is not None for side in way.sides() for state in _falling(side)]
+    falling = [
+        state.log_factor for way in ways if way is not None for side in way.sides() for state in _lower_points(side)
+    ]
     rivals = []
-    for start in [*_along_least_known(best, log_covariance), *falling]:
+    for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
-            rivals.append(minimize(problem, start, (), _tolerance(problem, best))[0])
-    return Surroundings(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
+            rivals.append(minimize(problem, start, (), _profile_tolerance(problem, best))[0])
+    return ProfileScan(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
 
 
-def _felt(problem: Problem, best: Iterate) -> _Float:
+def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> _Float:
     """Least share, of what was found, what was given and half-way, of each group in the mode that has most of it."""
     states = [best]
     for share in (0.0, 0.5):
@@ -123,15 +131,15 @@ def _felt(problem: Problem, best: Iterate) -> _Float:
     return np.asarray(np.min([np.max(state.share, axis=0) for state in states], axis=0))
 
 
-def _along_least_known(best: Iterate, log_covariance: _Float) -> list[_Float]:
+def _weakest_direction_starts(best: Iterate, log_covariance: _Float) -> list[_Float]:
     """Starts in the direction that is known least, where several factors are sought."""
     direction = np.linalg.eigh(log_covariance)[1][:, -1]
     direction /= np.max(np.abs(direction))
-    return [best.log_factor + step * direction for step in NEARER if direction.size > 1]
+    return [best.log_factor + step * direction for step in RIVAL_START_DISTANCES if direction.size > 1]
 
 
-def identifiability(
-    problem: Problem, best: Iterate, log_covariance: _Float | None, around: Surroundings | None
+def identifiability_remarks(
+    problem: StiffnessProblem, best: Iterate, log_covariance: _Float | None, around: ProfileScan | None
 ) -> list[FitRemark]:
     """Remarks on groups whose factor the frequencies leave open.
 
@@ -150,27 +158,29 @@ def identifiability(
             "group-not-felt",
             name,
             f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it",
-            CURE,
+            IDENTIFIABILITY_REMEDY,
         )
         for name, share in zip(problem.names, felt.tolist(), strict=True)
-        if share < LEAST_SHARE
+        if share < MIN_ENERGY_SHARE
     ]
     if log_covariance is None or around is None:
         return remarks
-    others = _others(problem, best, log_covariance, around.rivals)
+    others = _rival_text(problem, best, log_covariance, around.rivals)
     if others:
         text = f"another solution fits as well: factors {others}"
-        return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
-    for index in np.flatnonzero(felt >= LEAST_SHARE).tolist():
-        text = _open(problem, best, float(log_covariance[index, index]), index, around.ways[index])
-        remarks += [FitRemark("stiffness-ambiguous", problem.names[index], text, CURE)] if text else []
+        return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, IDENTIFIABILITY_REMEDY)]
+    for index in np.flatnonzero(felt >= MIN_ENERGY_SHARE).tolist():
+        text = _open_interval_text(problem, best, float(log_covariance[index, index]), index, around.profiles[index])
+        remarks += (
+            [FitRemark("stiffness-ambiguous", problem.names[index], text, IDENTIFIABILITY_REMEDY)] if text else []
+        )
     return remarks
 
 
-def _others(problem: Problem, best: Iterate, log_covariance: _Float, rivals: Sequence[Iterate]) -> str:
+def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: _Float, rivals: Sequence[Iterate]) -> str:
     """Factors of all solutions that fit as well, far off in one that is not open."""
-    error, highest = np.sqrt(np.diag(log_covariance)), best.cost + Allowed.of(problem, best).limit
-    far = np.where(error < FARTHEST, FAR * error + SHARP, math.inf)
+    error, highest = np.sqrt(np.diag(log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
+    far = np.where(error < MAX_LOG_INTERVAL, MIN_RIVAL_DISTANCE * error + MIN_PROFILE_WIDTH, math.inf)
     apart = [best.log_factor]
     for rival in rivals:
         if rival.cost < highest and all(np.max(np.abs(rival.log_factor - other) / far) > 1 for other in apart):
@@ -178,50 +188,60 @@ def _others(problem: Problem, best: Iterate, log_covariance: _Float, rivals: Seq
     return " or ".join(", ".join(f"{math.exp(value):.3g}" for value in rival) for rival in apart[1:])
 
 
-def _profile(problem: Problem, best: Iterate, log_covariance: _Float, index: int, far: bool) -> Profile | None:
-    allowed = Allowed.of(problem, best)
+def _likelihood_profile(
+    problem: StiffnessProblem, best: Iterate, log_covariance: _Float, index: int, far: bool
+) -> Profile | None:
+    allowed = AllowedExcess.of(problem, best)
     half = math.sqrt(allowed.rise * float(log_covariance[index, index]))
-    if half < SHARP:
+    if half < MIN_PROFILE_WIDTH:
         return None
-    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()]
+    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= MAX_LOG_INTERVAL**2).tolist()]
     ends = best, best
-    if half < FARTHEST:
-        along = np.clip(half * log_covariance[:, index] / log_covariance[index, index], -FARTHEST, FARTHEST)
+    if half < MAX_LOG_INTERVAL:
+        along = np.clip(
+            half * log_covariance[:, index] / log_covariance[index, index], -MAX_LOG_INTERVAL, MAX_LOG_INTERVAL
+        )
         ends = problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)
-        if not all(NEARLY < (end.cost - best.cost) / allowed.limit < 1 / NEARLY for end in ends):
-            low, high = (minimize(problem, end.log_factor, fixed, _tolerance(problem, best))[0] for end in ends)
+        if not all(MIN_INTERVAL_RISE < (end.cost - best.cost) / allowed.limit < 1 / MIN_INTERVAL_RISE for end in ends):
+            low, high = (minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends)
             ends = low, high
     if not far:
         return Profile(ends, ((), ()))
-    below, above = (tuple(_beyond(problem, best, end, fixed, side)) for side, end in zip((-1, 1), ends, strict=True))
+    below, above = (
+        tuple(_extend_profile(problem, best, end, fixed, side)) for side, end in zip((-1, 1), ends, strict=True)
+    )
     return Profile(ends, (below, above))
 
 
-def _open(problem: Problem, best: Iterate, variance: float, index: int, way: Profile | None) -> str:
+def _open_interval_text(
+    problem: StiffnessProblem, best: Iterate, variance: float, index: int, way: Profile | None
+) -> str:
     """What is wrong with the interval of one factor, in words; empty where nothing is."""
-    allowed = Allowed.of(problem, best)
+    allowed = AllowedExcess.of(problem, best)
     half = math.sqrt(allowed.rise * variance)
-    if not half < FARTHEST:
+    if not half < MAX_LOG_INTERVAL:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
-    if half < SHARP:
+    if half < MIN_PROFILE_WIDTH:
         return ""
     if way is None:
         return "its interval reaches where the model cannot be solved"
-    near = _held([(end.cost - best.cost) / allowed.limit for end in way.ends])
-    beyond = [list(_masses(best, side, index, allowed)) for side in way.sides()]
+    near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end in way.ends])
+    beyond = [list(_likelihood_masses(best, side, index, allowed)) for side in way.sides()]
     mass = math.sqrt(2 * math.pi * variance)
     total = mass + math.fsum(part for side in beyond for part, _ in side)
     held = near * mass / total
-    if held >= LEAST_HELD:
+    if held >= MIN_INTERVAL_COVERAGE:
         return ""
-    low, high = (_reach(side, total * (1 - CONFIDENCE) / 2, half) for side in beyond)
+    low, high = (_interval_reach(side, total * (1 - PROFILE_CONFIDENCE) / 2, half) for side in beyond)
     reach = f"the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
     return (
         f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: {reach}"
     )
 
 
-def _masses(best: Iterate, side: Sequence[Iterate], index: int, allowed: Allowed) -> Iterator[tuple[float, float]]:
+def _likelihood_masses(
+    best: Iterate, side: Sequence[Iterate], index: int, allowed: AllowedExcess
+) -> Iterator[tuple[float, float]]:
     """Likelihood over that of the best fit, summed from each place to the next, and how far that is (logarithm).
 
     In between its logarithm is taken for straight.
@@ -233,7 +253,7 @@ def _masses(best: Iterate, side: Sequence[Iterate], index: int, allowed: Allowed
         yield distance * mean, abs(float(far.log_factor[index] - best.log_factor[index]))
 
 
-def _reach(side: Sequence[tuple[float, float]], least: float, half: float) -> float:
+def _interval_reach(side: Sequence[tuple[float, float]], least: float, half: float) -> float:
     """How far the likelihood goes with no more than so little of it left out."""
     left_out = 0.0
     for part, place in reversed(side):
@@ -243,26 +263,28 @@ def _reach(side: Sequence[tuple[float, float]], least: float, half: float) -> fl
     return half
 
 
-def _held(rises: Sequence[float]) -> float:
+def _interval_coverage(rises: Sequence[float]) -> float:
     """How often an interval holds the truth at whose ends the sum of squares rises by so many times what it should."""
-    outside = (1 - CONFIDENCE) / 2
+    outside = (1 - PROFILE_CONFIDENCE) / 2
     deviates = [-float(scipy.special.ndtri(outside)) * math.sqrt(max(rise, 0.0)) for rise in rises]
     return float(1 - scipy.special.ndtr(-deviates[0]) - scipy.special.ndtr(-deviates[1]))
 
 
-def _falling(side: Sequence[Iterate]) -> list[Iterate]:
+def _lower_points(side: Sequence[Iterate]) -> list[Iterate]:
     """Places beyond the first that lie lower than the one before and not above the one behind."""
     costs = [state.cost for state in side]
     behind = [*costs[2:], math.inf]
     return [state for state, last, next_ in zip(side[1:], costs, behind, strict=False) if last > state.cost <= next_]
 
 
-def _tolerance(problem: Problem, best: Iterate) -> float:
-    error = math.sqrt(best.cost / problem.spare) if problem.measured.std is None else 1.0
-    return TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
+def _profile_tolerance(problem: StiffnessProblem, best: Iterate) -> float:
+    error = math.sqrt(best.cost / problem.degrees_of_freedom) if problem.measured.std is None else 1.0
+    return PROFILE_TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
 
 
-def _beyond(problem: Problem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int) -> Iterator[Iterate]:
+def _extend_profile(
+    problem: StiffnessProblem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int
+) -> Iterator[Iterate]:
     """The least sum of squares further and further from the first fixed factor found, beyond an end of its interval.
 
     Where it is large, as at the place before, it need not be known well.
@@ -270,8 +292,8 @@ def _beyond(problem: Problem, best: Iterate, end: Iterate, fixed: Sequence[int],
     index = fixed[0]
     half = abs(float(end.log_factor[index] - best.log_factor[index]))
     to_start = -side * float(best.log_factor[index])
-    places = {half + step for step in STEPS} | {share * to_start for share in (0.5, 1.0)}
-    state, tolerance, limit = end, _tolerance(problem, best), Allowed.of(problem, best).limit
+    places = {half + step for step in PROFILE_STEPS} | {share * to_start for share in (0.5, 1.0)}
+    state, tolerance, limit = end, _profile_tolerance(problem, best), AllowedExcess.of(problem, best).limit
     for place in sorted(place for place in places if place > half):
         start = state.log_factor.copy()
         start[index] = best.log_factor[index] + side * place

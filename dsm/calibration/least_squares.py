@@ -3,32 +3,177 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from dsm.calibration.drawing import diameters, frequency_effects
-from dsm.calibration.measured import Measured
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
+from dsm.matrix.dynamic_stiffness import check_frequencies
 from dsm.modes.find_modes import find_modes
+from dsm.modes.natural_frequencies import natural_frequencies
+from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
 
-LIMIT = math.log(1e6)
+DIAMETER_STEP = 1e-3
+"""Relative change of a diameter by which its effect is worked out, either way."""
+TOOL_TOLERANCE_RATIO = 3.0
+"""Tolerance of all diameters of a tool together over that of one of the drawing: what stands for flutes is rough."""
+ALL_SPINDLES = -1
+"""Stands for all spindles in the place of a diameter."""
+DiameterKey = tuple[int, int]
+"""The spindle of a segment, and its number from the rear end; 0: all that no other spindle has, together."""
+
+
+def diameter_keys(spindles: Sequence[Spindle]) -> list[list[DiameterKey]]:
+    """A name for the diameters of each segment of each spindle; segments that all have at their rear are the same.
+
+    The last name of a spindle with others, its tool, is that of all these together.
+    """
+    shared = 0
+    for rear in zip(*(reversed(spindle.segments) for spindle in spindles), strict=False):
+        if any(segment != rear[0] for segment in rear):
+            break
+        shared += 1
+    names = []
+    for number, spindle in enumerate(spindles):
+        behind = range(len(spindle.segments), 0, -1)
+        together = [(number, 0)] if len(behind) > shared else []
+        names.append([*((ALL_SPINDLES, k) if k <= shared else (number, k) for k in behind), *together])
+    return names
+
+
+def diameter_effects(spindle: Spindle, values: Callable[[Spindle], _Float], names: Sequence[DiameterKey]) -> _Float:
+    """d ln value / d ln diameter, outside and inside alike, of each of the names, shape (n_values, n_names).
+
+    Of all diameters of a tool together it is TOGETHER times as much.
+    """
+    columns = []
+    for number in range(len(spindle.segments)):
+        low, high = (values(_scale_diameter(spindle, number, 1 + side * DIAMETER_STEP)) for side in (-1, 1))
+        columns.append(np.log(high / low) / (2 * DIAMETER_STEP))
+    own = [column for column, (owner, _) in zip(columns, names, strict=False) if owner != ALL_SPINDLES]
+    return np.array([*columns, TOOL_TOLERANCE_RATIO * np.sum(own, axis=0)] if own else columns).T
+
+
+def frequency_effects(
+    spindles: Sequence[Spindle], mode: NDArray[np.int_], shaft: NDArray[np.int_], names: Sequence[Sequence[DiameterKey]]
+) -> _Float:
+    """Effects on modes of several spindles, shape (n_modes, n_diameters), diameters by name in order of appearance."""
+    order = diameter_columns(names)
+    found = np.zeros((mode.size, len(order)))
+    for number, spindle in enumerate(spindles):
+        here = np.flatnonzero(shaft == number)
+        columns = np.array([order[name] for name in names[number]])
+        found[np.ix_(here, columns)] = diameter_effects(spindle, _frequency_function(mode[here]), names[number])
+    return found
+
+
+def _frequency_function(mode: NDArray[np.int_]) -> Callable[[Spindle], _Float]:
+    """What gives the frequencies of these modes (Hz)."""
+    return lambda spindle: np.asarray(natural_frequencies(spindle, int(np.max(mode)))[mode - 1])
+
+
+def diameter_columns(names: Sequence[Sequence[DiameterKey]]) -> dict[DiameterKey, int]:
+    """Column of each diameter."""
+    return {name: column for column, name in enumerate(dict.fromkeys(name for row in names for name in row))}
+
+
+def _scale_diameter(spindle: Spindle, number: int, factor: float) -> Spindle:
+    segments = list(spindle.segments)
+    segments[number] = _scale_segment(segments[number], factor)
+    return replace(spindle, segments=segments)
+
+
+def _scale_segment(segment: Segment, factor: float) -> Segment:
+    def times(diameter: float | None) -> float | None:
+        return None if diameter is None else factor * diameter
+
+    return replace(
+        segment,
+        outer_diameter=factor * segment.outer_diameter,
+        bore_diameter=factor * segment.bore_diameter,
+        end_outer_diameter=times(segment.end_outer_diameter),
+        end_bore_diameter=times(segment.end_bore_diameter),
+        mass_diameter=times(segment.mass_diameter),
+    )
+
+
+class MeasuredModes(NamedTuple):
+    """What was measured."""
+
+    mode: NDArray[np.int_]
+    """Numbers of the modes, shape (n,); 1 is the lowest."""
+    frequency: _Float
+    """Frequencies (Hz), shape (n,)."""
+    std: _Float | None
+    """Standard errors (Hz), shape (n,); None where not given."""
+    shaft: NDArray[np.int_]
+    """Number of the spindle that each belongs to, shape (n,); 0 is the first."""
+
+    @property
+    def scale(self) -> _Float:
+        """What residuals are divided by: standard errors (Hz); where there are none, the frequencies."""
+        return self.frequency if self.std is None else self.std
+
+
+def check_measured_modes(
+    spindles: int,
+    frequency: ArrayLike,
+    frequency_std: ArrayLike | None,
+    mode: Sequence[int] | None,
+    shaft: Sequence[int] | None,
+) -> MeasuredModes:
+    """What was measured of so many spindles, as fit_stiffness takes it; ValueError for what cannot be."""
+    f = check_frequencies(frequency)
+    if np.any(f == 0):
+        raise ValueError("frequency=0 Hz is not > 0")
+    std = None if frequency_std is None else np.atleast_1d(np.asarray(frequency_std, dtype=np.float64))
+    if std is not None and (std.shape != f.shape or not np.all(np.isfinite(std) & (std > 0))):
+        raise ValueError(
+            f"frequency_std={frequency_std!r} is not one finite number > 0 (Hz) for each of {f.size} modes"
+        )
+    where = np.zeros(f.size, dtype=np.int_) if shaft is None else np.atleast_1d(np.asarray(shaft))
+    if where.shape != f.shape or where.dtype.kind not in "iu" or {*where.tolist()} != {*range(spindles)}:
+        raise ValueError(
+            f"shaft={shaft} does not say for each of {f.size} modes on which of {spindles} spindles it was measured, "
+            f"0 to {spindles - 1}, each at least once"
+        )
+    numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
+    whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
+    for number in range(spindles):
+        _check_mode_numbers(f[where == number], numbers[where == number] if whole else numbers, mode)
+    return MeasuredModes(numbers, f, std, where)
+
+
+def _check_mode_numbers(f: _Float, numbers: NDArray[np.int_], mode: Sequence[int] | None) -> None:
+    """Of one spindle."""
+    whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
+    if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
+        raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
+    order = np.argsort(numbers)
+    if np.any(np.diff(f[order]) <= 0):
+        raise ValueError(
+            f"frequency={f[order].tolist()} Hz does not rise with the number of the mode, {numbers[order]}"
+        )
+
+
+MAX_LOG_FACTOR = math.log(1e6)
 """Factors are sought between 1e-6 and 1e6."""
-LONGEST_STEP = 2.0
+MAX_LOG_STEP = 2.0
 """Largest change of the logarithm of a factor in one step."""
-CONVERGED = 1e-12
+FACTOR_STEP_TOLERANCE = 1e-12
 """A step that would change no frequency by more than this part of it ends the search."""
-BLURRED = 1e-8
+ROUNDING_STEP_LIMIT = 1e-8
 """Below this, a step that brings nothing has met rounding, and the search has ended as well."""
-ROUNDING = 1e-10
+FREQUENCY_ROUNDING = 1e-10
 """Frequencies may be off by this part of them: a step that promises no more than that can hide has met it too."""
-UNLIKELY = 1e-3
+MIN_CHI_SQUARE_PROBABILITY = 1e-3
 """A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
 
 
@@ -56,28 +201,28 @@ class Iterate(NamedTuple):
         return float(self.residual @ self.residual)
 
 
-class Problem(NamedTuple):
+class StiffnessProblem(NamedTuple):
     """Which factors are sought from which frequencies."""
 
     spindles: tuple[Spindle, ...]
     """Spindles as given; parts of one group have the same factor in all of them."""
     names: tuple[str, ...]
     """Groups, each with a factor."""
-    measured: Measured
+    measured: MeasuredModes
     """The frequencies."""
     weight: _Float | None = None
     """What scaled residuals are multiplied by (n, n), where their errors depend on each other."""
 
-    def with_drawing(self, state: Iterate, tolerance: float) -> Problem:
+    def with_drawing(self, state: Iterate, tolerance: float) -> StiffnessProblem:
         """The same with all diameters of the drawing off by this standard error (-), as they act on this state."""
         measured = self.measured
-        effect = frequency_effects(state.spindles, measured.mode, measured.shaft, diameters(state.spindles))
+        effect = frequency_effects(state.spindles, measured.mode, measured.shaft, diameter_keys(state.spindles))
         scaled = tolerance * effect * (measured.frequency / measured.scale)[:, np.newaxis]
         covariance = np.eye(measured.mode.size) + scaled @ scaled.T
         return self._replace(weight=np.linalg.inv(np.linalg.cholesky(covariance)))
 
     @property
-    def spare(self) -> int:
+    def degrees_of_freedom(self) -> int:
         """Modes less factors."""
         return self.measured.frequency.size - len(self.names)
 
@@ -103,12 +248,12 @@ class Problem(NamedTuple):
         """Whether the residuals are of the size that is to be expected."""
         measured = self.measured
         if measured.std is None:
-            return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < UNLIKELY
-        return float(scipy.special.chdtrc(max(self.spare, 1), state.cost)) > UNLIKELY
+            return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < MIN_CHI_SQUARE_PROBABILITY
+        return float(scipy.special.chdtrc(max(self.degrees_of_freedom, 1), state.cost)) > MIN_CHI_SQUARE_PROBABILITY
 
 
 def minimize(
-    problem: Problem, start: _Float, fixed: int | Sequence[int] = (), converged: float = CONVERGED
+    problem: StiffnessProblem, start: _Float, fixed: int | Sequence[int] = (), converged: float = FACTOR_STEP_TOLERANCE
 ) -> tuple[Iterate, bool]:
     """The last state on the way down from a start by Levenberg and Marquardt, and whether it is a minimum.
 
@@ -120,15 +265,17 @@ def minimize(
         return state, True
     damping = 1.0
     for _ in range(100):
-        change = float(np.max(np.abs(state.share @ _step(state, free, 0.0)))) / 2
+        change = float(np.max(np.abs(state.share @ _damped_step(state, free, 0.0)))) / 2
         if change <= converged:
             return state, True
-        if np.any(np.abs(state.log_factor[free]) == LIMIT):
+        if np.any(np.abs(state.log_factor[free]) == MAX_LOG_FACTOR):
             break
-        trial = problem.evaluate(np.clip(state.log_factor + _step(state, free, damping), -LIMIT, LIMIT))
+        trial = problem.evaluate(
+            np.clip(state.log_factor + _damped_step(state, free, damping), -MAX_LOG_FACTOR, MAX_LOG_FACTOR)
+        )
         if trial.cost < state.cost:
             state, damping = trial, max(damping / 10, 1e-15)
-        elif change <= max(BLURRED, converged) or _hidden(problem, state, free):
+        elif change <= max(ROUNDING_STEP_LIMIT, converged) or _is_hidden_by_rounding(problem, state, free):
             return state, True
         elif damping > 1e6:
             break
@@ -137,14 +284,14 @@ def minimize(
     return state, False
 
 
-def _hidden(problem: Problem, state: Iterate, free: NDArray[np.int_]) -> bool:
+def _is_hidden_by_rounding(problem: StiffnessProblem, state: Iterate, free: NDArray[np.int_]) -> bool:
     """Whether the sum of squares falls, by the step of Gauss and Newton, by no more than rounding changes it."""
-    left = state.residual + state.slope @ _step(state, free, 0.0)
-    blur = ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
+    left = state.residual + state.slope @ _damped_step(state, free, 0.0)
+    blur = FREQUENCY_ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
     return state.cost - float(left @ left) <= 2 * math.sqrt(state.cost) * blur + blur**2
 
 
-def _step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
+def _damped_step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
     """Step of Levenberg and Marquardt; with damping 0 that of Gauss and Newton."""
     slope = state.slope[:, free]
     weight = math.sqrt(damping) * np.linalg.norm(slope, 2)
@@ -152,4 +299,4 @@ def _step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
     step = np.zeros(state.log_factor.size)
     step[free] = np.linalg.lstsq(matrix, -np.append(state.residual, np.zeros(free.size)), rcond=None)[0]
     longest = float(np.max(np.abs(step)))
-    return np.asarray(step * (LONGEST_STEP / longest if damping > 0 and longest > LONGEST_STEP else 1.0))
+    return np.asarray(step * (MAX_LOG_STEP / longest if damping > 0 and longest > MAX_LOG_STEP else 1.0))

@@ -10,17 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.matrix.assemble import assemble
-from dsm.matrix.damped_blocks import damped_blocks
-from dsm.matrix.dynamic_stiffness import full_matrices
-from dsm.matrix.frequency_axis import frequency_axis
-from dsm.spindle.attachments import Bearing
+from dsm.matrix.condense import damped_blocks
+from dsm.matrix.dynamic_stiffness import check_frequencies, full_matrices
+from dsm.spindle.attachments import Bearing, damping_of_bearings, supports
 from dsm.spindle.spindle import Spindle, require_support
-from dsm.spindle.supports import given_damping, supports
 
 _Float = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
 
-CHUNK = 50
+RECEPTANCE_MAP_CHUNK = 50
 """Frequencies whose full matrices are in memory at a time."""
 
 
@@ -51,7 +49,7 @@ def receptance_map(
     >>> (abs(softer).argmax(axis=1) + 1).tolist()  # Hz: where the peak at the tip goes as the bearings wear
     [1124, 1019, 896]
     """
-    f, factors = frequency_axis(frequency), _checked(factor)
+    f, factors = check_frequencies(frequency), _check_factors(factor)
     if np.any(f == 0):
         require_support(spindle)
     chosen = calibrated_bearings(spindle, group)
@@ -63,7 +61,7 @@ def receptance_map(
     w = np.asarray(2 * np.pi * f, dtype=np.complex128)
     places = [position, *(bearing.position for bearing in bearings)]
     compliance = _compliance(replace(spindle, bearings=[*bearings, *kept]), w, places, loss_factor)
-    values, products = _across_springs(bearings, compliance, w, loss_factor)
+    values, products = _spring_terms(bearings, compliance, w, loss_factor)
     change = (1 + 1j * loss_factor) * (factors[:, np.newaxis] / middle - 1)
     receptances = np.tile(compliance[:, 0, 0], (factors.size, 1))
     for value, product in zip(values.T, products.T, strict=True):
@@ -71,7 +69,7 @@ def receptance_map(
     return receptances
 
 
-def _checked(factor: ArrayLike) -> _Float:
+def _check_factors(factor: ArrayLike) -> _Float:
     factors = np.atleast_1d(np.asarray(factor, dtype=np.float64))
     if factors.ndim != 1 or factors.size == 0:
         raise ValueError(f"factor has shape {factors.shape}; a 1-D array of at least one factor is needed")
@@ -82,28 +80,28 @@ def _checked(factor: ArrayLike) -> _Float:
 
 
 def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_factor: float) -> _Complex:
-    """Deflections under forces, both at `places` (m), shape (n, n_places, n_places)."""
-    damping = given_damping(spindle.bearings, loss_factor)
+    """Deflections under forces, both at `order_taps` (m), shape (n, n_places, n_places)."""
+    damping = damping_of_bearings(spindle.bearings, loss_factor)
     model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
     dofs = [2 * model.node(place) for place in places]
     forces = np.zeros((model.held.size, len(dofs)), dtype=np.complex128)
     forces[dofs, np.arange(len(dofs))] = ~model.held.ravel()[dofs]
     compliance = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
-    for start in range(0, w.size, CHUNK):
-        chunk = slice(start, start + CHUNK)
+    for start in range(0, w.size, RECEPTANCE_MAP_CHUNK):
+        chunk = slice(start, start + RECEPTANCE_MAP_CHUNK)
         matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], damping))
         compliance[chunk] = model.solve(matrices, forces)[:, dofs]
     return compliance
 
 
-def _across_springs(
+def _spring_terms(
     bearings: Sequence[Bearing], compliance: _Complex, w: _Complex, loss_factor: float
 ) -> tuple[_Complex, _Complex]:
     """s and p of the formula above, shape (n, n_bearings) each."""
-    held = supports(bearings, w, given_damping(bearings, loss_factor))
+    held = supports(bearings, w, damping_of_bearings(bearings, loss_factor))
     root = np.sqrt([bearing.stiffness for bearing in bearings])
     matrix = np.outer(root, root) * held.across(compliance[:, 1:, 1:])
     values, vectors = np.linalg.eig(matrix)
-    elongation = (root * held.share * compliance[:, 1:, 0])[..., np.newaxis]
+    elongation = (root * held.motion_share * compliance[:, 1:, 0])[..., np.newaxis]
     products = (vectors.swapaxes(1, 2) @ elongation) * np.linalg.solve(vectors, elongation)
     return values, products[..., 0]

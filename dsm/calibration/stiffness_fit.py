@@ -1,20 +1,24 @@
-"""What fitting several stiffnesses to several modes found."""
+"""Result of a stiffness fit, and the prediction of further modes from it."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.calibration.fit_remark import FitRemark
-from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.least_squares import diameter_columns, diameter_effects, diameter_keys, frequency_effects
+from dsm.calibration.report_text import FitRemark, format_with_error
 from dsm.calibration.stiffness_groups import group_stiffness, is_tilting, scale_groups
+from dsm.modes.natural_frequencies import modes_at
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
 
-OPEN = ("group-not-felt", "stiffness-ambiguous")
+OPEN_REMARK_CODES = ("group-not-felt", "stiffness-ambiguous")
 """Codes of the remarks that leave a stiffness open."""
 
 
@@ -64,18 +68,18 @@ class StiffnessFit:
         """The fitted spindle, the first of several."""
         return self.spindles[0]
 
-    def applied_to(self, spindle: Spindle) -> Spindle:
+    def apply_to(self, spindle: Spindle) -> Spindle:
         """A spindle with the stiffnesses that the fit started from, its groups scaled by the factors found."""
         return scale_groups(spindle, dict(zip(self.groups, self.factor.tolist(), strict=True)))
 
     @property
     def open_groups(self) -> frozenset[str]:
         """Groups whose stiffness the measured modes leave open, as the remarks say."""
-        about = [remark.about for remark in self.remarks if remark.code in OPEN]
+        about = [remark.about for remark in self.remarks if remark.code in OPEN_REMARK_CODES]
         return frozenset(name for entry in about for name in ([entry] if entry in self.groups else self.groups))
 
     @property
-    def misfits(self) -> bool:
+    def has_misfit(self) -> bool:
         """Whether the frequencies do not fit one another, far beyond their errors."""
         return any(remark.code == "frequencies-misfit" for remark in self.remarks)
 
@@ -131,7 +135,9 @@ class StiffnessFit:
 
     def __str__(self) -> str:
         """The report."""
-        return "\n".join([*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines(), *self._notes()])
+        return "\n".join(
+            [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines(), *self._remark_lines()]
+        )
 
     def _stiffness_lines(self) -> list[str]:
         width = max(map(len, self.groups))
@@ -140,7 +146,7 @@ class StiffnessFit:
             scale, unit = (1.0, "N m/rad") if is_tilting(self.spindles, group) else (1e6, "N/um")
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
             start = f"start {stiffness / factor / scale:.5g} {unit}"
-            estimate = f"{plus_minus(stiffness, std, scale, unit, percent=True)} each on average"
+            estimate = f"{format_with_error(stiffness, std, scale, unit, percent=True)} each on average"
             text = f"open, {start}" if group in self.open_groups else f"{estimate}, {start}: factor {factor:.5f}"
             lines.append(f"stiffness {group:{width}}  {text}")
         return lines
@@ -164,12 +170,12 @@ class StiffnessFit:
                 f"{group} {100 * share:.1f} %"
                 for group, share in zip(self.groups, self.energy_share[index], strict=True)
             )
-            measured = plus_minus(float(self.frequency[index]), std, unit="Hz", percent=True)
+            measured = format_with_error(float(self.frequency[index]), std, unit="Hz", percent=True)
             place = f"{self.shaft[index] + 1:7d}, {number:4d}" if several else f"{number:4d}"
             lines.append(f"{place}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
         return lines
 
-    def _notes(self) -> list[str]:
+    def _remark_lines(self) -> list[str]:
         chi = self.reduced_chi_square
         lines = (
             [] if chi is None else [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
@@ -185,3 +191,89 @@ class StiffnessFitError(ArithmeticError):
         super().__init__(message)
         self.best = best
         """The best estimate; not to be trusted."""
+
+
+MAX_LOG_FACTOR_CHANGE = math.log(30.0)
+"""A stiffness that is known less well than to this factor (its logarithm) is moved by no more ..."""
+MIN_LOG_FACTOR_CHANGE = 1e-9
+"""... and by no less than this."""
+
+
+class PredictedMode(NamedTuple):
+    """One mode of a spindle with the fitted bearings and joints."""
+
+    frequency: float
+    """Natural frequency (Hz)."""
+    frequency_std: float | None
+    """Standard error of the frequency from those of the stiffnesses (Hz); None where these are not known."""
+    stiffness: float
+    """Modal stiffness where it is looked at (N/m)."""
+    stiffness_std: float | None
+    """Standard error of the modal stiffness, likewise (N/m)."""
+
+
+def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: float = 0.0) -> PredictedMode:
+    """A mode (1 is the lowest) of a spindle with the groups of the fit, at `position` from its tool tip (m).
+
+    spindle: with the stiffnesses that the fit started from, such as the same one with a third tool. The errors are half
+    the change from one end of each principal axis of the factors' covariance to the other, added in squares, and what
+    the tolerance of the drawing adds: diameters that it shares with the fitted spindles act on both. Raises ValueError
+    as modes_at.
+
+    >>> bearings = [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)]
+    >>> tapped = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], bearings)
+    >>> fit = fit_stiffness(tapped, [0.95 * natural_frequencies(tapped, 1)[0]], frequency_std=[2.0])
+    >>> other = Spindle([Segment(0.1, 0.04), Segment(0.4, 0.06)], bearings)  # with a tool that was never tapped
+    >>> mode = predict_mode(fit, other)
+    >>> f"{mode.frequency:.0f} +- {mode.frequency_std:.0f} Hz, K = {mode.stiffness / 1e6:.1f} N/um"
+    '921 +- 2 Hz, K = 33.2 N/um'
+    """
+
+    def of(shaft: Spindle) -> _Float:
+        frequency, stiffness = modes_at(shaft, mode, position)
+        return np.array([frequency[-1], stiffness[-1]])
+
+    def at(log_factor: _Float) -> _Float:
+        return of(scale_groups(spindle, dict(zip(fit.groups, np.exp(log_factor).tolist(), strict=True))))
+
+    best = np.log(fit.factor)
+    values = at(best)
+    if fit.log_covariance is None:
+        return PredictedMode(float(values[0]), None, float(values[1]), None)
+    variance, axes = np.linalg.eigh(fit.log_covariance)
+    sizes = np.clip(np.sqrt(np.maximum(variance, 0.0)), MIN_LOG_FACTOR_CHANGE, MAX_LOG_FACTOR_CHANGE)
+    changes = np.array([(at(best + step) - at(best - step)) / 2 for step in (axes * sizes).T])
+    squares = np.sum(np.square(changes), axis=0)
+    if fit.tolerance > 0 and fit.frequency_std is not None:
+        slope = (axes / sizes) @ changes / values
+        squares = squares + values**2 * _diameter_variance(
+            fit, _joint_diameter_effects(fit, fit.apply_to(spindle), of), slope
+        )
+    errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
+    return PredictedMode(float(values[0]), errors[0], float(values[1]), errors[1])
+
+
+def _joint_diameter_effects(
+    fit: StiffnessFit, spindle: Spindle, values: Callable[[Spindle], _Float]
+) -> tuple[_Float, _Float]:
+    """Effects of all diameters on the modes of the fit (n, d), and on two values of another spindle (2, d)."""
+    names = diameter_keys([*fit.spindles, spindle])
+    order = diameter_columns(names)
+    own = np.zeros((2, len(order)))
+    own[:, [order[name] for name in names[-1]]] = diameter_effects(spindle, values, names[-1])
+    fitted = frequency_effects(fit.spindles, fit.mode, fit.shaft, names)
+    return fitted, own
+
+
+def _diameter_variance(fit: StiffnessFit, effect: tuple[_Float, _Float], slope: _Float) -> _Float:
+    """What the drawing adds to the relative variances (2,), whose part by the factors holds its effect on the fit.
+
+    slope: d ln value / d ln factor, shape (g, 2).
+    """
+    fitted, own = effect
+    relative = np.asarray(fit.frequency_std) / fit.frequency
+    covariance = np.diag(relative**2) + fit.tolerance**2 * fitted @ fitted.T
+    factors = np.asarray(fit.log_covariance)
+    known = np.where(np.diag(factors) < MAX_LOG_FACTOR_CHANGE**2, 1.0, 0.0)[:, np.newaxis]
+    by_fit = slope.T @ (known * (factors @ (fit.energy_share / 2).T)) @ np.linalg.solve(covariance, fitted)
+    return np.asarray(fit.tolerance**2 * np.sum(own**2 - 2 * by_fit * own, axis=1))

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsm.modes.energy_shares import spring_energy
 from dsm.modes.modes import Modes
-from dsm.modes.spring_energy import spring_energy
 from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
-_Part = Bearing | Joint
+_StiffPart = Bearing | Joint
 
 
 def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
@@ -51,7 +51,9 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
     """The spindle with bearing stiffnesses, and both stiffnesses of joints, times a factor; see calibrated_parts."""
     factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
-    return _with_parts(spindle, [_times(part, one, one) for part, one in zip(_parts(spindle), factors, strict=True)])
+    return _with_parts(
+        spindle, [_scale_part(part, one, one) for part, one in zip(_parts(spindle), factors, strict=True)]
+    )
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
@@ -65,7 +67,7 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 
     Raises ValueError for a group that is not there or named twice, for none, and for one with a rigid bearing.
     """
-    known_names = tuple(dict.fromkeys(name for spindle in spindles for name in _names(spindle) if name))
+    known_names = tuple(dict.fromkeys(name for spindle in spindles for name in _group_names(spindle) if name))
     names = known_names if groups is None else tuple(groups)
     listed = ", ".join(map(repr, known_names)) or "none"
     if not names:
@@ -85,9 +87,9 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
     """The spindle with bearing stiffnesses, and both stiffnesses of joints, times the factor of their group."""
 
-    def scaled(part: _Part) -> _Part:
-        tilting = factors.get(_tilting(part), 1.0) if isinstance(part, Joint) else 1.0
-        return _times(part, factors.get(part.group, 1.0), tilting)
+    def scaled(part: _StiffPart) -> _StiffPart:
+        tilting = factors.get(_tilting_group(part), 1.0) if isinstance(part, Joint) else 1.0
+        return _scale_part(part, factors.get(part.group, 1.0), tilting)
 
     return _with_parts(spindle, [scaled(part) for part in _parts(spindle)])
 
@@ -117,19 +119,19 @@ def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
     energy = spring_energy(modes)
     shares = np.zeros((modes.frequency.size, len(groups)))
     springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
-    names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting, modes.spindle.joints)]
+    names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting_group, modes.spindle.joints)]
     for name, of_spring in zip(names, springs, strict=True):
         if name in groups:
             shares[:, groups.index(name)] += of_spring
     return np.asarray(shares / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
 
 
-def _tilting(joint: Joint) -> str:
+def _tilting_group(joint: Joint) -> str:
     """Group of its stiffness against tilting."""
     return joint.rotational_group or joint.group
 
 
-def _names(spindle: Spindle) -> list[str]:
+def _group_names(spindle: Spindle) -> list[str]:
     joints = [name for joint in spindle.joints for name in (joint.group, joint.rotational_group)]
     return [*(bearing.group for bearing in spindle.bearings), *joints]
 
@@ -138,7 +140,7 @@ def _parts(spindle: Spindle) -> tuple[Bearing | Joint, ...]:
     return (*spindle.bearings, *spindle.joints)
 
 
-def _times(part: _Part, factor: float, tilting: float) -> _Part:
+def _scale_part(part: _StiffPart, factor: float, tilting: float) -> _StiffPart:
     if factor == tilting == 1.0:
         return part
     if isinstance(part, Bearing):

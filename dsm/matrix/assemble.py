@@ -10,21 +10,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.elements.beam_elements import link_elements, stiffness_elements
-from dsm.elements.place_nodes import place_nodes
-from dsm.elements.whirl_terms import whirl_terms
+from dsm.elements.beam_elements import link_elements, place_nodes, stiffness_elements
+from dsm.elements.element_series import combine_rotary_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.material import Material
-from dsm.spindle.places import nearest
-from dsm.spindle.sections import Sections, sections_of
-from dsm.spindle.segment import Segment
+from dsm.spindle.sections import Sections, sections_of_segments
+from dsm.spindle.segment import Material, Segment, nearest_index
 from dsm.spindle.spindle import Spindle, Theory
 
 _Float = NDArray[np.float64]
-SLOW = 0.25
+SLOW_SPIN_SHARE = 0.25
 """Speeds below this part of the highest w divide the shaft alike: gyroscopic moments are small beside its inertia."""
-Held = tuple[float, int]
+HeldDof = tuple[float, int]
 """A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
 
 
@@ -32,12 +29,12 @@ def assemble(
     spindle: Spindle,
     top_frequency: float,
     places: Sequence[float] = (),
-    held: Sequence[Held] = (),
+    held: Sequence[HeldDof] = (),
     left_out: Sequence[int] = (),
     spin: float | None = None,
     links: bool = False,
 ) -> DynamicStiffness:
-    """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
+    """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `order_taps` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
     held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: places in (*bearings, *joints) of parts
@@ -55,16 +52,16 @@ def _assemble(
     spindle: Spindle,
     top_frequency: float,
     places: tuple[float, ...],
-    held: tuple[Held, ...],
+    held: tuple[HeldDof, ...],
     left_out: tuple[int, ...],
     spin: float | None,
     links: bool,
 ) -> DynamicStiffness:
     if spin is not None and spin < 0:
-        return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
-    wanted = (*_places_of_parts(spindle), *places, *(z for z, _ in held))
-    fastest = None if spin is None else fastest_spin(spin, top_frequency)
-    bare = _bare(
+        return _reverse_spin(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
+    wanted = (*_part_positions(spindle), *places, *(z for z, _ in held))
+    fastest = None if spin is None else shared_spin_limit(spin, top_frequency)
+    bare = _assemble_shaft(
         tuple(spindle.segments),
         spindle.material,
         spindle.theory,
@@ -75,28 +72,28 @@ def _assemble(
         links,
     )
     diagonal, coupling = (
-        part.copy() if spin is None else whirl_terms(part, spin) for part in (bare.diagonal, bare.coupling)
+        part.copy() if spin is None else combine_rotary_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
     model = replace(
         bare, diagonal=diagonal, coupling=coupling, held=bare.held.copy(), scale=bare.scale.copy(), spin=spin
     )
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
-    model.scale[:] = _scale(model)
+    model.scale[:] = _dof_scale(model)
     for z, dof in (*rigid, *held):
-        _hold(model, model.node(z), dof)
+        _hold_dof(model, model.node(z), dof)
     for index in left_out:
         if index >= len(spindle.bearings):  # a link without forces joins nothing
             link = model.node(spindle.joints[index - len(spindle.bearings)].position) + 1
-            _hold(model, link, 0)
-            _hold(model, link, 1)
+            _hold_dof(model, link, 0)
+            _hold_dof(model, link, 1)
     for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
 
 
 @lru_cache(maxsize=32)
-def _bare(
+def _assemble_shaft(
     segments: tuple[Segment, ...],
     material: Material,
     theory: Theory,
@@ -110,34 +107,34 @@ def _bare(
 
     fastest: for speeds up to that (rad/s), terms as for whirl_terms; None: for a shaft at rest.
     """
-    shaft = sections_of(segments, material)
+    shaft = sections_of_segments(segments, material)
     position, segment, short = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
-    series = _elements(theory, shaft, position, segment, short, fastest is not None)
-    position, series, short = _with_joints(joints, position, series, short)
-    return _chain(position, series, short, top_frequency, _least(shaft))
+    series = _element_series(theory, shaft, position, segment, short, fastest is not None)
+    position, series, short = _insert_joints(joints, position, series, short)
+    return _join_elements(position, series, short, top_frequency, _shaft_stiffness(shaft))
 
 
-def fastest_spin(spin: float, top_frequency: float) -> float:
+def shared_spin_limit(spin: float, top_frequency: float) -> float:
     """A speed (rad/s) not below this one that others share, and with it nodes and series."""
-    fastest = SLOW * 2 * math.pi * top_frequency
+    fastest = SLOW_SPIN_SHARE * 2 * math.pi * top_frequency
     while fastest < spin:
         fastest *= 2
     return fastest
 
 
-def _reversed(model: DynamicStiffness) -> DynamicStiffness:
+def _reverse_spin(model: DynamicStiffness) -> DynamicStiffness:
     """The same shaft spinning the other way round: speed and frequency change their signs together."""
     sign = (-1.0) ** np.arange(model.diagonal.shape[2])
     spin = None if model.spin is None else -model.spin
     return replace(model, diagonal=sign * model.diagonal, coupling=sign * model.coupling, spin=spin)
 
 
-def _places_of_parts(spindle: Spindle) -> list[float]:
+def _part_positions(spindle: Spindle) -> list[float]:
     parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
     return [part.position for part in parts]
 
 
-def _elements(
+def _element_series(
     theory: Theory,
     shaft: Sections,
     position: _Float,
@@ -154,12 +151,12 @@ def _elements(
     return series
 
 
-def _with_joints(
+def _insert_joints(
     joints: Sequence[Joint], position: _Float, series: _Float, short: NDArray[np.bool_]
 ) -> tuple[_Float, _Float, NDArray[np.bool_]]:
     """Nodes and elements with a link of no length at each joint."""
     for joint in joints:
-        node = nearest(position, joint.position)
+        node = nearest_index(position, joint.position)
         link = np.zeros((10, series.shape[2]))
         link[[3, 5], 0] = -1 / joint.stiffness, -1 / joint.rotational_stiffness
         link[[6, 9], 0] = -1.0
@@ -169,7 +166,7 @@ def _with_joints(
     return position, series, short
 
 
-def _chain(
+def _join_elements(
     position: _Float,
     series: _Float,
     short: NDArray[np.bool_],
@@ -193,7 +190,7 @@ def _chain(
     return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
 
 
-def _least(shaft: Sections) -> tuple[float, float]:
+def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
     """Stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
     middle = np.arange(shaft.ends.size - 1)
     rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
@@ -201,7 +198,7 @@ def _least(shaft: Sections) -> tuple[float, float]:
     return rigidity / length**3, rigidity / length
 
 
-def _scale(model: DynamicStiffness) -> _Float:
+def _dof_scale(model: DynamicStiffness) -> _Float:
     """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
     sizes = np.maximum(model.diagonal[::2, :, 0], model.scale[:2, np.newaxis] ** -2)
     link = np.flatnonzero(model.is_link)
@@ -219,9 +216,9 @@ def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
             model.diagonal[2, node, 1] += body.polar_inertia * model.spin
 
 
-def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[Held]:
+def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[HeldDof]:
     """Add the bearings; what they hold rigidly is returned."""
-    rigid: list[Held] = []
+    rigid: list[HeldDof] = []
     nodes = (model.dofs(spindle.bearings) // 2).tolist()
     for index, (bearing, node) in enumerate(zip(spindle.bearings, nodes, strict=True)):
         model.diagonal[2, node, 0] += bearing.rotational_stiffness
@@ -234,7 +231,7 @@ def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[i
     return rigid
 
 
-def _hold(model: DynamicStiffness, node: int, dof: int) -> None:
+def _hold_dof(model: DynamicStiffness, node: int, dof: int) -> None:
     """Replace row and column of a dof by those of the unit matrix, in place."""
     model.held[node, dof] = True
     model.diagonal[[2 * dof, 1], node] = 0.0

@@ -1,16 +1,21 @@
-"""Dynamic condensation: block elimination along the shaft, the stiffness at one node."""
+"""Condense a shaft to the stiffness at one node, with or without damping."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.spindle.attachments import Damping, damping_of_bearings, supports
+from dsm.spindle.spindle import Spindle
+
 _Complex = NDArray[np.complex128]
 
 
-class Condensed(NamedTuple):
+class CondensedStiffness(NamedTuple):
     """What a whole shaft opposes to deflection u and slope t of one node; (n,) each, n frequencies."""
 
     uu: _Complex
@@ -25,7 +30,7 @@ class Condensed(NamedTuple):
     """Deflection of the node `start` over t (m)."""
 
 
-class _Passed(NamedTuple):
+class _Elimination(NamedTuple):
     """What the nodes before one do to it: stiffness to be added, and how the node before it follows its motion."""
 
     lost: tuple[_Complex, _Complex, _Complex]
@@ -34,9 +39,9 @@ class _Passed(NamedTuple):
     """Motion of the node before over that of this one, with changed sign: u/u, u/t, t/u, t/t."""
 
 
-def condense(
+def condense_to_node(
     diagonal: _Complex, coupling: _Complex, is_link: NDArray[np.bool_], node: int, start: int | None = None
-) -> Condensed:
+) -> CondensedStiffness:
     """Eliminate all nodes but one, from both ends, all frequencies at once.
 
     diagonal, coupling: blocks of K as in DynamicStiffness.blocks. is_link: which nodes are those of force and moment;
@@ -50,7 +55,9 @@ def condense(
     flipped = coupling[: node - diagonal.shape[0] : -1][:, [0, 2, 1, 3]]
     right, _, _ = _eliminate(diagonal[:node:-1], flipped, is_link[:node:-1], flipped.shape[0])
     uu, ut, tt = diagonal[node]
-    return Condensed(uu - left[0] - right[0], ut - left[1] - right[1], tt - left[2] - right[2], share_u, share_t)
+    return CondensedStiffness(
+        uu - left[0] - right[0], ut - left[1] - right[1], tt - left[2] - right[2], share_u, share_t
+    )
 
 
 def _eliminate(
@@ -72,17 +79,17 @@ def _eliminate(
     return lost, share_u, share_t
 
 
-def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Passed:
+def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Elimination:
     a, b, d = pivot
     c_uu, c_ut, c_tu, c_tt = coupling
     determinant = a * d - b * b
     u_u, u_t = (d * c_uu - b * c_tu) / determinant, (d * c_ut - b * c_tt) / determinant
     t_u, t_t = (a * c_tu - b * c_uu) / determinant, (a * c_tt - b * c_ut) / determinant
     lost = c_uu * u_u + c_tu * t_u, c_uu * u_t + c_tu * t_t, c_ut * u_t + c_tt * t_t
-    return _Passed(lost, (u_u, u_t, t_u, t_t))
+    return _Elimination(lost, (u_u, u_t, t_u, t_t))
 
 
-def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, far: _Complex) -> _Passed:
+def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, far: _Complex) -> _Elimination:
     """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a tip that nothing holds."""
     shape = near[0].shape
     a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
@@ -99,4 +106,60 @@ def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, f
     solved = np.linalg.solve(both.transpose(2, 0, 1), right.transpose(2, 0, 1)).transpose(1, 2, 0)
     (u_u, u_t), (t_u, t_t), (q_u, q_t), (m_u, m_t) = solved
     lost = far[0] * q_u + far[2] * m_u, far[0] * q_t + far[2] * m_t, far[1] * q_t + far[3] * m_t
-    return _Passed(lost, (u_u, u_t, t_u, t_t))
+    return _Elimination(lost, (u_u, u_t, t_u, t_t))
+
+
+def damped_blocks(
+    model: DynamicStiffness, spindle: Spindle, w: _Complex, damping: Damping, derivative: bool = False
+) -> tuple[_Complex, _Complex]:
+    """Blocks of K(w) as in DynamicStiffness.blocks, for a shaft that does not spin, at w (rad/s), shape (n,), complex.
+
+    Shaft, bearings, housing and joints have the complex stiffness k (1 + i eta). Beside it each bearing has its viscous
+    damper, i w c in parallel with its spring, before the housing; those of `damping` count, not those of the spindle.
+    With `derivative`, the blocks of dK/dw.
+    """
+    complexity = damping.complexity
+    w2 = np.asarray(w * w / complexity)
+    diagonal, coupling = model.blocks(w2, derivative)
+    factor = 2 * w if derivative else np.full(1, complexity)
+    diagonal, coupling = factor * diagonal, factor * coupling
+    damped = [i for i, b in enumerate(spindle.bearings) if damping.viscous[i] > 0 and math.isfinite(b.stiffness)]
+    if damped:
+        bearings, viscous = [spindle.bearings[i] for i in damped], damping.viscous[damped]
+        held = supports(bearings, w, Damping(viscous, damping.loss_factor))
+        node = [model.node(bearing.position) for bearing in bearings]
+        undamped = complexity * np.array([bearing.support_stiffness for bearing in bearings])
+        change = 1j * viscous * held.stiffness_slope if derivative else held.stiffness - undamped
+        diagonal[0, node] += change.T
+    return diagonal, coupling
+
+
+CONDENSATION_CHUNK = 1024
+"""Frequencies whose blocks are in memory at a time: 2 MB for 30 nodes, and faster than all at once."""
+
+
+def condense_damped(
+    model: DynamicStiffness,
+    spindle: Spindle,
+    frequency: NDArray[np.float64],
+    loss_factor: float,
+    node: int,
+    start: int | None = None,
+    extra: NDArray[np.complex128] | None = None,
+) -> CondensedStiffness:
+    """All of a shaft that does not spin condensed to one node, dynamically, exact at each frequency (Hz), shape (n,).
+
+    loss_factor: of all stiffness, see Damping; below 0 a ValueError. node and start: as for condense. extra: stiffness
+    uu, ut, tt that something else adds at the last node, shape (3, n).
+    """
+    damping = damping_of_bearings(spindle.bearings, loss_factor)
+    w = np.asarray(2 * np.pi * frequency, dtype=np.complex128)
+    condensed = np.empty((5, w.size), dtype=np.complex128)
+    for first in range(0, w.size, CONDENSATION_CHUNK):
+        chunk = slice(first, first + CONDENSATION_CHUNK)
+        diagonal, coupling = damped_blocks(model, spindle, w[chunk], damping)
+        if extra is not None:
+            diagonal[:, -1] += extra[:, chunk]
+        for row, value in zip(condensed, condense_to_node(diagonal, coupling, model.is_link, node, start), strict=True):
+            row[chunk] = value
+    return CondensedStiffness(*condensed)

@@ -1,21 +1,63 @@
-"""The dynamic stiffness matrix of a whole shaft."""
+"""Dynamic stiffness matrix of a whole shaft, its factor, and the count of modes below a frequency."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy
+from numpy.typing import ArrayLike, NDArray
 
-from dsm.spindle.places import nearest, nearest_each
+from dsm.spindle.segment import nearest_index, nearest_indices
+
+
+def check_frequencies(frequency: ArrayLike) -> NDArray[np.float64]:
+    """The frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
+    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    if f.ndim != 1:
+        raise ValueError(f"frequency has shape {f.shape}; a 1-D array (Hz) is needed")
+    bad = f[~(np.isfinite(f) & (f >= 0))]
+    if bad.size:
+        raise ValueError(f"frequency={bad[0]} Hz is not a finite number >= 0")
+    return f
+
+
+_Float = NDArray[np.float64]
+
+
+class SymmetricFactor(NamedTuple):
+    """L D L^T by the pivoting of Bunch and Kaufman, as LAPACK keeps it."""
+
+    values: _Float
+    """L, and D of 1 x 1 and 2 x 2 blocks."""
+    pivots: NDArray[np.int32]
+    """Rows exchanged; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues (Sylvester's law of inertia)."""
+        single = self.pivots > 0
+        pairs = (self.pivots.size - np.count_nonzero(single)) // 2
+        return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs)
+
+    def solve(self, right: _Float) -> _Float:
+        """Solutions of matrix times y = right, shape (n, m)."""
+        return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
+
+
+def symmetric_factor(matrix: _Float) -> SymmetricFactor:
+    """The factor of a matrix (n, n) in Fortran's order, its lower half alone looked at; the matrix is overwritten."""
+    values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
+    return SymmetricFactor(values, pivots)
+
 
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
-class _Placed(Protocol):
+class _PositionedPart(Protocol):
     """A part of a spindle."""
 
     @property
@@ -73,13 +115,13 @@ class DynamicStiffness:
 
     def node(self, position: float) -> int:
         """Index of the node nearest to a position (m)."""
-        return nearest(self.position, position)
+        return nearest_index(self.position, position)
 
-    def dofs(self, parts: Sequence[_Placed]) -> NDArray[np.int_]:
+    def dofs(self, parts: Sequence[_PositionedPart]) -> NDArray[np.int_]:
         """Indices of the deflections of the nodes of parts in a full matrix, shape (n,)."""
         if not parts:
             return np.zeros(0, dtype=int)
-        return 2 * nearest_each(self.position, [part.position for part in parts])
+        return 2 * nearest_indices(self.position, [part.position for part in parts])
 
     def blocks(self, eigenvalue: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
         """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n), in SI units, at eigenvalues (n,).
@@ -132,7 +174,7 @@ class DynamicStiffness:
         solution = np.linalg.solve(matrices * (scale * self.scale), scale * right)
         return np.asarray(scale * solution, dtype=matrices.dtype)
 
-    def solve_nearly(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
+    def solve_singular(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
         """The same for inverse iteration: of matrices that are singular, of those that are equal but for rounding.
 
         Peters and Wilkinson, SIAM Review 21 (1979): a pivot of zero may be replaced by one of rounding's size.
@@ -155,7 +197,7 @@ def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArr
     uu, ut, tt = diagonal
     size = 2 * uu.shape[0]
     matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
-    matrices[:, _entries(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
+    matrices[:, _block_indices(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
     return matrices.reshape(-1, size, size)
 
 
@@ -171,10 +213,28 @@ def _lower_half(n_nodes: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
 
 
 @lru_cache(maxsize=32)
-def _entries(n_nodes: int) -> NDArray[np.int_]:
+def _block_indices(n_nodes: int) -> NDArray[np.int_]:
     """Where the blocks stand in a flattened matrix: diagonal ones, those above and those below them."""
     u = 2 * np.arange(n_nodes)
     left, right = u[:-1], u[1:]
     above = [(left, right), (left, right + 1), (left + 1, right), (left + 1, right + 1)]
     pairs = [(u, u), (u, u + 1), (u + 1, u), (u + 1, u + 1), *above, *((column, row) for row, column in above)]
     return np.concatenate([2 * n_nodes * row + column for row, column in pairs])
+
+
+def count_modes_below(model: DynamicStiffness, eigenvalue: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Number of natural frequencies below w, shape (n,), for w^2 (w where it spins): the negative pivots of K(w).
+
+    None is missed and double ones count twice. Source: W. H. Wittrick and F. W. Williams, A general algorithm for
+    computing natural frequencies of elastic structures, Q. J. Mech. Appl. Math. 24 (1971), with J0 = 0. The pivoting
+    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance; those
+    of links are taken off. Where the shaft spins, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
+    falls through 0 once, for any phi.
+    """
+    counts = [count_modes_of_factor(model, symmetric_factor(matrix)) for matrix in model.scaled(eigenvalue)]
+    return np.array(counts, dtype=int)
+
+
+def count_modes_of_factor(model: DynamicStiffness, factor: SymmetricFactor) -> int:
+    """The same from the factor of K(w): its negative pivots but for the two of each link that carries force."""
+    return factor.negative - model.link_pivots

@@ -1,21 +1,61 @@
-"""Where the strain energy of a mode sits."""
+"""Strain energy of a mode in segments, bearings, housings and joints."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.elements import POINTS
-from dsm.modes.between_nodes import between_nodes
+from dsm.elements import GAUSS_POINTS
 from dsm.modes.find_modes import find_modes
-from dsm.modes.modes import Modes
-from dsm.modes.spring_energy import spring_energy
+from dsm.modes.modes import Modes, evaluate_between_nodes
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle, require_support
 
 _Float = NDArray[np.float64]
+
+
+class SpringEnergy(NamedTuple):
+    """Twice the strain energy of each spring in each mode; of a mode of unit modal mass all parts together have w^2."""
+
+    radial: _Float
+    """Radial springs of the bearings, shape (n_modes, n_bearings); 0 where rigid."""
+    tilting: _Float
+    """Their stiffness against tilting, shape (n_modes, n_bearings)."""
+    housings: _Float
+    """Housings behind them, shape (n_modes, n_bearings); 0 where rigid."""
+    shifts: _Float
+    """Radial springs of the joints, shape (n_modes, n_joints)."""
+    kinks: _Float
+    """Their stiffness against tilting, shape (n_modes, n_joints)."""
+
+
+def spring_energy(modes: Modes) -> SpringEnergy:
+    """The energy of all springs of modes with nodes at all parts, as find_modes gives them."""
+    spindle = modes.spindle
+    radial, tilting, housings = np.zeros((3, modes.frequency.size, len(spindle.bearings)))
+    for index, bearing in enumerate(spindle.bearings):
+        node = modes.node(bearing.position)
+        tilting[:, index] = bearing.rotational_stiffness * modes.slope[:, node] ** 2
+        if math.isfinite(bearing.support_stiffness):  # of springs in series the one of stiffness k takes force^2/k
+            squared_force = (bearing.support_stiffness * modes.deflection[:, node]) ** 2
+            radial[:, index] = squared_force / bearing.stiffness
+            housings[:, index] = squared_force / bearing.housing_stiffness
+    return SpringEnergy(radial, tilting, housings, *_joint_energy(modes))
+
+
+def _joint_energy(modes: Modes) -> tuple[_Float, _Float]:
+    """A joint stands between two nodes at one place."""
+    shifts, kinks = np.zeros((2, modes.frequency.size, len(modes.spindle.joints)))
+    for index, joint in enumerate(modes.spindle.joints):
+        node = modes.node(joint.position)
+        shift = modes.deflection[:, node + 1] - modes.deflection[:, node]
+        kink = modes.slope[:, node + 1] - modes.slope[:, node]
+        shifts[:, index], kinks[:, index] = joint.stiffness * shift**2, joint.rotational_stiffness * kink**2
+    return shifts, kinks
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,26 +97,26 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     # Twice the energy of a mode of unit modal mass is w^2.
     springs = spring_energy(modes)
     bearings, joints = springs.radial + springs.tilting, springs.shifts + springs.kinks
-    parts = _segments(spindle, modes), bearings, springs.housings, joints
+    parts = _segment_energy(spindle, modes), bearings, springs.housings, joints
     return EnergyShares(modes.frequency, *(energy / w2[:, np.newaxis] for energy in parts))
 
 
-def _segments(spindle: Spindle, modes: Modes) -> _Float:
+def _segment_energy(spindle: Spindle, modes: Modes) -> _Float:
     """Twice the integral of M^2/EI + Q^2/(kappa G A) along each segment, by Gauss points in each element."""
     shaft = sections(spindle)
     element = np.flatnonzero(np.diff(modes.position) > 0)
     start, length = modes.position[element], np.diff(modes.position)[element]
-    point, weight = np.polynomial.legendre.leggauss(POINTS)
+    point, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     places = (start[:, np.newaxis] + length[:, np.newaxis] * (point + 1) / 2).ravel()
-    left = np.repeat(element, POINTS)
+    left = np.repeat(element, GAUSS_POINTS)
     shape = modes.deflection, modes.slope
-    state = between_nodes(shaft, spindle.theory, modes.frequency, modes.position, shape, places, left)
+    state = evaluate_between_nodes(shaft, spindle.theory, modes.frequency, modes.position, shape, places, left)
     segment = shaft.segment_at(start + length / 2)
-    section = shaft.at(np.repeat(segment, POINTS), places)
+    section = shaft.at(np.repeat(segment, GAUSS_POINTS), places)
     density = state.moment**2 / section.rigidity
     if spindle.theory == "timoshenko":
         density += state.force**2 / section.shear
-    energy = density.reshape(modes.frequency.size, -1, POINTS) @ weight * length / 2
+    energy = density.reshape(modes.frequency.size, -1, GAUSS_POINTS) @ weight * length / 2
     total = np.zeros((len(spindle.segments), modes.frequency.size))
     np.add.at(total, segment, energy.T)
     return total.T

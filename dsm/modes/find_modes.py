@@ -10,36 +10,34 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.matrix.assemble import Held, assemble, fastest_spin
-from dsm.matrix.count_below import count_below
-from dsm.matrix.dynamic_stiffness import DynamicStiffness
-from dsm.modes.finite_element_modes import finite_element_modes, whirling_modes
+from dsm.matrix.assemble import HeldDof, assemble, shared_spin_limit
+from dsm.matrix.dynamic_stiffness import DynamicStiffness, count_modes_below
+from dsm.modes.eigensolvers import finite_element_modes, newton_step, quadratic_form, whirling_modes
 from dsm.modes.modes import Modes
-from dsm.modes.newton_step import newton_step, quadratic
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
 
-CERTAINTY = 2e-10
+MODE_INTERVAL_WIDTH = 2e-10
 """Relative half-width, in w^2 (w where it spins), of the interval in which each mode is proved to lie."""
-ROUNDING = 1024 * np.finfo(np.float64).eps
+MODE_ROUNDING = 1024 * np.finfo(np.float64).eps
 """The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
-BLURRED = 0.1
+MAX_MODE_INTERVAL = 0.1
 """An interval wider than this part of its w^2 proves nothing worth having."""
-DULL = 1e-5
+MAX_DIRECT_INTERVAL = 1e-5
 """Where stiffness gives one wider than this, links are taken: the error is some 1e-4 of the interval."""
 
-SETTLED = 1e-8
+MODE_STEP_TOLERANCE = 1e-8
 """Relative change by a step that leaves less than rounding to the next: each step at least squares the error."""
 
-MOST_MODES = 100
+MAX_MODES = 100
 """More are refused: the work grows with their third power."""
 
-MORE = 12
+EXTRA_WHIRL_MODES = 12
 """Modes at rest beyond those wanted of which modes of whirl are made to begin with."""
 
-SPOILT = (
+ROUNDING_MESSAGE = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
     "for bearings, masses or joints far too close to each other or to the end of a segment"
 )
@@ -49,10 +47,10 @@ def find_modes(
     spindle: Spindle,
     count: int,
     places: Sequence[float] = (),
-    held: Sequence[Held] = (),
+    held: Sequence[HeldDof] = (),
     spin: float | None = None,
 ) -> Modes:
-    """The `count` lowest modes, with nodes also at `places` (m) and the dofs `held` fixed (see assemble).
+    """The `count` lowest modes, with nodes also at `order_taps` (m) and the dofs `held` fixed (see assemble).
 
     Hermite elements give a start, inverse iteration with Newton steps on the exact matrix the modes, and two
     Wittrick-Williams counts the proof that mode n is the n-th; bisection on the count where the proof fails.
@@ -62,41 +60,43 @@ def find_modes(
 
     Raises ValueError for a count outside 1 to MOST_MODES, ArithmeticError where rounding spoils the count.
     """
-    if not 1 <= count <= MOST_MODES:
-        raise ValueError(f"{count} modes were asked for; 1 to {MOST_MODES} can be: beams say nothing of higher ones")
-    wanted = _Wanted(spindle, count, tuple(places), tuple(held), spin)
+    if not 1 <= count <= MAX_MODES:
+        raise ValueError(f"{count} modes were asked for; 1 to {MAX_MODES} can be: beams say nothing of higher ones")
+    wanted = _ModeRequest(spindle, count, tuple(places), tuple(held), spin)
     try:
-        return _solve(wanted, links=False)
-    except _SpoiltError:
-        return _solve(wanted, links=True)
+        return _solve_modes(wanted, links=False)
+    except _RoundingError:
+        return _solve_modes(wanted, links=True)
 
 
-class _SpoiltError(ArithmeticError):
+class _RoundingError(ArithmeticError):
     """Rounding leaves modes in doubt."""
 
     def __init__(self) -> None:
-        super().__init__(SPOILT)
+        super().__init__(ROUNDING_MESSAGE)
 
 
-class _Wanted(NamedTuple):
+class _ModeRequest(NamedTuple):
     """Arguments of find_modes."""
 
     spindle: Spindle
     number: int
     places: tuple[float, ...]
-    held: tuple[Held, ...]
+    held: tuple[HeldDof, ...]
     spin: float | None
 
 
-def _solve(wanted: _Wanted, links: bool) -> Modes:
+def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
     try:
-        model, eigenvalue, shape = _start(wanted, links)
-        width = CERTAINTY * eigenvalue + ROUNDING * quadratic(np.abs(model.dense(eigenvalue)), np.abs(shape))
-        eigenvalue, shape = _refine(model, eigenvalue, shape, width)
-        _require_sharp(wanted, eigenvalue, width, BLURRED if links else DULL)
-        eigenvalue, shape = _prove(model, eigenvalue, shape, width)
+        model, eigenvalue, shape = _start_values(wanted, links)
+        width = MODE_INTERVAL_WIDTH * eigenvalue + MODE_ROUNDING * quadratic_form(
+            np.abs(model.dense(eigenvalue)), np.abs(shape)
+        )
+        eigenvalue, shape = _refine_modes(model, eigenvalue, shape, width)
+        _require_small_rounding(wanted, eigenvalue, width, MAX_MODE_INTERVAL if links else MAX_DIRECT_INTERVAL)
+        eigenvalue, shape = _verify_modes(model, eigenvalue, shape, width)
     except np.linalg.LinAlgError as exc:
-        raise _SpoiltError from exc
+        raise _RoundingError from exc
     node = np.flatnonzero(~model.is_link)
     deflection, slope = shape[:, 2 * node], shape[:, 2 * node + 1]
     return Modes(
@@ -104,35 +104,39 @@ def _solve(wanted: _Wanted, links: bool) -> Modes:
     )
 
 
-def _start(wanted: _Wanted, links: bool) -> tuple[DynamicStiffness, _Float, _Float]:
+def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, _Float, _Float]:
     """A matrix exact up to the last mode, and the modes of its finite elements."""
     spindle, count, places, held, spin = wanted
     top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
         model = assemble(spindle, top, places, held, spin=spin, links=links)
-        eigenvalue, shape = _finite_elements(model, wanted, top, links)
+        eigenvalue, shape = _finite_element_start(model, wanted, top, links)
         highest = float(model.to_frequency(eigenvalue[-1:])[0])
         if highest <= model.top_frequency:
             return model, eigenvalue, shape
         top = 2.0 ** (math.ceil(4 * math.log2(highest)) / 4)  # the same for speeds near to each other
-    raise _SpoiltError
+    raise _RoundingError
 
 
-def _finite_elements(model: DynamicStiffness, wanted: _Wanted, top: float, links: bool) -> tuple[_Float, _Float]:
+def _finite_element_start(
+    model: DynamicStiffness, wanted: _ModeRequest, top: float, links: bool
+) -> tuple[_Float, _Float]:
     spindle, count, places, held, spin = wanted
     if spin is None:
         return finite_element_modes(model, count)
-    w2, shape = _at_rest(spindle, count + MORE, top, places, held, fastest_spin(abs(spin), top), links)
+    w2, shape = _modes_at_rest(
+        spindle, count + EXTRA_WHIRL_MODES, top, places, held, shared_spin_limit(abs(spin), top), links
+    )
     return whirling_modes(model, w2, shape, count)
 
 
 @lru_cache(maxsize=4)
-def _at_rest(
+def _modes_at_rest(
     spindle: Spindle,
     count: int,
     top: float,
     places: tuple[float, ...],
-    held: tuple[Held, ...],
+    held: tuple[HeldDof, ...],
     spin: float,
     links: bool,
 ) -> tuple[_Float, _Float]:
@@ -155,35 +159,35 @@ def _first_guess(spindle: Spindle, phase: float) -> float:
     return 1 / (2 * np.pi * float(np.sqrt(bending**4 + shear**2 + rotary**2)))
 
 
-def _refine(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _refine_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
     """Inverse iteration with a Newton step each, all modes at once; sorted."""
     for _ in range(8):
         previous = eigenvalue
-        eigenvalue, shape = _iterate(model, eigenvalue, shape, width)
-        if np.all(np.abs(eigenvalue - previous) <= SETTLED * eigenvalue):
+        eigenvalue, shape = _iterate_once(model, eigenvalue, shape, width)
+        if np.all(np.abs(eigenvalue - previous) <= MODE_STEP_TOLERANCE * eigenvalue):
             break
     order = np.argsort(eigenvalue)
     return eigenvalue[order], shape[order]
 
 
-def _iterate(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _iterate_once(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
     """One step from beside each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
     trial = eigenvalue + width
     stiffness, slope = model.dense(trial), model.dense(trial, derivative=True)
-    improved, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve_nearly)
+    improved, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve_singular)
     return improved, moved / np.sqrt(-energy)[:, np.newaxis]
 
 
-def _require_sharp(wanted: _Wanted, eigenvalue: _Float, width: _Float, widest: float) -> None:
+def _require_small_rounding(wanted: _ModeRequest, eigenvalue: _Float, width: _Float, widest: float) -> None:
     """Raise _SpoiltError where rounding leaves modes in doubt, or takes them for motions without bending."""
     moving = eigenvalue > width
     still = int(np.sum(~moving))
-    doubtful = still > 0 and still > _motions(wanted.spindle, wanted.held, float(np.min(width)))
+    doubtful = still > 0 and still > _count_rigid_motions(wanted.spindle, wanted.held, float(np.min(width)))
     if doubtful or np.any(width[moving] > widest * eigenvalue[moving]):
-        raise _SpoiltError
+        raise _RoundingError
 
 
-def _motions(spindle: Spindle, held: Sequence[Held], width: float) -> int:
+def _count_rigid_motions(spindle: Spindle, held: Sequence[HeldDof], width: float) -> int:
     """Number of motions without bending, 0 to 2, that no spring worth the name and no held dof hinders."""
     hindered = [[1.0, z] if dof == 0 else [0.0, 1.0] for z, dof in held]
     for bearing in spindle.bearings:
@@ -194,33 +198,33 @@ def _motions(spindle: Spindle, held: Sequence[Held], width: float) -> int:
     return 2 - int(np.linalg.matrix_rank(hindered) if hindered else 0)
 
 
-def _prove(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _verify_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
     """The same modes where each is the one it should be; the others found anew by counting."""
     eigenvalue = np.where(eigenvalue > width, eigenvalue, 0.0)
-    missed = ~_certified(model, eigenvalue, width)
+    missed = ~_are_certified(model, eigenvalue, width)
     if np.any(missed):
         width = width[missed]
-        proved = _bisect(model, np.flatnonzero(missed) + 1, width)
-        nearby, shape[missed] = _iterate(model, proved, shape[missed], width)
+        proved = _bisect_modes(model, np.flatnonzero(missed) + 1, width)
+        nearby, shape[missed] = _iterate_once(model, proved, shape[missed], width)
         eigenvalue[missed] = np.clip(nearby, np.maximum(proved - width, 0.0), proved + width)
     return eigenvalue, shape
 
 
-def _certified(model: DynamicStiffness, eigenvalue: _Float, width: _Float) -> NDArray[np.bool_]:
+def _are_certified(model: DynamicStiffness, eigenvalue: _Float, width: _Float) -> NDArray[np.bool_]:
     """For mode n: whether fewer than n modes lie below eigenvalue - width, and n or more below eigenvalue + width."""
-    below, up_to = count_below(model, np.concatenate([eigenvalue - width, eigenvalue + width])).reshape(2, -1)
+    below, up_to = count_modes_below(model, np.concatenate([eigenvalue - width, eigenvalue + width])).reshape(2, -1)
     order = np.arange(1, eigenvalue.size + 1)
     return np.asarray((below < order) & (order <= up_to))
 
 
-def _bisect(model: DynamicStiffness, order: NDArray[np.int_], width: _Float) -> _Float:
+def _bisect_modes(model: DynamicStiffness, order: NDArray[np.int_], width: _Float) -> _Float:
     """eigenvalue of the modes with these numbers (1 is the first), each within its width, by counting alone."""
     low = -width
     high = np.full(order.size, float(model.to_eigenvalue(np.array(model.top_frequency))))
-    if np.any(count_below(model, low) >= order) or np.any(count_below(model, high) < order):
-        raise _SpoiltError
+    if np.any(count_modes_below(model, low) >= order) or np.any(count_modes_below(model, high) < order):
+        raise _RoundingError
     while np.any(high - low > width):
         middle = (low + high) / 2
-        above = count_below(model, middle) < order
+        above = count_modes_below(model, middle) < order
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.asarray(np.maximum((low + high) / 2, 0.0), dtype=np.float64)

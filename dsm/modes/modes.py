@@ -1,16 +1,59 @@
-"""Natural modes of a spindle."""
+"""Natural modes of a spindle, evaluated at any place."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.modes.between_nodes import between_nodes
-from dsm.spindle.places import SAME_PLACE, nearest
-from dsm.spindle.sections import sections
-from dsm.spindle.spindle import Spindle
+from dsm.elements import count_series_terms, transfer_series
+from dsm.spindle.sections import Sections, sections
+from dsm.spindle.segment import SAME_PLACE, nearest_index
+from dsm.spindle.spindle import Spindle, Theory
+
+_Float = NDArray[np.float64]
+
+
+class StateVectors(NamedTuple):
+    """Motion and internal forces of modes at places, shape (n_modes, n_places) each."""
+
+    deflection: _Float
+    """u, of the modes' own scale."""
+    slope: _Float
+    """t, rotation of the cross-section."""
+    force: _Float
+    """Shear force Q."""
+    moment: _Float
+    """Bending moment M."""
+
+
+def evaluate_between_nodes(
+    shaft: Sections,
+    theory: Theory,
+    frequency: _Float,
+    position: _Float,
+    shape: tuple[_Float, _Float],
+    places: _Float,
+    left: NDArray[np.int_],
+) -> StateVectors:
+    """The modes of a shaft at rest inside its elements, exact.
+
+    frequency (Hz), shape (n_modes,); position of the nodes (m) and the shape (deflection, slope) there, (n_modes,
+    n_nodes) each; places (m), shape (n_places,), and the node left of each. What the element carries from its left node
+    on, (u, t, Q, M)' = T (u1, t1, Q1, M1), must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
+    """
+    start, end = position[left], position[left + 1]
+    segment = shaft.segment_at((start + end) / 2)
+    powers = np.vander((2 * np.pi * frequency) ** 2, count_series_terms(apart=False), increasing=True)
+    whole, part = (
+        np.moveaxis(transfer_series(shaft, theory, segment, start, to) @ powers.T, 3, 0) for to in (end, places)
+    )
+    near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
+    strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]
+    forces = np.linalg.solve(whole[..., :2, 2:], strain)
+    return StateVectors(*np.moveaxis((part @ np.concatenate([near[..., np.newaxis], forces], axis=2))[..., 0], 2, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +81,7 @@ class Modes:
 
     def node(self, position: float) -> int:
         """Index of the place of these modes nearest to a position (m); at a joint that of the side of the tool tip."""
-        return nearest(self.position, position)
+        return nearest_index(self.position, position)
 
     def at(self, places: NDArray[np.float64]) -> Modes:
         """The same modes at other places on the shaft (m, shape (n,)), exact; a place next to a node has its values.
@@ -57,7 +100,7 @@ class Modes:
         inside = np.minimum(from_left, from_right) > slack
         if np.any(inside):
             shape = self.deflection, self.slope
-            state = between_nodes(
+            state = evaluate_between_nodes(
                 sections(self.spindle),
                 self.spindle.theory,
                 self.frequency,

@@ -1,11 +1,13 @@
-"""Natural frequencies of a spindle."""
+"""Natural frequencies, mode shapes and modal stiffness of a spindle."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dsm.modes.find_modes import find_modes
+from dsm.modes.modes import Modes
+from dsm.spindle.segment import SAME_PLACE
 from dsm.spindle.spindle import Spindle
 
 
@@ -27,3 +29,66 @@ def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = Fal
     """
     held = [(bearing.position, 0) for bearing in spindle.bearings] if rigid_bearings else []
     return find_modes(spindle, count, held=held).frequency
+
+
+def modes_at(spindle: Spindle, count: int, position: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Natural frequencies (Hz) and modal stiffness at one place (N/m) of the lowest modes, shape (count,) each.
+
+    position: distance from the tool tip (m). The receptance there is the sum over all modes of 1/K/(1 - (f/f_n)^2).
+    K is 0 for a motion without bending and inf where the mode is at rest. Raises ValueError for a position off the
+    shaft, and as natural_frequencies.
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> frequency, stiffness = modes_at(shaft, 2, position=0.125)
+    >>> frequency.round(1).tolist(), (stiffness / 1e6).round(1).tolist()  # Hz, N/um
+    ([406.2, 1624.9], [50.2, 401.7])
+    """
+    modes = find_modes(spindle, count, places=[position])
+    return modes.frequency, modes.stiffness_at(position)
+
+
+def modal_stiffness(spindle: Spindle, mode: int = 1, position: float = 0.0) -> float:
+    """Modal stiffness K of a mode (1 is the lowest) at `position` from the tool tip (m), in N/m; see modes_at.
+
+    This, and not the static stiffness, is what the height of a peak of the measured FRF gives: |H| = 1/(2 zeta K).
+    Raises ValueError for a mode below 1, and as modes_at.
+
+    Of a shaft on two knife edges half the mass moves with its middle:
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> w = 2 * np.pi * natural_frequencies(shaft, 1)[0]
+    >>> round(modal_stiffness(shaft, 1, position=0.25) / 1e6, 2)  # N/um
+    25.1
+    >>> round(float(shaft.mass / 2 * w**2) / 1e6, 2)
+    25.1
+    """
+    if mode < 1:
+        raise ValueError(f"mode={mode} is not at least 1, the lowest")
+    return float(modes_at(spindle, mode, position)[1][-1])
+
+
+def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -> Modes:
+    """The `count` lowest modes with deflection and slope at `order_taps` from the tool tip (m), shape (n,), any order.
+
+    None: at segment ends, bearings, masses and joints. Exact everywhere, inside long segments too; a joint has two
+    sides, and at its place the values are those of the side away from the tool tip. With theory="timoshenko" the slope
+    is the rotation of the cross-section. Raises ValueError for a place off the shaft, and as natural_frequencies.
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> modes = mode_shapes(shaft, 1, [0.125, 0.25, 0.375])
+    >>> abs(modes.deflection[0] / modes.deflection[0, 1]).round(3).tolist()  # sin(pi z / L)
+    [0.707, 1.0, 0.707]
+    """
+    modes = find_modes(spindle, count)
+    return modes if places is None else modes.at(_check_places(spindle, places))
+
+
+def _check_places(spindle: Spindle, places: ArrayLike) -> NDArray[np.float64]:
+    position = np.asarray(places, dtype=np.float64)
+    if position.ndim != 1:
+        raise ValueError(f"places has shape {position.shape}; a 1-D array (m) is needed")
+    slack = SAME_PLACE * spindle.length
+    off = position[~((position >= -slack) & (position <= spindle.length + slack))]
+    if off.size:
+        raise ValueError(f"places holds {off[0]} m, which is off the shaft, 0 to {spindle.length:g} m")
+    return np.clip(position, 0.0, spindle.length)

@@ -1,14 +1,9 @@
 """The spindle as plain data: segments, materials, bearings, masses, joints."""
 
-from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.change_tool import change_tool, check_tool
-from dsm.spindle.cut_spindle import cut_spindle
-from dsm.spindle.material import MATERIALS, Material
-from dsm.spindle.places import SAME_PLACE, nearest
+from dsm.spindle.attachments import Bearing, Damping, Joint, LumpedMass, Supports, damping_of_bearings, supports
 from dsm.spindle.sections import CrossSection, Sections, sections
-from dsm.spindle.segment import Segment
-from dsm.spindle.spindle import Spindle, Theory, require_support
-from dsm.spindle.supports import Damping, Supports, given_damping, supports
+from dsm.spindle.segment import MATERIALS, SAME_PLACE, Material, Segment, nearest_index
+from dsm.spindle.spindle import Spindle, Theory, change_tool, check_tool, cut_spindle, require_support
 
 __all__ = [
     "MATERIALS",
@@ -27,8 +22,8 @@ __all__ = [
     "change_tool",
     "check_tool",
     "cut_spindle",
-    "given_damping",
-    "nearest",
+    "damping_of_bearings",
+    "nearest_index",
     "require_support",
     "sections",
     "supports",

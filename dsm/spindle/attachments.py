@@ -1,21 +1,22 @@
-"""What a shaft is held by, carries and is joined with."""
+"""Bearings, joints and masses on a shaft, and bearings in series with their housings."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar, get_args
+from typing import Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.spindle.checks import require_not_negative, require_positive
+from dsm.spindle.segment import require_not_negative, require_positive
 
 Stiffness = TypeVar("Stiffness", float, NDArray[np.complex128])
 RollingElements = Literal["balls", "rollers"]
 
 
-def shaft_share(stiffness: Stiffness, softness: Stiffness) -> Stiffness:
+def bearing_motion_share(stiffness: Stiffness, softness: Stiffness) -> Stiffness:
     """Part of the motion of the shaft that goes into a bearing of a stiffness (N/m), not into its housing (m/N)."""
     return 1 / (1 + stiffness * softness)
 
@@ -50,7 +51,7 @@ class Bearing:
         """What the shaft feels of bearing and housing (N/m)."""
         if math.isinf(self.stiffness):
             return self.housing_stiffness
-        return self.stiffness * shaft_share(self.stiffness, 1 / self.housing_stiffness)
+        return self.stiffness * bearing_motion_share(self.stiffness, 1 / self.housing_stiffness)
 
     def check(self, where: str) -> None:
         """Raise ValueError, beginning with `where`, for what is no bearing."""
@@ -121,3 +122,70 @@ class Joint:
         """Raise ValueError, beginning with `where`, for what is no joint."""
         require_positive(where, "stiffness", self.stiffness, "N/m")
         require_positive(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
+
+
+_Complex = NDArray[np.complex128]
+
+
+class Damping(NamedTuple):
+    """Damping of a spindle, apart from its stiffness."""
+
+    viscous: NDArray[np.float64]
+    """Dampers of the bearings (N s/m), shape (n_bearings,)."""
+    loss_factor: float
+    """Loss factor eta of shaft, bearings, housing and joints (-): stiffness k becomes k (1 + i eta)."""
+
+    @property
+    def complexity(self) -> complex:
+        """1 + i eta."""
+        return 1 + 1j * self.loss_factor
+
+
+class Supports(NamedTuple):
+    """Radial springs with dampers, each before the spring of its housing; n frequencies, m bearings."""
+
+    spring: _Complex
+    """Stiffness of the bearings alone, dampers included (N/m), shape (n, m)."""
+    housing_compliance: _Complex
+    """Compliance of the housings (m/N), shape (m,)."""
+
+    @property
+    def motion_share(self) -> _Complex:
+        """Part of the motion of the shaft that goes into the bearing and not into its housing (-), shape (n, m)."""
+        return np.asarray(bearing_motion_share(self.spring, self.housing_compliance))
+
+    @property
+    def stiffness(self) -> _Complex:
+        """Stiffness that the shaft feels (N/m), shape (n, m)."""
+        return self.spring * self.motion_share
+
+    @property
+    def stiffness_slope(self) -> _Complex:
+        """Derivative of what the shaft feels by the stiffness of the bearing (-), shape (n, m)."""
+        return self.motion_share**2
+
+    def across(self, compliance: _Complex) -> _Complex:
+        """Compliance across the springs of the bearings, (n, m, m), from that of the shaft on them (m/N).
+
+        A pair of forces across a spring moves the shaft with the share a of it, and the housing by a times its
+        compliance.
+        """
+        matrices = self.motion_share[:, :, np.newaxis] * compliance * self.motion_share[:, np.newaxis]
+        diagonal = np.arange(self.housing_compliance.size)
+        matrices[:, diagonal, diagonal] += self.motion_share * self.housing_compliance
+        return matrices
+
+
+def supports(bearings: Sequence[Bearing], w: _Complex, damping: Damping) -> Supports:
+    """The supports of bearings at angular frequencies w (rad/s), shape (n,); `damping` has one damper for each."""
+    stiffness = np.array([bearing.stiffness for bearing in bearings])
+    softness = np.array([1 / bearing.housing_stiffness for bearing in bearings])
+    spring = damping.complexity * stiffness + 1j * w[:, np.newaxis] * damping.viscous
+    return Supports(spring, softness / damping.complexity)
+
+
+def damping_of_bearings(bearings: Sequence[Bearing], loss_factor: float) -> Damping:
+    """The dampers of bearings with a loss factor, which is checked."""
+    if not (math.isfinite(loss_factor) and loss_factor >= 0):
+        raise ValueError(f"loss_factor={loss_factor} is not a finite number >= 0")
+    return Damping(np.array([bearing.damping for bearing in bearings], dtype=np.float64), loss_factor)

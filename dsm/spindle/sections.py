@@ -9,8 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.spindle.material import Material, shear_coefficient
-from dsm.spindle.segment import Segment, ring_area, ring_second_moment
+from dsm.spindle.segment import Material, Segment, ring_area, ring_second_moment, shear_coefficient
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
@@ -87,10 +86,10 @@ class Sections:
 @lru_cache(maxsize=32)
 def sections(spindle: Spindle) -> Sections:
     """The cross-sections of a spindle."""
-    return sections_of(spindle.segments, spindle.material)
+    return sections_of_segments(spindle.segments, spindle.material)
 
 
-def sections_of(segments: Sequence[Segment], common: Material) -> Sections:
+def sections_of_segments(segments: Sequence[Segment], common: Material) -> Sections:
     """Those of segments, some of them of the common material."""
     rows = []
     for segment in segments:

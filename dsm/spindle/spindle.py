@@ -1,18 +1,17 @@
-"""The spindle as plain data: round segments, bearings, masses and joints."""
+"""The spindle as plain data, and the same spindle with another tool."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
+
+import numpy as np
 
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.checks import require_positive
-from dsm.spindle.material import STEEL, Material
-from dsm.spindle.places import SAME_PLACE
-from dsm.spindle.segment import Segment, ring_area
+from dsm.spindle.segment import SAME_PLACE, STEEL, Material, Segment, nearest_index, require_positive, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
@@ -142,3 +141,80 @@ def require_support(spindle: Spindle) -> None:
             f"the shaft is held by {len(spindle.bearings)} bearing(s) and can move freely; at least two are needed, "
             "or one with a rotational stiffness"
         )
+
+
+Part = TypeVar("Part", Bearing, LumpedMass, Joint)
+
+
+def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | None]:
+    """What lies beyond `position` from the tool tip (m), its own positions counted from the cut; the joint at the cut.
+
+    A segment there is cut in two. Bearings, masses and joints nearer to the tool tip fall away; a bearing or a mass at
+    the cut stays. Raises ValueError for a cut off the shaft or at its far end.
+    """
+    slack = SAME_PLACE * spindle.length
+    if not 0 <= position < spindle.length - slack:
+        raise ValueError(f"position={position} m leaves no spindle; cut it between 0 and {spindle.length:g} m")
+    ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
+    end = float(ends[nearest_index(ends, position)])
+    cut = end if abs(end - position) <= slack else float(position)
+    at_cut = [joint for joint in spindle.joints if abs(joint.position - cut) <= slack]
+    rest = replace(
+        spindle,
+        segments=[
+            _rest_of_segment(segment, max(cut - start, 0.0))
+            for segment, start, end in zip(spindle.segments, ends[:-1], ends[1:], strict=True)
+            if end > cut
+        ],
+        bearings=shift_parts([part for part in spindle.bearings if part.position >= cut - slack], -cut),
+        masses=shift_parts([part for part in spindle.masses if part.position >= cut - slack], -cut),
+        joints=shift_parts([part for part in spindle.joints if part.position > cut + slack], -cut),
+    )
+    return rest, at_cut[0] if at_cut else None
+
+
+def shift_parts(parts: Iterable[Part], shift: float) -> list[Part]:
+    """The same parts, further from the tool tip by `shift` (m); none before it."""
+    return [replace(part, position=max(part.position + shift, 0.0)) for part in parts]
+
+
+def _rest_of_segment(segment: Segment, removed: float) -> Segment:
+    """What is left of a segment without its first part, of length `removed` (m)."""
+    outer, bore = segment.diameters_at(removed / segment.length)
+    return replace(segment, length=segment.length - removed, outer_diameter=outer, bore_diameter=bore)
+
+
+def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
+    """The spindle beyond `position` from its tool tip (m) with `tool` in front of it.
+
+    tool: a free shaft, its first segment the new tool tip, its last one fast to the spindle. A bearing, a mass or a
+    joint where the spindle is cut stays with it; all that is nearer to the old tip falls away. Segments of the tool
+    without a material of their own keep that of the tool. Raises ValueError for a cut off the shaft, a tool with
+    bearings, and one of another beam theory.
+
+    >>> long_tool = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
+    >>> short_tool = change_tool(long_tool, 0.1, Spindle([Segment(0.06, 0.02)], []))
+    >>> round(short_tool.length, 2), [round(bearing.position, 2) for bearing in short_tool.bearings]  # m
+    (0.36, [0.11, 0.34])
+    """
+    check_tool(tool, spindle.theory)
+    rest, joint = cut_spindle(spindle, position)
+    between = [] if joint is None else [replace(joint, position=tool.length)]
+    segments = list(tool.segments)
+    if tool.material != spindle.material:
+        segments = [replace(segment, material=segment.material or tool.material) for segment in segments]
+    return replace(
+        rest,
+        segments=[*segments, *rest.segments],
+        bearings=shift_parts(rest.bearings, tool.length),
+        masses=[*tool.masses, *shift_parts(rest.masses, tool.length)],
+        joints=[*tool.joints, *between, *shift_parts(rest.joints, tool.length)],
+    )
+
+
+def check_tool(tool: Spindle, theory: str) -> None:
+    """Raise ValueError for what cannot be put into a spindle of a beam theory."""
+    if tool.bearings:
+        raise ValueError(f"the tool has {len(tool.bearings)} bearing(s); give it without, as a free shaft")
+    if tool.theory != theory:
+        raise ValueError(f"theory={tool.theory!r} of the tool is not that of the spindle, {theory!r}")

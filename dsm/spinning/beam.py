@@ -1,13 +1,19 @@
-"""A spinning beam that need not be round, as plain data in the frame that turns with it."""
+"""Spinning beam that need not be round, its elements and its dynamic stiffness."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, get_args
 
-Dof = Literal["u", "v", "u'", "v'"]
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsm.elements.element_series import MAX_ELEMENT_X, SERIES_TERMS, element_series
+
+SpinningDof = Literal["u", "v", "u'", "v'"]
 """Deflections along the axes x and y of the section, and their slopes du/dz and dv/dz."""
 
 
@@ -55,7 +61,7 @@ class SpinningBeam:
     """Segments in order; kept as a tuple."""
     springs: Sequence[SpinningSpring] = ()
     """Springs in any order; those at one place add up; kept as a tuple."""
-    held: Sequence[tuple[float, Dof]] = ()
+    held: Sequence[tuple[float, SpinningDof]] = ()
     """Position (m) and name of each dof that is held: "u" and "v" are a pin, all four a clamp; kept as a tuple."""
 
     def __post_init__(self) -> None:
@@ -71,8 +77,8 @@ class SpinningBeam:
             self._check_spring(f"spring {number}: ", spring)
         for position, dof in self.held:
             self._check_place("held: ", position)
-            if dof not in get_args(Dof):
-                raise ValueError(f"held: dof={dof!r} is none of {', '.join(get_args(Dof))}")
+            if dof not in get_args(SpinningDof):
+                raise ValueError(f"held: dof={dof!r} is none of {', '.join(get_args(SpinningDof))}")
 
     @property
     def length(self) -> float:
@@ -98,7 +104,7 @@ class SpinningBeam:
                 return False
         return True
 
-    def stiffness(self, spring: SpinningSpring) -> Iterator[tuple[Dof, float]]:
+    def stiffness(self, spring: SpinningSpring) -> Iterator[tuple[SpinningDof, float]]:
         """What a spring adds to u and to v (N/m)."""
         yield "u", spring.stiffness_x
         yield "v", spring.stiffness_x if spring.stiffness_y is None else spring.stiffness_y
@@ -125,3 +131,156 @@ def check_positive(name: str, value: float) -> None:
     """Raise ValueError for what is no finite number > 0."""
     if not (math.isfinite(value) and value > 0):
         raise ValueError(f"{name}={value} is not a finite number > 0")
+
+
+_Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpinningChain:
+    """Stiffness matrix K(w) of uniform elements in a row, on springs, in the frame that turns with them at W (rad/s).
+
+    Every node has the dofs u, v, u' = du/dz, v' = dv/dz, in this order, with u = U cos wt and v = V sin wt: then
+    E d'''' = M2 d for d = (U, V), E = diag(EIyy, EIxx), M2 = m [[w^2 + W^2, 2 w W], [2 w W, w^2 + W^2]]. The planar
+    element of EI = 1, u'''' = q u, is a power series in q without poles below q L^4 = 500 (see element_series),
+    sum c_n q^n; so the spinning one is sum c_n (x) E (E^-1 M2)^n: no eigenvectors of the pencil (M2, E) are needed,
+    and as all its entries are >= 0 nothing cancels. It holds up to x = L (m (w + W)^2 / min EI)^(1/4) = MAX_X.
+    """
+
+    length: _Float
+    """Length of the elements (m), shape (n,)."""
+    rigidity: _Float
+    """EIyy, which resists u, and EIxx, which resists v, of each element (N m^2), shape (n, 2)."""
+    mass_per_length: _Float
+    """Mass per length (kg/m), shape (n,)."""
+    spring: _Float
+    """Stiffness of the springs against each dof (N/m), shape (4 n + 4,)."""
+    free: NDArray[np.int_]
+    """Indices of the dofs that are not held, shape (n_free,)."""
+
+    def matrices(self, w: _Float, spin: float) -> tuple[_Float, _Float]:
+        """K and dK/dw at w and W = spin (rad/s), both >= 0, shape (n_w, n_free, n_free) each."""
+        mass = self.mass_per_length[:, np.newaxis, np.newaxis] / self.rigidity[..., np.newaxis]
+        constant = np.full_like(w, spin)
+        same, other = w**2 + spin**2, 2 * w * spin
+        step = mass * np.array([[same, other], [other, same]]).T[:, np.newaxis]
+        slope = 2 * mass * np.array([[w, constant], [constant, w]]).T[:, np.newaxis]
+        power, changed = np.broadcast_to(self._rigidity_matrix, step.shape), np.zeros_like(step)
+        value, derivative = np.zeros((2, w.size, self.length.size, 4, 2, 4, 2))
+        for term in self._planar:
+            value += np.einsum("ekl,weab->wekalb", term, power)
+            derivative += np.einsum("ekl,weab->wekalb", term, changed)
+            power, changed = power @ step, changed @ step + power @ slope
+        return self._joined(value) + self._springs, self._joined(derivative)
+
+    def count(self, w: _Float, spin: float) -> NDArray[np.int_]:
+        """Number of negative eigenvalues of K at w and W = spin (rad/s), shape (n_w,)."""
+        scale = 1 / np.sqrt(np.diagonal(self.hermite()[0]))
+        scaled = self.matrices(w, spin)[0] * np.outer(scale, scale)
+        return np.asarray(np.sum(np.linalg.eigvalsh(scaled) < 0, axis=-1), dtype=int)
+
+    def in_plane(self, axis: Literal[0, 1]) -> SpinningChain:
+        """The same that moves along u (0) or v (1) only."""
+        return replace(self, free=self.free[self.free % 2 == axis])
+
+    def hermite(self) -> tuple[_Float, _Float, _Float]:
+        """Static stiffness S, consistent mass M and coupling C: K is nearly S - (w^2 + W^2) M - 2 w W C."""
+        mass = self.mass_per_length[:, np.newaxis, np.newaxis]
+        inner = (
+            (self._planar[0], self._rigidity_matrix),
+            (-self._planar[1], mass * np.eye(2)),
+            (-self._planar[1], mass * np.eye(2)[::-1]),
+        )
+        stiffness, inertia, coupling = (
+            self._joined(np.einsum("ekl,eab->ekalb", *pair)[np.newaxis])[0] for pair in inner
+        )
+        return stiffness + self._springs, inertia, coupling
+
+    @cached_property
+    def _springs(self) -> _Float:
+        return np.diag(self.spring[self.free])
+
+    @cached_property
+    def _rigidity_matrix(self) -> _Float:
+        return np.asarray(self.rigidity[:, np.newaxis] * np.eye(2))
+
+    @cached_property
+    def _planar(self) -> _Float:
+        """Coefficients of q^n of the planar elements of EI = 1, dofs u, u' at both ends, shape (TERMS, n, 4, 4)."""
+        one = np.ones_like(self.length)
+        a, b, c, d, e, f = element_series(one, one, self.length)
+        rows = np.array([[a, b, d, e], [b, c, -e, f], [d, -e, a, -b], [e, f, -b, c]])
+        return np.asarray(rows.transpose(3, 2, 0, 1)).reshape(SERIES_TERMS, -1, 4, 4)
+
+    def _joined(self, elements: _Float) -> _Float:
+        """The matrix of the chain from those of its elements, shape (n_w, n, 4, 2, 4, 2): planar dof, axis."""
+        n_w, n = elements.shape[:2]
+        matrix = np.zeros((n_w, 4 * n + 4, 4 * n + 4))
+        for first, element in enumerate(elements.reshape(n_w, n, 8, 8).swapaxes(0, 1)):
+            at = slice(4 * first, 4 * first + 8)
+            matrix[:, at, at] += element
+        return matrix[:, self.free[:, np.newaxis], self.free]
+
+
+def spinning_element(
+    rigidity_xx: float,
+    rigidity_yy: float,
+    mass_per_length: float,
+    length: float,
+    frequency: ArrayLike,
+    speed_rpm: float,
+) -> _Float:
+    """Stiffness matrix of a uniform beam spinning about its axis z, in the frame that turns with it, (n, 8, 8).
+
+    rigidity_xx: EIxx, against v (N m^2); rigidity_yy: EIyy, against u (N m^2); mass_per_length (kg/m); length (m);
+    frequency: (n,) Hz, >= 0, seen in the turning frame; speed_rpm: speed of spin (rpm), >= 0.
+
+    Rows and columns are u, v, du/dz, dv/dz at z = 0, then the same at z = length; the matrix gives the forces (N) and
+    moments (N m) that do work on them, along the same axes at both ends, and is symmetric. The motion is
+    u = U cos wt, v = V sin wt; for u = U sin wt, v = V cos wt the coupling of u and v changes its sign. A rotation
+    about x is -dv/dz.
+
+    Equal to A B^-1 of Gaber & Hashemi, Shock and Vibration, 2015, eqs. (1)-(27), with the signs put right
+    (docs/paper.md), but also defined at speed 0, at frequency 0 and where the two are equal. Beams longer than the
+    series allows are taken in equal parts whose inner dofs are eliminated; infinite only at the natural frequencies
+    of the beam clamped at both ends. Raises ValueError for numbers out of range.
+
+    At rest, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
+
+    >>> element = spinning_element(1e4, 1e4, mass_per_length=15.0, length=0.5, frequency=[0.0], speed_rpm=0.0)
+    >>> element.shape
+    (1, 8, 8)
+    >>> round(float(element[0, 0, 0]) / (12 * 1e4 / 0.5**3), 9)
+    1.0
+    """
+    numbers = {"rigidity_xx": rigidity_xx, "rigidity_yy": rigidity_yy, "mass_per_length": mass_per_length}
+    for name, value in {**numbers, "length": length}.items():
+        check_positive(name, value)
+    spin = angular_speed(speed_rpm)
+    w = 2 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    if w.ndim != 1 or not np.all(np.isfinite(w) & (w >= 0)):
+        raise ValueError(f"frequency={frequency!r} is not a list of finite numbers >= 0 (Hz)")
+    x = length * (mass_per_length / min(rigidity_xx, rigidity_yy) * (w + spin) ** 2) ** 0.25
+    parts = np.maximum(np.ceil(x / MAX_ELEMENT_X), 1).astype(int)
+    result = np.empty((w.size, 8, 8))
+    for n in np.unique(parts):
+        rigidity = np.tile([rigidity_yy, rigidity_xx], (n, 1))
+        mass, dofs = np.full(n, mass_per_length), np.arange(4 * n + 4)
+        chain = SpinningChain(np.full(n, length / n), rigidity, mass, np.zeros(dofs.size), dofs)
+        result[parts == n] = _condense_inner_nodes(chain.matrices(w[parts == n], spin)[0])
+    return result
+
+
+def angular_speed(speed_rpm: float) -> float:
+    """Speed of spin (rad/s). Raises ValueError for a negative speed."""
+    if not (math.isfinite(speed_rpm) and speed_rpm >= 0):
+        raise ValueError(f"speed_rpm={speed_rpm} is not a finite number >= 0")
+    return speed_rpm * math.pi / 30
+
+
+def _condense_inner_nodes(matrix: _Float) -> _Float:
+    """Eliminate all nodes but the first and the last."""
+    ends = np.r_[0:4, -4:0]
+    outer, across, inner = matrix[:, ends[:, np.newaxis], ends], matrix[:, 4:-4, ends], matrix[:, 4:-4, 4:-4]
+    reduced = outer - across.swapaxes(1, 2) @ np.linalg.solve(inner, across)
+    return np.asarray((reduced + reduced.swapaxes(1, 2)) / 2)

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from acquisition import Block, Channel, DeviceError, DeviceIdentity, Driver, EmulatorThread, SensorPlace
+from acquisition import Block, Channel, DeviceError, DeviceIdentity, Driver, EmulatorThread, SensorDataLocation
 from acquisition.emulation import quantise
 from acquisition.ports import SerialLink
 
@@ -106,6 +106,6 @@ DRIVER = Driver(
     "an ACME-1",
     open=Acme,
     probe=probe,
-    sensors=SensorPlace("the settings of the ACME-1", "sensitivity", "skew"),
+    sensors=SensorDataLocation("the settings of the ACME-1", "sensitivity", "skew"),
     emulate=AcmeEmulator,
 )

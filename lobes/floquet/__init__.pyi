@@ -1,22 +1,19 @@
 """Semi-discretisation of high order: milling over one tooth period, its largest multiplier, and the limits from it."""
 
-from .growth import growth
-from .milling_rows import MillingRows, joined_rows, rows_of
-from .multipliers import largest_multipliers
-from .pieces import piece_numbers
+from .milling_rows import MillingRows, count_pieces, join_rows, rows_at_speeds
+from .multipliers import growth_rate, largest_multipliers
 from .program_limit import ProgramLimit, program_limit
-from .spectral_radius import spectral_radius
-from .stability_boundary import stability_boundary
+from .stability_boundary import spectral_radius, stability_boundary
 
 __all__ = [
     "MillingRows",
     "ProgramLimit",
-    "growth",
-    "joined_rows",
+    "count_pieces",
+    "growth_rate",
+    "join_rows",
     "largest_multipliers",
-    "piece_numbers",
     "program_limit",
-    "rows_of",
+    "rows_at_speeds",
     "spectral_radius",
     "stability_boundary",
 ]

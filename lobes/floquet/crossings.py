@@ -1,4 +1,4 @@
-"""All depths where stability changes, over many speeds at once."""
+"""Find all depths where stability changes, with converged pieces."""
 
 from __future__ import annotations
 
@@ -8,27 +8,30 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-SCAN = 24
+from lobes.floquet.milling_rows import MillingRows, count_pieces
+from lobes.floquet.multipliers import growth_rate, largest_multipliers
+
+SCAN_DEPTHS = 24
 """Depths looked at before anything is refined ..."""
-SPREAD = 1.5
+SCAN_EXPONENT = 1.5
 """... the j-th of them at (j / SCAN) ^ SPREAD of the deepest: limits lie low."""
-ROUNDS = 6
+MAX_STEP_HALVINGS = 6
 """Halvings of a step that may hide a pair of crossings."""
-DOUBT = 0.5
+HIDDEN_CROSSING_SHARE = 0.5
 """It may where growth, as steep as in a step beside it, goes this share of the way to zero and back."""
-SURE = 1e-4
+GROWTH_SIGN_ACCURACY = 1e-4
 """Accuracy of growth that is enough for its sign, unless it is smaller than that."""
-ACCURACY = 1e-6
+CROSSING_ACCURACY = 1e-6
 """Relative accuracy of a crossing."""
-MOST_STEPS = 60
+MAX_CROSSING_STEPS = 60
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
-Growth = Callable[[Rows, Floats, float], Floats]
+GrowthFunction = Callable[[Rows, Floats, float], Floats]
 """From rows (s,), depths (s, d) and an accuracy to a value (s, d) that is negative where the cut is stable."""
 
 
-def find_crossings(growth: Growth, n_rows: int, deepest: float) -> Floats:
+def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Floats:
     """Depths up to `deepest` where growth changes its sign, rising in each row, filled up with inf, shape (n_rows, k).
 
     A scan finds the changes between its depths. A step of it is halved as long as growth, were it as steep in it as in
@@ -36,13 +39,15 @@ def find_crossings(growth: Growth, n_rows: int, deepest: float) -> Floats:
     is negative at depth 0. k is at least 1.
     """
     rows = np.arange(n_rows)
-    depth = np.broadcast_to(deepest * (np.arange(1, SCAN + 1) / SCAN) ** SPREAD, (n_rows, SCAN))
-    value = growth(rows, depth, SURE)
-    brackets = _brackets(growth, _steps(depth, value))
-    return _table(brackets.row, _refine(growth, brackets), n_rows)
+    depth = np.broadcast_to(
+        deepest * (np.arange(1, SCAN_DEPTHS + 1) / SCAN_DEPTHS) ** SCAN_EXPONENT, (n_rows, SCAN_DEPTHS)
+    )
+    value = growth(rows, depth, GROWTH_SIGN_ACCURACY)
+    brackets = _bracket_crossings(growth, _scan_steps(depth, value))
+    return _pad_rows(brackets.row, _refine_crossings(growth, brackets), n_rows)
 
 
-def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
+def _pad_rows(row: Rows, crossing: Floats, n_rows: int) -> Floats:
     order = np.lexsort((crossing, row))
     row, crossing = row[order], crossing[order]
     counts = np.bincount(row, minlength=n_rows)
@@ -52,7 +57,7 @@ def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class _Steps:
+class _DepthSteps:
     """Steps between two depths, arrays of one shape (n,)."""
 
     row: Rows
@@ -65,8 +70,8 @@ class _Steps:
     after: Floats
     """Steepness of growth in the step after."""
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> _Steps:
-        return _Steps(*(getattr(self, field.name)[which] for field in fields(self)))
+    def __getitem__(self, which: NDArray[np.bool_]) -> _DepthSteps:
+        return _DepthSteps(*(getattr(self, field.name)[which] for field in fields(self)))
 
     @property
     def crosses(self) -> NDArray[np.bool_]:
@@ -76,58 +81,60 @@ class _Steps:
     def may_hide(self) -> NDArray[np.bool_]:
         """Whether growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
-        return np.asarray(reach > DOUBT * (np.abs(self.at_low) + np.abs(self.at_high)))
+        return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 
-    def halves(self, middle: Floats) -> _Steps:
+    def halves(self, middle: Floats) -> _DepthSteps:
         """Both halves, given growth at the middles."""
         half = (self.low + self.high) / 2
         left, right = (np.abs(middle - end) / (half - self.low) for end in (self.at_low, self.at_high))
-        return _joined(
-            _Steps(self.row, self.low, half, self.at_low, middle, self.before, right),
-            _Steps(self.row, half, self.high, middle, self.at_high, left, self.after),
+        return _join_steps(
+            _DepthSteps(self.row, self.low, half, self.at_low, middle, self.before, right),
+            _DepthSteps(self.row, half, self.high, middle, self.at_high, left, self.after),
         )
 
 
-def _joined(*parts: _Steps) -> _Steps:
-    return _Steps(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_Steps)))
+def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
+    return _DepthSteps(
+        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_DepthSteps))
+    )
 
 
-def _steps(depth: Floats, value: Floats) -> _Steps:
+def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:
     """The steps of a scan; depth 0 has the value at the first depth, made stable."""
     at = np.hstack((np.zeros((len(depth), 1)), depth))
     values = np.hstack((-np.abs(value[:, :1]), value))
     steep = np.pad(np.abs(np.diff(values) / np.diff(at)), ((0, 0), (1, 1)))
     row = np.repeat(np.arange(len(depth)), depth.shape[1])
     parts = (at[:, :-1], at[:, 1:], values[:, :-1], values[:, 1:], steep[:, :-2], steep[:, 2:])
-    return _Steps(row, *(part.ravel() for part in parts))
+    return _DepthSteps(row, *(part.ravel() for part in parts))
 
 
-def _brackets(growth: Growth, steps: _Steps) -> _Steps:
+def _bracket_crossings(growth: GrowthFunction, steps: _DepthSteps) -> _DepthSteps:
     """The steps that hold a crossing, halved where there may be more."""
     done = []
-    for _ in range(ROUNDS):
+    for _ in range(MAX_STEP_HALVINGS):
         doubtful = steps.may_hide
         done.append(steps[~doubtful & steps.crosses])
         steps = steps[doubtful]
         if not steps.row.size:
             break
         middle = (steps.low + steps.high)[:, np.newaxis] / 2
-        steps = steps.halves(growth(steps.row, middle, SURE)[:, 0])
-    return _joined(*done, steps[steps.crosses])
+        steps = steps.halves(growth(steps.row, middle, GROWTH_SIGN_ACCURACY)[:, 0])
+    return _join_steps(*done, steps[steps.crosses])
 
 
-def _refine(growth: Growth, brackets: _Steps) -> Floats:
+def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps) -> Floats:
     """The zero in each step by the false position, with the weight of an end that stays put twice halved (Illinois)."""
     row, low, high = brackets.row, brackets.low.copy(), brackets.high.copy()
     at_low, at_high = brackets.at_low.copy(), brackets.at_high.copy()
     zero, was_lower = (low + high) / 2, np.full(row.size, -1)
     busy = np.arange(row.size)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_CROSSING_STEPS):
         if not busy.size:
             break
         a, b, fa, fb = low[busy], high[busy], at_low[busy], at_high[busy]
         guess = np.clip(b - fb * (b - a) / (fb - fa), a + 0.01 * (b - a), b - 0.01 * (b - a))
-        value = growth(row[busy], guess[:, np.newaxis], ACCURACY)[:, 0]
+        value = growth(row[busy], guess[:, np.newaxis], CROSSING_ACCURACY)[:, 0]
         lower = (value < 0) == (fa < 0)
         left = value * np.where(lower, guess - b, a - guess) / np.where(lower, fb - value, value - fa)
         zero[busy] = guess + left
@@ -135,5 +142,65 @@ def _refine(growth: Growth, brackets: _Steps) -> Floats:
         low[busy], at_low[busy] = np.where(lower, guess, a), np.where(lower, value, weight * fa)
         high[busy], at_high[busy] = np.where(lower, b, guess), np.where(lower, weight * fb, value)
         was_lower[busy] = lower
-        busy = busy[np.abs(left) > ACCURACY * guess]
+        busy = busy[np.abs(left) > CROSSING_ACCURACY * guess]
     return zero
+
+
+REAL_MULTIPLIER_ANGLE = 1e-4
+"""A multiplier whose angle is this near to pi (rad) is real."""
+LIMIT_TOLERANCE = 0.0025
+"""A limit has settled where twice as many pieces find the cut stable this much below it, and unstable above."""
+MAX_PIECE_DOUBLINGS = 4
+"""Of the pieces, at most. A kind that is open then stays so: at crawling speeds multipliers of all angles crowd."""
+
+Numbers = NDArray[np.int64]
+
+
+def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Numbers]:
+    """All crossings up to max_depth (m), rising, filled up with inf, shape (r, k), and the pieces (r,) of each row.
+
+    Raises ArithmeticError where a limit does not settle.
+    """
+    number = count_pieces(rows, max_depth)
+    crossings = find_crossings(_growth_function(rows, number), len(rows), max_depth)
+    for _ in range(MAX_PIECE_DOUBLINGS):
+        limit_holds, kind_holds = _has_converged(rows, crossings[:, 0], number)
+        moved = np.flatnonzero(~(limit_holds & kind_holds))
+        if not moved.size:
+            return crossings, number
+        number[moved] *= 2
+        again = find_crossings(_growth_function(rows[moved], number[moved]), moved.size, max_depth)
+        width = max(crossings.shape[1], again.shape[1])
+        crossings, again = (_pad_columns(table, width) for table in (crossings, again))
+        crossings[moved] = again
+    limit_holds, _ = _has_converged(rows, crossings[:, 0], number)
+    if np.all(limit_holds):
+        return crossings, number
+    speed = rows.speed_rpm[np.flatnonzero(~limit_holds)[0]]
+    raise ArithmeticError(f"the limit at {speed:g} rpm has not settled; leave this speed out")
+
+
+def _has_converged(rows: MillingRows, depth: Floats, number: Numbers) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether twice as many pieces leave the limit where it is, and its kind, each of shape (r,)."""
+    limit, kind = np.ones((2, depth.size), dtype=bool)
+    limited = np.flatnonzero(np.isfinite(depth))
+    if limited.size:
+        around = depth[limited, np.newaxis] * (1 + LIMIT_TOLERANCE * np.array([-1.0, 1.0]))
+        fine = largest_multipliers(rows[limited], around, 2 * number[limited], LIMIT_TOLERANCE * 1e-2)
+        coarse = largest_multipliers(rows[limited], around[:, 1:], number[limited], LIMIT_TOLERANCE * 1e-2)
+        limit[limited] = (np.abs(fine[:, 0]) < 1) & (np.abs(fine[:, 1]) > 1)
+        kind[limited] = is_flip(fine[:, 1]) == is_flip(coarse[:, 0])
+    return limit, kind
+
+
+def _pad_columns(table: Floats, width: int) -> Floats:
+    return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=np.inf)
+
+
+def is_flip(multiplier: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Whether each is -1 in its direction: period two."""
+    return np.asarray(np.abs(np.abs(np.angle(multiplier)) - np.pi) < REAL_MULTIPLIER_ANGLE)
+
+
+def _growth_function(rows: MillingRows, number: Numbers) -> GrowthFunction:
+    return lambda row, depth, tolerance: growth_rate(rows[row], depth, number[row], tolerance)

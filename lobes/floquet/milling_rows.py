@@ -1,4 +1,4 @@
-"""One cut on many machines at once: r rows that differ in their numbers, not in their make."""
+"""Many milling systems of one kind, and the pieces their tooth period is divided into."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.cut import Cut
-from lobes.milling_system import MillingSystem, seen_at_tip
+from lobes.milling_system import MillingSystem, tip_participation
 
 Floats = NDArray[np.float64]
 
@@ -49,20 +49,20 @@ class MillingRows:
 
     def __getitem__(self, which: Any) -> MillingRows:
         """Some of the rows, by an index array or a mask."""
-        return replace(self, **{name: getattr(self, name)[which] for name in _VARYING})
+        return replace(self, **{name: getattr(self, name)[which] for name in _VARYING_FIELDS})
 
-    def fed_at(self, angle: float) -> MillingRows:
+    def with_feed_angle(self, angle: float) -> MillingRows:
         """All rows with the feed at an angle from x (rad)."""
         return replace(self, feed_angle=np.full(len(self), angle))
 
-    def making(self, cut: Cut) -> MillingRows:
+    def with_cut(self, cut: Cut) -> MillingRows:
         """All rows with the teeth, immersion and feed of a cut; their coefficients stay."""
-        return replace(self, cut=cut).fed_at(cut.feed_angle)
+        return replace(self, cut=cut).with_feed_angle(cut.feed_angle)
 
     @property
-    def seen(self) -> tuple[Floats, Floats]:
+    def tip_participation(self) -> tuple[Floats, Floats]:
         """What the tip shows of each mode's coordinate q and of its velocity q' / w, each of shape (r, n)."""
-        return seen_at_tip(self.damping_ratio, self.phase)
+        return tip_participation(self.damping_ratio, self.phase)
 
     @property
     def tooth_period(self) -> Floats:
@@ -72,7 +72,7 @@ class MillingRows:
     @property
     def period(self) -> Floats:
         """Time after which the cut repeats (s), shape (r,): the tooth period of evenly spaced teeth."""
-        return self.tooth_period * len(self.cut.pattern)
+        return self.tooth_period * len(self.cut.pitch_pattern)
 
     @property
     def force(self) -> Floats:
@@ -80,7 +80,7 @@ class MillingRows:
         return np.asarray(np.hypot(self.tangential, self.radial))
 
 
-_VARYING = (
+_VARYING_FIELDS = (
     "frequency",
     "damping_ratio",
     "stiffness",
@@ -93,18 +93,20 @@ _VARYING = (
 )
 
 
-def joined_rows(first: MillingRows, second: MillingRows) -> MillingRows:
+def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:
     """The rows of both, of the same cut and make."""
-    columns: dict[str, Any] = {name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING}
+    columns: dict[str, Any] = {
+        name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING_FIELDS
+    }
     return replace(first, **columns)
 
 
-def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
+def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
     """One system and cut at many speeds (rpm), shape (r,).
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> rows = rows_of(milling_system([mode], None), slot, np.array([6000.0, 12000.0]))
+    >>> rows = rows_at_speeds(build_milling_system([mode], None), slot, np.array([6000.0, 12000.0]))
     >>> (rows.tooth_period * 1e3).tolist()  # ms
     [5.0, 2.5]
     """
@@ -123,3 +125,70 @@ def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
         radial=np.full(speed_rpm.shape, cut.radial),
         feed_angle=np.full(speed_rpm.shape, cut.feed_angle),
     )
+
+
+MAX_CYCLES_PER_PIECE = 0.75
+"""Cycles of the fastest mode that counts in one piece, at most: multipliers within 1e-6 of the exact ones."""
+COARSE_CYCLES_PER_PIECE = 1.0
+"""The same where growth within 1e-4 is enough: that of draws."""
+PIECE_NUMBER_RATIO = 1.3
+"""Larger numbers are rounded up to powers of this, so that neighbouring speeds share theirs."""
+MIN_LOOP_GAIN = 0.1
+"""A mode counts where depth times force times its largest flexibility, 1 / (2 K zeta) of a real one, is more: a loop of
+less cannot sustain itself, whatever the speed."""
+MIN_SEGMENT_SHARE = 1e-12
+"""Segments shorter than this share of the pattern are left out."""
+
+
+def segment_ends(cut: Cut, depth: Floats) -> Floats:
+    """Angles where the force begins, ends or bends, from a tooth's entry to where the pattern repeats, rising (rad).
+
+    depth (c,) in m counts for helical teeth alone: they leave later at the tip's other end. Shape (c, k + 1).
+    """
+    turn = sum(cut.pitch_pattern)
+    entries = -cut.lead_angles[: len(cut.pitch_pattern)]
+    lag = cut.helix_lag * depth[:, np.newaxis]
+    arc = np.full(lag.shape, cut.exit_angle - cut.entry_angle)
+    bends = arc if cut.helix_lag == 0 else np.hstack((lag, arc, arc + lag))
+    after = (bends[:, :, np.newaxis] + entries).reshape(depth.size, -1)
+    edge = np.zeros((depth.size, 1))
+    inside = np.hstack((edge + entries[1:], np.mod(after, turn)))
+    return np.hstack((edge, np.sort(inside, axis=1), edge + turn))
+
+
+def is_out_of_cut(cut: Cut, ends: Floats, depth: Floats) -> NDArray[np.bool_]:
+    """Whether no tooth cuts in the segments between these ends (c, k + 1), shape (c, k)."""
+    reach = cut.exit_angle - cut.entry_angle + cut.helix_lag * depth[:, np.newaxis, np.newaxis]
+    middle = (ends[:, :-1, np.newaxis] + ends[:, 1:, np.newaxis]) / 2
+    return np.asarray(np.all(np.mod(middle + cut.lead_angles, 2 * np.pi) > reach, axis=-1))
+
+
+def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER_PIECE) -> NDArray[np.int64]:
+    """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,).
+
+    most: cycles of the fastest mode that counts in one.
+    """
+    loop = (
+        deepest
+        * rows.force[:, np.newaxis]
+        / (2 * rows.stiffness * rows.damping_ratio)
+        * np.hypot(*rows.tip_participation)
+    )
+    loop = loop * np.sum(rows.vector**2, axis=-1)
+    fastest = np.maximum(
+        np.max(np.where(loop > MIN_LOOP_GAIN, rows.frequency, 0.0), axis=1), np.min(rows.frequency, axis=1)
+    )
+    cycles = fastest / (2 * np.pi) * rows.period
+    return np.asarray(np.ceil(np.maximum(cycles / most, 1.0)), dtype=np.int64)
+
+
+def divide_segments(cut: Cut, number: NDArray[np.int64], ends: Floats) -> NDArray[np.int64]:
+    """Pieces of each segment (c, k) where the whole pattern is to have these numbers (c,); 0 for an empty one.
+
+    None is longer than the shortest delay: what was cut before must be known.
+    """
+    share = np.diff(ends, axis=1) / ends[:, -1:]
+    wanted = np.maximum(number[:, np.newaxis] * share, np.maximum(share * sum(cut.pitch_pattern) / cut.delays[0], 1.0))
+    power = np.ceil(np.log(wanted) / np.log(PIECE_NUMBER_RATIO) - 1e-9)
+    rounded = np.where(wanted <= 4, np.ceil(wanted - 1e-9), np.ceil(PIECE_NUMBER_RATIO**power - 1e-9))
+    return np.where(share > MIN_SEGMENT_SHARE, rounded, 0).astype(np.int64)

@@ -1,4 +1,11 @@
-"""The map of milling over one tooth period, piece by piece.
+"""Map of milling over one tooth period, or over the pattern of unequal pitches.
+
+As `lobes.floquet.build_period_map`, but each tooth meets what the one before it left, a delay of its own ago:
+
+    F(t) = -b sum_j H_j(t) (d(t) - d(t - tau_j))
+
+The state is z and the displacements at the nodes of each piece of the last pattern in which teeth cut. No delay is
+longer than the pattern, none shorter than a piece; within a piece the displacement is the polynomial through its nodes.
 
 The state is z, for each mode its coordinate q and its velocity over its frequency, and the displacements w of the tool
 tip one period ago at the Gauss nodes of each piece in which teeth cut. Within a piece q is a polynomial through its
@@ -17,21 +24,145 @@ Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes.floquet.milling_rows import MillingRows
-from lobes.floquet.piece_response import PieceResponse, ringing
-from lobes.floquet.pieces import is_free, segment_ends
-from lobes.floquet.stages import gauss_stages
-from lobes.floquet.uneven_map import UnevenMap, UnevenPiece, surfaces
-from lobes.tooth_force import force_shares, turns
+from lobes.floquet.milling_rows import MillingRows, is_out_of_cut, segment_ends
+from lobes.floquet.piece_response import PieceResponse, free_response, gauss_nodes, interpolation_weights
+from lobes.tooth_force import feed_rotation, force_shares
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RegeneratedSurface:
+    """What teeth of one delay meet in a piece."""
+
+    first: int
+    """First piece of the pattern in which it was cut ..."""
+    last: int
+    """... and the one after the last."""
+    weights: Floats
+    """Displacements at the piece's nodes from those at the nodes of these pieces, shape (r or 1, 1, nodes, s)."""
+    force: Floats
+    """Depth times force matrix of these teeth at the nodes (N/m), shape (r, d, p, p, s)."""
+
+    def load(self, past: Floats) -> Floats:
+        """Forces at the nodes (r, d, p, s) from the displacements of the pattern (r, d, p, pieces, s)."""
+        met = past[..., self.first : self.last, :]
+        *cases, pieces, nodes = met.shape
+        if len(self.weights) > 1:
+            left = np.matmul(met.reshape(*cases, pieces * nodes), self.weights)
+        else:
+            left = (met.reshape(-1, pieces * nodes) @ self.weights[0, 0]).reshape(*cases, -1)
+        return np.asarray((self.force * left[:, :, np.newaxis]).sum(axis=3))
+
+    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> RegeneratedSurface:
+        """For some of the cases, c of them, as rows of one depth each."""
+        weights = self.weights[which[0]] if len(self.weights) > 1 else self.weights
+        return RegeneratedSurface(self.first, self.last, weights, self.force[which][:, np.newaxis])
+
+
+@dataclass(frozen=True, eq=False)
+class UnevenPiece:
+    """One piece of the pattern; without teeth in the cut it meets no surface."""
+
+    matrix: Floats
+    """From z and the forces of what was left to z and the displacements, shape (r, d, m, m); without of z alone."""
+    surfaces: tuple[RegeneratedSurface, ...] = ()
+
+    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> UnevenPiece:
+        """For some of the cases, c of them, as rows of one depth each."""
+        row, column = which
+        matrix = self.matrix[row, column if self.matrix.shape[1] > 1 else 0][:, np.newaxis]
+        return UnevenPiece(matrix, tuple(surface[which] for surface in self.surfaces))
+
+
+@dataclass(frozen=True, eq=False)
+class UnevenMap:
+    """Applied, never multiplied out."""
+
+    pieces: tuple[UnevenPiece, ...]
+    modes: int
+    """Number of modes n."""
+    directions: int
+    """Number of directions p."""
+
+    @property
+    def kind(self) -> np.dtype[Any]:
+        """Precision of its numbers."""
+        return self.pieces[0].matrix.dtype
+
+    @property
+    def cutting(self) -> int:
+        """Number of pieces in which teeth cut."""
+        return sum(bool(piece.surfaces) for piece in self.pieces)
+
+    @property
+    def states(self) -> int:
+        """Numbers in a state."""
+        return 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
+
+    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> UnevenMap:
+        """Some of the cases, c of them, as rows of one depth each."""
+        return UnevenMap(tuple(piece[which] for piece in self.pieces), self.modes, self.directions)
+
+    def __call__(self, state: Floats) -> Floats:
+        """The states (r, d, states) one pattern on."""
+        cases, z = state.shape[:-1], state[..., : 2 * self.modes]
+        past = state[..., 2 * self.modes :].reshape(*cases, self.directions, self.cutting, -1).copy()
+        at = 0
+        for piece in self.pieces:
+            if not piece.surfaces:
+                z = (piece.matrix @ z[..., np.newaxis])[..., 0]
+                continue
+            load = functools.reduce(np.add, [surface.load(past) for surface in piece.surfaces])
+            both = np.concatenate((z, load.reshape(*cases, -1)), axis=-1)
+            both = (piece.matrix @ both[..., np.newaxis])[..., 0]
+            z, new = both[..., : 2 * self.modes], both[..., 2 * self.modes :]
+            past[..., at, :] = new.reshape(*cases, self.directions, -1)
+            at += 1
+        return np.concatenate((z, past.reshape(*cases, -1)), axis=-1)
+
+
+def regenerated_surfaces(
+    delays: tuple[float, ...], turn: float, starts: Floats, lengths: Floats, forces: Floats
+) -> Iterator[tuple[RegeneratedSurface, ...]]:
+    """What the teeth of each delay (rad) meet in each piece in which any cut.
+
+    The pieces start at angles (r or 1, k) and are as long (rad) in a pattern of `turn` (rad); forces: depth times force
+    matrix of the teeth of each delay at the nodes (N/m), shape (delays, p, p, s, k, r, d).
+    """
+    node = starts[..., np.newaxis] + lengths[..., np.newaxis] * gauss_nodes().node
+    met = [_locate_angles(np.mod(node - delay, turn), starts, lengths) for delay in delays]
+    forces = np.moveaxis(forces, (5, 6, 4), (1, 2, 3))
+    cut = np.any(forces, axis=(1, 2, 4, 5, 6))
+    for k in range(starts.shape[1]):
+        yield tuple(RegeneratedSurface(*met[i][k], forces[i, :, :, k]) for i in np.flatnonzero(cut[:, k]))
+
+
+def _locate_angles(angle: Floats, starts: Floats, lengths: Floats) -> list[tuple[int, int, Floats]]:
+    """For each piece that pieces its nodes' angles (r or 1, k, s) lie in, first and one after the last, and weights."""
+    rows = np.arange(len(starts))[:, np.newaxis, np.newaxis]
+    piece = np.maximum(np.sum(starts[:, np.newaxis, np.newaxis] <= angle[..., np.newaxis], axis=-1) - 1, 0)
+    within = np.clip((angle - starts[rows, piece]) / lengths[rows, piece], 0.0, 1.0)
+    own = np.swapaxes(interpolation_weights(within), 2, 3)
+    first, last = np.min(piece, axis=(0, 2)), np.max(piece, axis=(0, 2)) + 1
+    return [
+        (int(a), int(b), _spread_weights(own[:, k], piece[:, k] - a, b - a))
+        for k, (a, b) in enumerate(zip(first, last, strict=True))
+    ]
+
+
+def _spread_weights(own: Floats, piece: NDArray[np.intp], number: int) -> Floats:
+    """Weights (r, m, s) of the nodes of one piece for each of s angles, among those of `number` pieces (r, 1, ., s)."""
+    is_own = np.arange(number)[:, np.newaxis, np.newaxis] == piece[:, np.newaxis, np.newaxis]
+    return np.where(is_own, own[:, np.newaxis], 0.0).reshape(len(own), 1, -1, piece.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +206,7 @@ class PeriodMap:
         return np.concatenate((z, *parts), axis=-1)
 
 
-def period_map(
+def build_period_map(
     rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], kind: type[np.floating[Any]] = np.float64
 ) -> PeriodMap | UnevenMap:
     """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
@@ -83,7 +214,7 @@ def period_map(
     For helical teeth, whose segments depend on the depth, d is 1. kind: precision; that of uneven teeth is double.
     """
     ends = segment_ends(rows.cut, depth[:, 0])
-    free = is_free(rows.cut, ends, depth[:, 0])
+    free = is_out_of_cut(rows.cut, ends, depth[:, 0])
     segments = [
         _Segment.of(rows, depth, ends[:, k : k + 2], int(numbers[k]), bool(np.all(free[:, k])))
         for k in np.flatnonzero(numbers)
@@ -108,23 +239,23 @@ class _Segment:
     def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> _Segment:
         angle = (ends[:, 1] - ends[:, 0]) / number
         starts = ends[:, :1] + angle[:, np.newaxis] * np.arange(number)
-        time = angle / sum(rows.cut.pattern) * rows.period
-        return cls(starts, angle, time, None if is_free else _forces(rows, starts, angle, depth))
+        time = angle / sum(rows.cut.pitch_pattern) * rows.period
+        return cls(starts, angle, time, None if is_free else _force_matrices(rows, starts, angle, depth))
 
-    def ringing(self, rows: MillingRows) -> Floats:
+    def free_response(self, rows: MillingRows) -> Floats:
         """Map of z over all pieces without a cut, shape (r, 1, 2n, 2n)."""
-        return ringing(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
+        return free_response(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
 
 
 def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: type[np.floating[Any]]) -> PeriodMap:
     pieces = list[tuple[bool, Floats]]()
     for segment in segments:
         if segment.forces is None:
-            pieces.append((False, segment.ringing(rows).astype(kind)))
+            pieces.append((False, segment.free_response(rows).astype(kind)))
         else:
-            maps = PieceResponse.of(rows, segment.time).rounded(kind).cutting(segment.forces[0].astype(kind))
+            maps = PieceResponse.of(rows, segment.time).as_precision(kind).cutting(segment.forces[0].astype(kind))
             pieces += [(True, piece) for piece in maps]
-    return PeriodMap(tuple(pieces), rows.direction.size, gauss_stages().node.size * rows.axes.size)
+    return PeriodMap(tuple(pieces), rows.direction.size, gauss_nodes().node.size * rows.axes.size)
 
 
 def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
@@ -135,27 +266,30 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
         [np.repeat(segment.angle[apart, np.newaxis], segment.starts.shape[1], 1) for segment in cutting]
     )
     forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=4)
-    met = surfaces(rows.cut.delays, sum(rows.cut.pattern), starts, lengths, forces)
+    met = regenerated_surfaces(rows.cut.delays, sum(rows.cut.pitch_pattern), starts, lengths, forces)
     pieces = list[UnevenPiece]()
     for segment in segments:
         if segment.forces is None:
-            pieces.append(UnevenPiece(segment.ringing(rows)))
+            pieces.append(UnevenPiece(segment.free_response(rows)))
         else:
             maps = PieceResponse.of(rows, segment.time).loaded(segment.forces.sum(axis=0))
             pieces += [UnevenPiece(piece, next(met)) for piece in maps]
     return UnevenMap(tuple(pieces), rows.direction.size, rows.axes.size)
 
 
-def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
+def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
     """Depth times force matrix of the teeth of each delay at the nodes of pieces that start at angles (r, k) (N/m).
 
     Shape (delays, p, p, s, k, r, d).
     """
     is_alike = rows.cut.helix_lag == 0 or bool(np.all(depth[:, 0] == depth[0, 0]))
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
-    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
+    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_nodes().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
-    frame, coefficients = turns(rows.feed_angle)[..., rows.axes], np.stack((rows.tangential, rows.radial), axis=1)
+    frame, coefficients = (
+        feed_rotation(rows.feed_angle)[..., rows.axes],
+        np.stack((rows.tangential, rows.radial), axis=1),
+    )
     by_share = np.einsum("rc,rmi,rnj->rcmnij", coefficients, frame, frame).reshape(len(rows), 8, -1)
     matrix = shares.reshape(*shares.shape[:2], -1, 8) @ by_share
     matrix = matrix.reshape(*matrix.shape[:2], *at.shape[1:], *[rows.axes.size] * 2)

@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.cut import Cut
-from lobes.floquet.growth import growth
-from lobes.floquet.milling_rows import MillingRows, rows_of
-from lobes.floquet.settled_crossings import settled_crossings
-from lobes.floquet.stability_boundary import chatter_at
-from lobes.milling_system import MillingSystem, milling_system
-from lobes.program import SHARES, Modes, Program
+from lobes.cut import CHECKED_DEPTH_SHARES, Cut, DirectionModes, Program
+from lobes.floquet.crossings import converged_crossings
+from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
+from lobes.floquet.multipliers import growth_rate
+from lobes.floquet.stability_boundary import chatter_at_limits
+from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
 
-DEEPEST = 20.0
+MAX_PROGRAM_DEPTH_RATIO = 20.0
 """Limits are looked for up to this many times the depth of the program."""
 
 
@@ -51,12 +50,16 @@ class ProgramLimit:
 
 
 def program_limit(
-    program: Program, x: Modes, y: Modes, cuts: Sequence[Cut] | None = None, vectors: ArrayLike | None = None
+    program: Program,
+    x: DirectionModes,
+    y: DirectionModes,
+    cuts: Sequence[Cut] | None = None,
+    vectors: ArrayLike | None = None,
 ) -> ProgramLimit:
     """State and limit of a program by semi-discretisation, in the worst of the cuts that it makes on its way.
 
     cuts: differ in feed angle and immersion alone; None: its cut. vectors: directions (n, 2) of the modes of x, then of
-    y, where they lie askew (`milling_system`). Raises ValueError for bad modes or vectors.
+    y, where they lie askew (`build_milling_system`). Raises ValueError for bad modes or vectors.
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
@@ -64,20 +67,22 @@ def program_limit(
     >>> f"{limit.stable}, up to {limit.limit * 1e3:.2f} mm, then {limit.kind} at {limit.chatter_frequency:.0f} Hz"
     'True, up to 1.25 mm, then hopf at 498 Hz'
     """
-    cuts, system = cuts or (program.cut,), milling_system(x, y, vectors)
+    cuts, system = cuts or (program.cut,), build_milling_system(x, y, vectors)
     limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)
     crossing = np.empty(len(cuts))
-    for places in places_alike(cuts):
-        rows = _rows(system, program, [cuts[place] for place in places])
-        crossings, number[places] = settled_crossings(rows, DEEPEST * program.depth)
+    for places in group_by_engagement(cuts):
+        rows = _program_rows(system, program, [cuts[place] for place in places])
+        crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth)
         crossing[places] = crossings[:, 0]
-        unstable = _unstable(rows, program, number[places])
+        unstable = _is_unstable(rows, program, number[places])
         limit[places] = np.where(unstable, np.minimum(crossing[places], program.depth), crossing[places])
     worst = int(np.argmin(limit))
     chatter, kind = np.array([np.nan]), np.array([""])
     if np.isfinite(crossing[worst]):
         here = slice(worst, worst + 1)
-        chatter, kind = chatter_at(system, _rows(system, program, [cuts[worst]]), crossing[here], number[here])
+        chatter, kind = chatter_at_limits(
+            system, _program_rows(system, program, [cuts[worst]]), crossing[here], number[here]
+        )
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),
@@ -91,7 +96,7 @@ def program_limit(
     )
 
 
-def places_alike(cuts: Sequence[Cut]) -> list[list[int]]:
+def group_by_engagement(cuts: Sequence[Cut]) -> list[list[int]]:
     """Places of the cuts that differ in their feed angle alone."""
     places: dict[Cut, list[int]] = {}
     for place, cut in enumerate(cuts):
@@ -99,13 +104,13 @@ def places_alike(cuts: Sequence[Cut]) -> list[list[int]]:
     return list(places.values())
 
 
-def _rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) -> MillingRows:
+def _program_rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) -> MillingRows:
     """A system at the speed of the program, with cuts that differ in their feed angle alone."""
-    rows = rows_of(system, cuts[0], np.full(len(cuts), program.speed_rpm))
+    rows = rows_at_speeds(system, cuts[0], np.full(len(cuts), program.speed_rpm))
     return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
 
 
-def _unstable(rows: MillingRows, program: Program, number: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _is_unstable(rows: MillingRows, program: Program, number: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the program is unstable at its depth or a share of it, shape (r,)."""
-    depths = np.broadcast_to(program.depth * np.array(SHARES), (len(rows), len(SHARES)))
-    return np.asarray(np.any(growth(rows, depths, number) >= 0, axis=1))
+    depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
+    return np.asarray(np.any(growth_rate(rows, depths, number) >= 0, axis=1))

@@ -1,4 +1,4 @@
-"""The stability limit of milling over spindle speed, by semi-discretisation."""
+"""Stability boundary over speed by semi-discretisation, and its chatter frequencies."""
 
 from __future__ import annotations
 
@@ -7,17 +7,124 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.chatter_frequency import chatter_frequency
 from lobes.cut import Cut
-from lobes.floquet.milling_rows import MillingRows, rows_of
-from lobes.floquet.multipliers import largest_multipliers
-from lobes.floquet.settled_crossings import is_flip, settled_crossings
-from lobes.milling_system import MillingSystem, milling_system
-from lobes.speeds import check_speeds
-from lobes.stability_lobes import StabilityLobes
+from lobes.floquet.crossings import converged_crossings, is_flip
+from lobes.floquet.milling_rows import MillingRows, count_pieces, rows_at_speeds
+from lobes.floquet.multipliers import largest_multipliers, spectral_radii
+from lobes.milling_system import MillingSystem, build_milling_system
+from lobes.stability_lobes import StabilityLobes, check_speeds
+from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
 from modal import Mode
 
+MAX_CHATTER_FREQUENCY_RATIO = 2.0
+"""Frequencies are looked for up to this many times the highest natural frequency, and three tooth frequencies."""
+BALANCE_HARMONICS = 4
+"""Tooth frequencies on each side that count in the balance of harmonics."""
+FORCE_HARMONIC_SAMPLES = 128
+"""Intervals of a tooth period from which the harmonics of the cutting force are taken."""
+
 Floats = NDArray[np.float64]
+
+
+def loudest_chatter_frequency(
+    system: MillingSystem, cut: Cut, multiplier: NDArray[np.complex128], depth: Floats, base: Floats
+) -> Floats:
+    """The loudest frequency (Hz) at limits with these multipliers (|mu| = 1) and depths (m), each of shape (n,).
+
+    base (n,): frequency at which the cut repeats (Hz), the tooth frequency of even teeth. A multiplier leaves
+    |+-arg(mu) / (2 pi) + j| times base, j whole. First that one is taken which comes nearest to closing the loop of the
+    mean force, then the loudest in the balance of harmonics around it, over the delays tau,
+    d_k = -b G_k sum_l sum_tau H_(tau, k-l) (1 - exp(-i w_l tau)) d_l.
+    """
+    waves = _nearest_to_mean_force_loop(system, cut, multiplier, depth, base)[:, np.newaxis]
+    reach = BALANCE_HARMONICS * len(cut.pitch_pattern)
+    harmonics = waves + np.arange(-reach, reach + 1)
+    frequency = harmonics * base[:, np.newaxis]
+    receptance = -depth[:, np.newaxis, np.newaxis, np.newaxis] * system.receptance(frequency)
+    regenerated = 1 - np.exp(-2j * np.pi * harmonics[..., np.newaxis] * _relative_delays(cut))
+    forces = np.einsum("gklpq,nlg->nkplq", _force_harmonics(system, cut, harmonics.shape[1]), regenerated)
+    balance = np.einsum("gkpr,gkrlq->gkplq", receptance, forces)
+    size = harmonics.shape[1] * system.axes.size
+    values, vectors = np.linalg.eig(balance.reshape(-1, size, size))
+    row = np.arange(depth.size)
+    amplitude = np.abs(vectors[row, :, np.argmin(np.abs(values - 1), axis=1)]).reshape(*harmonics.shape, -1)
+    loudest = np.argmax(np.linalg.norm(amplitude, axis=-1), axis=1)
+    return np.asarray(np.abs(frequency[row, loudest]))
+
+
+def _nearest_to_mean_force_loop(
+    system: MillingSystem, cut: Cut, multiplier: NDArray[np.complex128], depth: Floats, base: Floats
+) -> Floats:
+    """Multiple of base with the least |det(I + b s H0 G(w))|, s the mean of 1 - exp(-i w tau), shape (n,)."""
+    part = np.abs(np.angle(multiplier))[:, np.newaxis] / (2 * np.pi)
+    highest = MAX_CHATTER_FREQUENCY_RATIO * float(np.max(system.frequency)) / (2 * np.pi)
+    whole = np.arange(int(highest / np.min(base)) + 3 * len(cut.pitch_pattern))
+    waves = np.concatenate((whole + part, whole + 1 - part), axis=1)
+    gain = depth[:, np.newaxis] * mean_regeneration(cut, waves / len(cut.pitch_pattern))
+    force = mean_force(cut)[np.ix_(system.axes, system.axes)]
+    receptance = system.receptance(waves * base[:, np.newaxis])
+    loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * (force @ receptance)
+    best = np.argmin(np.abs(np.linalg.det(loop)), axis=1)[:, np.newaxis]
+    return np.take_along_axis(waves, best, axis=1)[:, 0]
+
+
+def _relative_delays(cut: Cut) -> Floats:
+    """Delays over the time after which the cut repeats, shape (delays,)."""
+    return np.array(cut.delays) / sum(cut.pitch_pattern)
+
+
+def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> NDArray[np.complex128]:
+    """Harmonics H_(k-l) of the force matrix of the teeth of each delay, shape (delays, number, number, p, p)."""
+    samples = FORCE_HARMONIC_SAMPLES * len(cut.pitch_pattern)
+    forces = interval_forces(cut, samples)[..., system.axes[:, np.newaxis], system.axes]
+    harmonics = np.fft.fft(forces, axis=1) / samples
+    order = np.arange(number)
+    return np.asarray(harmonics[:, order[:, np.newaxis] - order])
+
+
+def check_depths(depth: ArrayLike) -> NDArray[np.float64]:
+    """Axial depths (m) as a 1-D array; ValueError unless there is one at least and all are finite and >= 0."""
+    depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
+    if depths.ndim != 1 or depths.size == 0:
+        raise ValueError(f"depth has shape {depths.shape}; a 1-D array of at least one depth (m) is needed")
+    bad = np.flatnonzero(~(np.isfinite(depths) & (depths >= 0)))
+    if bad.size:
+        raise ValueError(f"depth[{bad[0]}]={depths[bad[0]]} is not a finite depth >= 0 m; 1 mm is 1e-3")
+    return depths
+
+
+def spectral_radius(
+    x: Sequence[Mode] | None,
+    y: Sequence[Mode] | None,
+    cut: Cut,
+    speed_rpm: ArrayLike,
+    depth: ArrayLike,
+    vectors: ArrayLike | None = None,
+) -> NDArray[np.float64]:
+    """Largest magnitude of the Floquet multipliers over a tooth period at each speed (rpm) and depth (m); < 1: stable.
+
+    x and y are directions of the machine (`Cut.feed_angle` says how the feed lies in them); None stands for one that
+    is rigid. Any immersion, any number of modes, straight or helical teeth. The tooth period is divided finely enough
+    for all modes that count at the deepest depth. vectors: directions (n, 2) of the modes of x, then of y, where they
+    lie askew (`build_milling_system`). Returns shape (n_speed, n_depth).
+
+    Raises ValueError for bad speeds, depths, modes or vectors.
+    Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
+    (`lobes.floquet.build_period_map`).
+
+    Below 1 is stable. Without a cut a free mode decays by exp(-zeta w T) in a tooth period T:
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> spectral_radius([mode], [mode], slot, 12000.0, [1e-9, 0.2e-3, 2e-3]).round(3).tolist()
+    [[0.855, 0.863, 0.959]]
+    >>> round(float(np.exp(-0.02 * 2 * np.pi * 500.0 * 60 / (2 * 12000.0))), 3)
+    0.855
+    """
+    system, speed, deep = build_milling_system(x, y, vectors), check_speeds(speed_rpm), check_depths(depth)
+    rows = rows_at_speeds(system, cut, speed)
+    grid = np.broadcast_to(deep, (speed.size, deep.size))
+    return spectral_radii(rows, grid, count_pieces(rows, float(np.max(deep))))
 
 
 def stability_boundary(
@@ -35,11 +142,11 @@ def stability_boundary(
     "hopf"; the chatter frequency is the loudest of those that the multiplier leaves. The tooth period is divided into
     pieces for all modes that count, and again twice as finely until limits and kinds have settled within 0.25 %;
     `detail` states how many that took. vectors: directions (n, 2) of the modes of x, then of y, where they lie askew
-    (`milling_system`).
+    (`build_milling_system`).
 
     Raises ValueError for bad speeds, depths, modes or vectors, ArithmeticError where a limit does not settle.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
-    (`lobes.floquet.period_map`).
+    (`lobes.floquet.build_period_map`).
 
     Little immersion has flips between the lobes of a mean force, above 60 f / (N (k + 1/2)), 10000 rpm here:
 
@@ -49,16 +156,16 @@ def stability_boundary(
     >>> [f"{depth * 1e3:.2f} mm, {kind}" for depth, kind in zip(lobes.depth, lobes.kind, strict=True)]
     ['1.11 mm, hopf', '1.53 mm, hopf', '2.12 mm, hopf', '0.96 mm, flip', '5.30 mm, flip']
     """
-    system, speed = milling_system(x, y, vectors), check_speeds(speed_rpm)
+    system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise ValueError(f"max_depth={max_depth} m is not a finite depth > 0; give the deepest cut of interest")
-    rows = rows_of(system, cut, speed)
-    crossings, number = settled_crossings(rows, float(max_depth))
+    rows = rows_at_speeds(system, cut, speed)
+    crossings, number = converged_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
     chatter, kind = np.full(speed.shape, np.nan), np.full(speed.shape, "", dtype="<U4")
     limited = np.flatnonzero(np.isfinite(depth))
     if limited.size:
-        chatter[limited], kind[limited] = chatter_at(system, rows[limited], depth[limited], number[limited])
+        chatter[limited], kind[limited] = chatter_at_limits(system, rows[limited], depth[limited], number[limited])
     low, high = int(np.min(number)), int(np.max(number))
     return StabilityLobes(
         speed_rpm=speed,
@@ -71,10 +178,10 @@ def stability_boundary(
     )
 
 
-def chatter_at(
+def chatter_at_limits(
     system: MillingSystem, rows: MillingRows, depth: Floats, number: NDArray[np.int64]
 ) -> tuple[Floats, NDArray[np.str_]]:
     """Chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
     multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]
-    chatter = chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
+    chatter = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
     return chatter, np.where(is_flip(multiplier), "flip", "hopf")

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def ack(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     alarm: Annotated[
         str, typer.Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
     ] = "",
@@ -35,12 +35,12 @@ def ack(
       lobewatch ack mill-3 decay:reference:x --until 2026-12-01 --note "bearings ordered"
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.acknowledge import acknowledge
-    from lobewatch.notify.telling import telling
+    from lobewatch.logbook.operator_entries import acknowledge_alarms
+    from lobewatch.notify.publish_status import publish_on_change
 
     logbook = Logbook.open(machine)
-    with telling(logbook):
-        alarms, now = acknowledge(logbook, alarm, until, note, operator), datetime.now(UTC)
+    with publish_on_change(logbook):
+        alarms, now = acknowledge_alarms(logbook, alarm, until, note, operator), datetime.now(UTC)
         texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
         closing = "the light stays as it is: tap tests close an alarm, or a new baseline after a repair"
-        emit({"acknowledged": [known.row(now) for known in alarms]}, as_json, *texts, closing)
+        emit({"acknowledged": [known.to_row(now) for known in alarms]}, as_json, *texts, closing)

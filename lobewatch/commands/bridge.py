@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, notes, results
 
 
@@ -16,7 +16,9 @@ def bridge(
     driver: Annotated[str, typer.Argument(help="Name of the driver, as in [daq] of machine.toml.")],
     machine: Annotated[
         Path | None,
-        typer.Argument(parser=named_folder, help="Machine folder whose [daq] sets the device up: port, sensors, rate."),
+        typer.Argument(
+            parser=to_folder_path, help="Machine folder whose [daq] sets the device up: port, sensors, rate."
+        ),
     ] = None,
     port: Annotated[str, typer.Option(help="Port of the device; that of [daq] where not given.")] = "",
     listen: Annotated[
@@ -38,29 +40,29 @@ def bridge(
     from acquisition import DataError, find_driver
     from acquisition.taps import TapsBridge
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.machine.settings.daq_tables import Daq
-    from lobewatch.tap.plug import Plug
+    from lobewatch.machine.settings.setup_tables import DaqTable
+    from lobewatch.tap.device_connection import DeviceOpener
 
     folder, kind = None if machine is None else MachineFolder(machine), find_driver(driver)
-    if folder is None and kind.sensors is None:
+    if folder is None and kind.sensor_data is None:
         raise DataError(
             f"{kind.title} does not know its sensors: give the machine folder whose [[daq.channel]] names them"
         )
-    daq = Daq(driver=driver) if folder is None else folder.machine.daq
+    daq = DaqTable(driver=driver) if folder is None else folder.machine.daq
     if folder is not None and daq.driver != driver:
         raise DataError(f'{folder.toml}: driver = "{daq.driver}", not "{driver}"; give the same one')
     port = port or daq.port
     if not port:
         raise ValueError("no port: give --port, or a machine folder with port in [daq]")
-    server = TapsBridge(Plug(daq, port).open, _tell, address=listen, number=tcp_port)
+    server = TapsBridge(DeviceOpener(daq, port).open, _print_note, address=listen, number=tcp_port)
     identity = server.device.identity
     results.print(json.dumps({"port": server.port}) if as_json else f"port {server.port}", markup=False)
     results.file.flush()
-    _tell(
+    _print_note(
         f"{identity.model} on {port}, {server.device.sample_rate:g} Hz; tap with --port {server.port} (Ctrl-C ends it)"
     )
     server.run()
 
 
-def _tell(text: str) -> None:
+def _print_note(text: str) -> None:
     notes.print(text, markup=False)

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def calibrate(
     machine: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle] in its machine.toml.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
     ],
     frequency: Annotated[
         list[float] | None, typer.Option(help="Measured natural frequency (Hz); may be repeated.")
@@ -51,14 +51,14 @@ def calibrate(
     """
     if tool:
         given = {"--frequency": frequency, "--frequency-std": frequency_std, "--group": group}
-        _refuse_beside_tools({**given, "--damping-ratio": damping_ratio})
-        _from_tools(machine, tool, direction, mode or [], as_json=as_json)
+        _reject_with_tools({**given, "--damping-ratio": damping_ratio})
+        _calibrate_from_tools(machine, tool, direction, mode or [], as_json=as_json)
         return
     if not frequency or direction is not None:
         raise ValueError("give the measured --frequency, or two --tool or more, with a --direction where it matters")
     from lobewatch.machine import MachineFolder
-    from lobewatch.measuring import calibrate_model
-    from lobewatch.show.spindle.describe_model import model_calibration_json, model_calibration_texts
+    from lobewatch.measurement import calibrate_model
+    from lobewatch.show.models import model_calibration_json, model_calibration_texts
 
     _check_counts(len(frequency), frequency_std or [], mode or [])
     calibration = calibrate_model(
@@ -67,20 +67,22 @@ def calibrate(
     emit(model_calibration_json(calibration), as_json, *model_calibration_texts(calibration))
 
 
-def _refuse_beside_tools(given: Mapping[str, object]) -> None:
+def _reject_with_tools(given: Mapping[str, object]) -> None:
     named = [option for option, value in given.items() if value is not None and value != []]
     if named:
         raise ValueError(f"--tool and {', '.join(named)}: the tap tests say it; give one or the other")
 
 
-def _from_tools(machine: Path, tools: Sequence[str], direction: str | None, mode: Sequence[int], as_json: bool) -> None:
+def _calibrate_from_tools(
+    machine: Path, tools: Sequence[str], direction: str | None, mode: Sequence[int], as_json: bool
+) -> None:
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.joints.tools_calibration import calibrate_tools
-    from lobewatch.show.spindle.describe_tools import tools_json, tools_texts
+    from lobewatch.logbook.joint_calibration import calibrate_joints
+    from lobewatch.show.models import tools_json, tools_texts
 
-    calibration = calibrate_tools(Logbook.open(machine), tools, direction, mode)
+    calibration = calibrate_joints(Logbook.open(machine), tools, direction, mode)
     emit(tools_json(calibration), as_json, *tools_texts(calibration))
-    raise typer.Exit(int(calibration.fit.misfits))
+    raise typer.Exit(int(calibration.fit.has_misfit))
 
 
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:

@@ -8,16 +8,16 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.number_option import number
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.commands.shared_options import number
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
-PATIENCE = 5.0
+PROGRESS_DELAY = 5.0
 """Time after which a person is told how far it is (s)."""
 
 
 def check(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
     program: Annotated[
         list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
     ] = None,
@@ -53,12 +53,18 @@ def check(
       lobewatch check trial --speed 8000 --depth 2 --material 42CrMo4
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.chosen_verdicts import chosen_verdicts
+    from lobewatch.logbook.requested_cuts import evaluate_requested
     from lobewatch.machine import MachineFolder
-    from lobewatch.machine.additions.accept_settings import accept_settings
-    from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts, summary
-    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines
-    from lobewatch.show.programs.describe_verdicts import is_safe
+    from lobewatch.machine.folder_updates import accept_settings
+    from lobewatch.show.programs.advice import (
+        ProgramAdvice,
+        advise_program,
+        check_json,
+        check_summary_text,
+        check_texts,
+    )
+    from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines
+    from lobewatch.show.programs.verdicts import is_safe
 
     said = {
         "speed_rpm": speed,
@@ -74,10 +80,10 @@ def check(
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
-    verdicts, recommendations = chosen_verdicts(logbook, program or (), said)
+    verdicts, recommendations = evaluate_requested(logbook, program or (), said)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
     for verdict in verdicts:
-        if not slow and monotonic() - begin > PATIENCE:
+        if not slow and monotonic() - begin > PROGRESS_DELAY:
             notes.print(f"{len(programs)} of {len(verdicts)} programs are checked; the others take a while too")
             slow = True
         programs.append(advise_program(logbook, verdict))
@@ -88,7 +94,7 @@ def check(
         as_json,
         *(check_texts(programs, remarks, logbook.machine) if programs else ()),
         *(line for answer in recommendations for line in recommendation_lines(answer)),
-        *([summary(programs, len(recommendations))] if programs else ()),
+        *([check_summary_text(programs, len(recommendations))] if programs else ()),
     )
     if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
         raise typer.Exit(1)

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import FileOptions, takes_file_options
+from lobewatch.commands.shared_options import FileOptions, add_file_options
 from lobewatch.show.terminal.output import Json, emit
 
 
-@takes_file_options()
+@add_file_options()
 def convert(
     file: Annotated[Path, typer.Argument(help="Recorded hits or an FRF, as for lobewatch modes.")],
     out: Annotated[Path, typer.Argument(help="What to write: .uff (.unv), .csv, .mat, or .json (SEP005, hits only).")],
@@ -35,15 +35,15 @@ def convert(
       lobewatch convert h.mat h.csv --unit g/N --response 2
     """
     from acquisition import convert as write
-    from lobewatch.show.spindle.describe_modes import fact_lines
+    from lobewatch.show.modes import fact_lines
 
     written = write(file, out, file_options.description(date=date, direction=direction), hits=hits)
     payload = {
         "file": str(written.path),
         "format": written.title,
-        "holds": written.what,
+        "holds": written.content,
         "precision": written.precision,
         "facts": [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in written.recording.facts],
     }
-    summary = f"{written.path}: {written.title}, {written.what}, {written.precision}"
+    summary = f"{written.path}: {written.title}, {written.content}, {written.precision}"
     emit(payload, as_json, summary, *fact_lines(written.recording.facts))

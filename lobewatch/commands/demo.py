@@ -10,7 +10,7 @@ import typer
 
 from lobewatch.show.terminal.output import Json, emit, notes
 
-StoryName = Literal["steady", "step", "accelerating", "replaced", "none"]
+WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 
 
 def demo(
@@ -20,7 +20,7 @@ def demo(
     ] = 24,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1,
     scatter: Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")] = 0.1,
-    story: Annotated[StoryName, typer.Option(help="What befalls the bearings.")] = "steady",
+    story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings.")] = "steady",
     bad_clampings: Annotated[float, typer.Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
     temperature: Annotated[
         float | None, typer.Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
@@ -44,31 +44,29 @@ def demo(
 
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder, make_machine_folder
-    from lobewatch.notify.telling import telling
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.demo import demo_json, demo_texts
     from lobewatch.show.report.report import write_report
-    from lobewatch.show.trends.describe_demo import demo_json, demo_texts
-    from lobewatch.tap.stories.demo import age_spindle, compare_with_truth
-    from lobewatch.tap.stories.level_forecast import forecast_levels
-    from lobewatch.tap.stories.mounting import Mounting
-    from lobewatch.tap.stories.story import Story, Wear
+    from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
+    from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario
 
-    mounting = Mounting(scatter / 100, bad_clampings / 100, temperature)
+    mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
     mounting.check()
-    path = out or _free_name()
+    path = out or _find_free_name()
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
-        tests = age_spindle(folder, taps, seed, mounting.scatter, Story(story), mounting, tcp=tcp)
+        tests = age_spindle(folder, taps, seed, mounting.scatter, WearScenario(story), mounting, tcp=tcp)
         taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
         progress.add_task("history", total=None)
         logbook = Logbook(folder)
         compared = compare_with_truth(logbook, taken)
-        forecasts = forecast_levels(logbook, Wear.of(folder, taps, Story(story)))
-        with telling(logbook):
+        forecasts = forecast_levels(logbook, SpindleWear.of(folder, taps, WearScenario(story)))
+        with publish_on_change(logbook):
             report = write_report(logbook)
     emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))
 
 
-def _free_name() -> Path:
+def _find_free_name() -> Path:
     names = itertools.chain(["lobewatch-demo"], (f"lobewatch-demo-{i}" for i in itertools.count(2)))
     return next(path for path in map(Path, names) if not path.exists())

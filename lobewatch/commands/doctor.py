@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def doctor(
-    machine: Annotated[Path | None, typer.Argument(parser=named_folder, help="Machine folder.")] = None,
+    machine: Annotated[Path | None, typer.Argument(parser=to_folder_path, help="Machine folder.")] = None,
     as_json: Json = False,
 ) -> None:
     """What of this computer stands in the way of a tap test: ports, rights, clock, disk, packages, browser.
@@ -25,10 +25,10 @@ def doctor(
       lobewatch doctor mill-3 --json
     """
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.sensors import examine_computer
-    from lobewatch.show.devices.describe_findings import findings_json, findings_texts
+    from lobewatch.sensors import check_computer
+    from lobewatch.show.sensors import findings_json, findings_texts
 
-    findings = examine_computer(MachineFolder(machine) if machine else None)
+    findings = check_computer(MachineFolder(machine) if machine else None)
     emit(findings_json(findings), as_json, *findings_texts(findings))
     if any(finding.state == "hinders" for finding in findings):
         raise typer.Exit(1)

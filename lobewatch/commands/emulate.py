@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal, NamedTuple
 import typer
 
 import acquisition
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, notes, results
 
-StoryName = Literal["steady", "step", "accelerating", "replaced", "none"]
+WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
-MONTHS = 24
+SCENARIO_MONTHS = 24
 """Length of a story (months)."""
 
 
@@ -30,7 +30,7 @@ class EmulateOptions:
 
     machine: Annotated[
         Path,
-        typer.Argument(parser=named_folder, help="Machine folder with a spindle in its machine.toml: what is hit."),
+        typer.Argument(parser=to_folder_path, help="Machine folder with a spindle in its machine.toml: what is hit."),
     ]
     """Machine folder."""
     tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
@@ -39,7 +39,9 @@ class EmulateOptions:
     """Whether it runs ahead of real time; not every driver can."""
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1
     """Seed of the random numbers."""
-    story: Annotated[StoryName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = "none"
+    story: Annotated[WearScenarioName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = (
+        "none"
+    )
     """Story of the bearings."""
     month: Annotated[int, typer.Option("--month", min=0, max=60, help="Of the story, in which it is tapped.")] = 0
     """Month of the story."""
@@ -85,29 +87,29 @@ class Emulation(NamedTuple):
     """The same figures for people."""
     command: str
     """Command that a person gives next."""
-    words: str = ""
+    command_options: str = ""
     """Options of that command beside its port."""
 
 
 def _add_commands() -> None:
-    from acquisition.devices import driver_names, find_driver
+    from acquisition.devices import find_driver, list_driver_names
     from acquisition.errors import DataError
 
-    for name in driver_names():
+    for name in list_driver_names():
         try:
             driver = find_driver(name)
         except DataError as error:  # said here, and again by the command
-            emulate.command(name, help=f"{error}.")(_command(name, takes_fast=False))
+            emulate.command(name, help=f"{error}.")(_make_command(name, takes_fast=False))
             continue
         if driver.emulate is not None:
-            emulate.command(name, help=_help(name, driver.title))(_command(name, driver.emulates_fast))
+            emulate.command(name, help=_format_help(name, driver.title))(_make_command(name, driver.emulates_fast))
 
 
-def _command(name: str, takes_fast: bool) -> Callable[..., None]:
+def _make_command(name: str, takes_fast: bool) -> Callable[..., None]:
     """The command that emulates a driver; takes_fast: whether --fast is among its options."""
 
     def run(**values: Any) -> None:
-        _serve(name, EmulateOptions(**values))
+        _run_emulator(name, EmulateOptions(**values))
 
     options = inspect.signature(EmulateOptions, eval_str=True).parameters.values()
     run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -116,7 +118,7 @@ def _command(name: str, takes_fast: bool) -> Callable[..., None]:
     return run
 
 
-def _help(name: str, title: str) -> str:
+def _format_help(name: str, title: str) -> str:
     return (
         f"{title[:1].upper()}{title[1:]} with somebody who taps twice a second; Ctrl-C ends it.\n\nExamples:\n\n"
         f"  lobewatch emulate {name} trial\n  lobewatch tap trial --port /dev/pts/3  # in another window\n"
@@ -124,29 +126,32 @@ def _help(name: str, title: str) -> str:
     )
 
 
-def _serve(name: str, options: EmulateOptions) -> None:
+def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Somebody taps, or cuts where a program was chosen; until Ctrl-C."""
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.tap.stories.mounting import Mounting, mounted_spindle
-    from lobewatch.tap.stories.story import Story
+    from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 
     folder = MachineFolder(options.machine)
-    mounting = Mounting(options.scatter / 100, options.bad / 100, options.warm)
+    mounting = MountingVariation(options.scatter / 100, options.bad / 100, options.warm)
     mounting.check()
-    story = Story(options.story)
-    as_built = story is Story.NONE and not any(mounting)
+    story = WearScenario(options.story)
+    as_built = story is WearScenario.NONE and not any(mounting)
     shared = {
         "folder": folder,
         "seed": options.seed,
         "realtime": not options.fast,
         "tcp": options.tcp,
-        "spindle": None if as_built else mounted_spindle(folder, story, MONTHS, options.month, mounting, options.seed),
+        "spindle": None
+        if as_built
+        else build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, options.seed),
     }
-    emulation = _tapped(name, options, shared) if options.cut is None else _cut(name, options, options.cut, shared)
-    _until_interrupted(emulation, options)
+    emulation = (
+        _emulate_tap(name, options, shared) if options.cut is None else _emulate_cut(name, options, options.cut, shared)
+    )
+    _serve_until_interrupted(emulation, options)
 
 
-def _tapped(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
     """The spindle tapped; shared: arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
@@ -161,15 +166,15 @@ def _tapped(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Em
     )
 
 
-def _cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """The spindle cutting a program; shared: arguments that a tapped one takes too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
     from acquisition.devices import find_driver
-    from lobewatch.machine.settings.cut_setting import cut_setting
+    from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 
-    setting = cut_setting(shared["folder"].machine, program, options.speed, options.depth)
+    setting = find_cut_setting(shared["folder"].machine, program, options.speed, options.depth)
     emulated = emulate_cut(driver=find_driver(name), setting=setting, **shared)
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
     truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
@@ -179,7 +184,7 @@ def _cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, 
     return Emulation(emulated.device, truth, text, "listen", words)
 
 
-def _until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
+def _serve_until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
     """Say where the device is and what is behind it, and serve until Ctrl-C."""
     with emulation.device as device:
         line = json.dumps({"port": device.port, **emulation.truth}) if options.as_json else f"port {device.port}"
@@ -187,7 +192,7 @@ def _until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
         results.file.flush()
         notes.print(f"the truth: {emulation.truth_text}", markup=False)
         command = f"lobewatch {emulation.command} {shlex.quote(str(options.machine))} --port {device.port}"
-        next_step = f"{emulation.command} with: {command}{emulation.words}"
+        next_step = f"{emulation.command} with: {command}{emulation.command_options}"
         notes.print(f"{next_step}   (Ctrl-C ends the emulator)", markup=False)
         device.wait()
 

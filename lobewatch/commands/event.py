@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def event(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     text: Annotated[str, typer.Argument(help="What was done; with --withdraw not needed.")] = "",
     date: Annotated[datetime | None, typer.Option(help="When it was done, local time; now where not given.")] = None,
     new_baseline: Annotated[
@@ -34,14 +34,14 @@ def event(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
-    from lobewatch.machine.additions.correct import add_event, withdraw_event
-    from lobewatch.notify.telling import telling
-    from lobewatch.show.history.describe_history import event_json, event_text
+    from lobewatch.machine.folder_updates import add_event, withdraw_event
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.history import event_json, event_text
 
     folder = MachineFolder(machine)
     if withdraw and (text or date or new_baseline):
         raise ValueError(f"--withdraw {withdraw}: takes neither TEXT nor --date nor --new-baseline; leave them out")
-    with telling(Logbook(folder)):
+    with publish_on_change(Logbook(folder)):
         if withdraw:
             gone = withdraw_event(folder, withdraw)
             emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def exclude(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     tap: Annotated[
         str,
         typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1."),
@@ -29,11 +29,11 @@ def exclude(
       lobewatch exclude mill-3 20261102T0914 --reason "wrong tool in the spindle"
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.machine.additions.correct import exclude as take_out
-    from lobewatch.notify.telling import telling
+    from lobewatch.machine.folder_updates import exclude_entry as take_out
+    from lobewatch.notify.publish_status import publish_on_change
 
     logbook = Logbook.open(machine)
-    with telling(logbook):
+    with publish_on_change(logbook):
         entry = take_out(logbook.folder, tap, reason)
         payload = {"excluded": entry.id, "reason": reason}
         emit(payload, as_json, f"excluded {entry.id}", f"back with: lobewatch include {machine} {entry.id}")

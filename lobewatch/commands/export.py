@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def export(
     folder: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
     ],
     file: Annotated[
         Path | None, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
@@ -42,16 +42,15 @@ def export(
       lobewatch export mills --append fleet
       lobewatch export mills --to postgresql://mills@db.example/plant
     """
-    from lobewatch.plant.plant import find_machines
-    from lobewatch.plant.tap_table import all_tables
-    from lobewatch.show.plant.table_files import write_table
-    from lobewatch.show.plant.table_months import append_months
-    from lobewatch.show.plant.table_postgres import upsert_table
+    from lobewatch.fleet.fleet import find_machines
+    from lobewatch.fleet.tap_table import read_all_tables
+    from lobewatch.show.fleet.export_files import append_months, write_table
+    from lobewatch.show.fleet.export_postgres import upsert_table
 
     if [file, append, to].count(None) != 2:
         raise ValueError("give one of FILE, --append FOLDER and --to ADDRESS")
     machines, damaged = find_machines(folder), dict[str, str]()
-    tables = all_tables(machines, damaged)
+    tables = read_all_tables(machines, damaged)
     if file is not None:
         outcome = write_table(tables, file)
     elif append is not None:

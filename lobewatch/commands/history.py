@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks, results
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 
 def history(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
     hdf5: Annotated[
         Path | None, typer.Option(help="Write all values and the diagrams of every test to this file (HDF5).")
@@ -30,19 +30,19 @@ def history(
       lobewatch history mill-3 --hdf5 history.h5
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.show.history.describe_history import history_csv, history_json, history_lines
+    from lobewatch.show.history import history_csv, history_json, history_lines
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
     logbook = Logbook.open(machine)
     if hdf5 is not None:
         from lobes import write_history
-        from lobewatch.history.history_columns import to_columns
+        from lobewatch.history.export_columns import make_export_columns
 
-        write_history(hdf5, to_columns(logbook.history, logbook.machine))
+        write_history(hdf5, make_export_columns(logbook.history, logbook.machine))
     if as_csv:
         results.out(history_csv(logbook), end="", highlight=False)
     else:
         emit(history_json(logbook), as_json, *history_lines(logbook))
     kept = [remark for row in logbook.history.kept for remark in row.remarks if remark.code == "row-kept"]
-    note_remarks([*logbook.remarks, *kept])
+    print_remarks([*logbook.remarks, *kept])

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def include(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     tap: Annotated[
         str,
         typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1."),
@@ -26,10 +26,10 @@ def include(
       lobewatch include mill-3 20261102T0914
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.machine.additions.correct import include as take_back
-    from lobewatch.notify.telling import telling
+    from lobewatch.machine.folder_updates import include_entry as take_back
+    from lobewatch.notify.publish_status import publish_on_change
 
     logbook = Logbook.open(machine)
-    with telling(logbook):
+    with publish_on_change(logbook):
         entry = take_back(logbook.folder, tap)
         emit({"included": entry.id}, as_json, f"included {entry.id}: it counts again")

@@ -10,35 +10,42 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
-    from lobewatch.machine.set_up.draft import Draft
+    from lobewatch.machine.setup_questions.draft import MachineDraft
 
-Answer = str | None
+OptionalAnswer = str | None
 
 
 def init(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="The folder to make.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="The folder to make.")],
     example: Annotated[bool, typer.Option("--example", help="With the surrogate spindle and three programs.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
     edit: Annotated[str, typer.Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",
-    name: Annotated[Answer, typer.Option(help="Name of the machine.")] = None,
-    speeds: Annotated[Answer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
-    drive: Annotated[Answer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
+    name: Annotated[OptionalAnswer, typer.Option(help="Name of the machine.")] = None,
+    speeds: Annotated[OptionalAnswer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
+    drive: Annotated[OptionalAnswer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
     daq: Annotated[
-        Answer, typer.Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
+        OptionalAnswer, typer.Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
     ] = None,
-    hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')] = None,
-    accelerometer: Annotated[Answer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
-    fixing: Annotated[Answer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
+    hammer: Annotated[
+        OptionalAnswer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')
+    ] = None,
+    accelerometer: Annotated[OptionalAnswer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
+    fixing: Annotated[
+        OptionalAnswer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')
+    ] = None,
     tool: Annotated[
-        Answer, typer.Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".')
+        OptionalAnswer,
+        typer.Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".'),
     ] = None,
-    material: Annotated[Answer, typer.Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')] = None,
+    material: Annotated[
+        OptionalAnswer, typer.Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')
+    ] = None,
     program: Annotated[
-        Answer, typer.Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')
+        OptionalAnswer, typer.Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -53,7 +60,7 @@ def init(
       lobewatch init mill-3 --yes --daq COM3 --tool "4 20 30 80" --material 42CrMo4 --program "slot: 8000 2 20"
       lobewatch init trial --example
     """
-    from lobewatch.machine.new_folder import new_machine_text, write_machine
+    from lobewatch.machine.folder_files import make_machine_text, write_machine_file
 
     asked = {"name": name, "speeds": speeds, "drive": drive, "daq": daq, "hammer": hammer, "fixing": fixing}
     asked |= {"accelerometer": accelerometer, "tool": tool, "material": material, "program": program}
@@ -65,15 +72,15 @@ def init(
 
         text = MachineFolder(machine).toml_text
     else:
-        text = new_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
+        text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
     if asks or answers or edit:
-        draft = _set_up(text, answers, edit, asks)
+        draft = _answer_settings(text, answers, edit, asks)
         text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
     else:
         change = "change what is not as in your shop" if example else "fill it in"
         next_step = f"{change}, then tap with: {next_step} --port PORT"
-    write_machine(machine, text)
+    write_machine_file(machine, text)
     emit(
         {"machine": str(machine), "machine_toml": str(toml)},
         as_json,
@@ -82,14 +89,14 @@ def init(
     )
 
 
-def _set_up(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> Draft:
+def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
     """Draft with the answers of options and of whoever sits at the terminal."""
-    from lobewatch.machine.set_up.draft import Draft
-    from lobewatch.machine.set_up.questions import QUESTIONS, find_question
-    from lobewatch.show.terminal.set_up_dialogue import answer_questions, ask_questions
+    from lobewatch.machine.setup_questions.draft import MachineDraft
+    from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
+    from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions
 
-    draft = Draft(text, {})
-    chosen = (find_question(edit),) if edit else QUESTIONS
+    draft = MachineDraft(text, {})
+    chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
     if edit and not asks and edit not in answers:
         raise ValueError(f"--edit {edit}: nobody is at the terminal to ask; give the answer with --{edit}")
     if not asks:

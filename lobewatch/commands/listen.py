@@ -9,15 +9,14 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import FileOptions, takes_file_options
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks, notes
-from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
+from lobewatch.commands.shared_options import FileOptions, add_file_options
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
 
 
-@takes_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
+@add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
     cut: Annotated[str, typer.Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
     speed: Annotated[
@@ -65,12 +64,18 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.cut_comparison import keep_listened
-    from lobewatch.machine.settings.cut_setting import choose_cut
-    from lobewatch.notify.telling import telling
-    from lobewatch.show.cuts.describe_listened import cuts_json, cuts_texts
-    from lobewatch.show.history.describe_cut import kept_cut_remarks
-    from lobewatch.tap.listening.hear_cut import checked_sensor, checked_tacho, cut_pictures, hear_cut, judge_live
+    from lobewatch.logbook.cut_comparison import store_recorded_cuts
+    from lobewatch.machine.settings.requested_cut import choose_cut
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+    from lobewatch.show.history import saved_cut_remarks
+    from lobewatch.tap.cut_recording import (
+        acquire_cut,
+        check_sensor_kind,
+        check_tacho_options,
+        evaluate_live_cut,
+        publish_cut_states,
+    )
 
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
@@ -78,28 +83,32 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    description = file_options.description(sensor=checked_sensor(sensor, file), **checked_tacho(tacho, pulses, file))
-    with contextlib.ExitStack() as screens, cut_pictures(logbook, setting) as pictures:
+    description = file_options.description(
+        sensor=check_sensor_kind(sensor, file), **check_tacho_options(tacho, pulses, file)
+    )
+    with contextlib.ExitStack() as screens, publish_cut_states(logbook, setting) as pictures:
         if screen:
             from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen
 
             server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
-            screens.enter_context(serving(server))
-        signal = hear_cut(logbook.folder, setting, file, port, seconds, description, notes.print, pictures.show)
-        comparisons = judge_live(logbook, setting, signal, pictures)
+            screens.enter_context(serve_screen(server))
+        signal = acquire_cut(logbook.folder, setting, file, port, seconds, description, notes.print, pictures.show)
+        comparisons = evaluate_live_cut(logbook, setting, signal, pictures)
         if out is not None:
-            from lobewatch.show.cuts.figure_listened import save_listened  # brings matplotlib
+            from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # brings matplotlib
 
-            save_listened(comparisons, out)
+            save_cut_spectrum(comparisons, out)
         if dry_run:
-            emit(cuts_json(comparisons), as_json, *cuts_texts(comparisons))
+            emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
             return
-        with telling(logbook):
-            earlier, kept = logbook.cuts, keep_listened(logbook.folder, comparisons, signal, date)
+        with publish_on_change(logbook):
+            earlier, kept = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
             pictures.show(saved=kept[-1].id)
-            remarks = [kept_cut_remarks(logbook, cut, [*earlier, *kept[:number]]) for number, cut in enumerate(kept)]
+            remarks = [saved_cut_remarks(logbook, cut, [*earlier, *kept[:number]]) for number, cut in enumerate(kept)]
             stored_as = [
                 {"id": cut.id, "remarks": [r.code for r in said]} for cut, said in zip(kept, remarks, strict=True)
             ]
-            emit(cuts_json(comparisons, stored_as), as_json, *cuts_texts(comparisons, [cut.id for cut in kept]))
-    note_remarks(remark for said in remarks for remark in said)
+            emit(
+                recording_json(comparisons, stored_as), as_json, *recording_texts(comparisons, [cut.id for cut in kept])
+            )
+    print_remarks(remark for said in remarks for remark in said)

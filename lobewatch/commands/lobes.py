@@ -7,20 +7,20 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
-Source = Literal["modes", "frf"]
+DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
 def lobes(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
     cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
     tool: Annotated[
         str | None, typer.Option(help="If not given: that of the program, else that was tapped last.")
     ] = None,
-    source: Annotated[Source, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",
+    source: Annotated[DynamicsName, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",
     method: Annotated[MethodName, typer.Option(help="How the limits of the chart are found.")] = "zero-order",
     figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
     radial: Annotated[Path | None, typer.Option(help="Draw the limit over speed and radial depth.")] = None,
@@ -39,25 +39,25 @@ def lobes(
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
     """
     from lobewatch.logbook import Logbook, compare_lobes
-    from lobewatch.logbook.lobe_comparison import speeds_alone
-    from lobewatch.show.cuts.describe_heard import speeds_json, speeds_texts
-    from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
-    from lobewatch.tool import Dynamics, Method
+    from lobewatch.logbook.chart_data import chart_speed_pockets
+    from lobewatch.show.cuts.suggested_cuts import speed_pockets_json, speed_pockets_texts
+    from lobewatch.show.programs.lobes import comparison_json, comparison_texts
+    from lobewatch.tool import DynamicsSource, LobeMethod
 
     logbook = Logbook.open(machine)
     drawn = figure or radial or waterfall
-    alone = None if drawn else speeds_alone(logbook, tool, cut)
+    alone = None if drawn else chart_speed_pockets(logbook, tool, cut)
     if alone is not None:
         assembly, pockets = alone
         remarks = [*logbook.remarks, *assembly.remarks]
-        emit(speeds_json(cut, pockets, remarks), as_json, *speeds_texts(cut, pockets, remarks))
+        emit(speed_pockets_json(cut, pockets, remarks), as_json, *speed_pockets_texts(cut, pockets, remarks))
         return
     if notes.is_terminal:
         notes.print("looking for speeds and depths that are safe; this takes some seconds")
-    comparison = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
+    comparison = compare_lobes(logbook, tool, cut, DynamicsSource(source), LobeMethod(method))
     remarks = [*logbook.remarks, *comparison.remarks]
     if drawn:
-        from lobewatch.show.figures.lobe_pictures import save_pictures  # brings matplotlib
+        from lobewatch.show.figures.lobe_figures import save_lobe_figures  # brings matplotlib
 
-        remarks += save_pictures(logbook, comparison, Method(method), figure, radial, waterfall)
+        remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))

@@ -26,7 +26,7 @@ def materials(
       lobewatch materials S --json
     """
     from lobes import find_materials
-    from lobewatch.show.programs.describe_materials import material_json, material_texts
+    from lobewatch.show.programs.materials import material_json, material_texts
 
     known = find_materials(word)
     emit({"materials": [material_json(one) for one in known]}, as_json, *material_texts(known))

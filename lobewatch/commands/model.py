@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def model(
     machine: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle] in its machine.toml.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
     ],
     tool: Annotated[str | None, typer.Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
@@ -30,21 +30,21 @@ def model(
       lobewatch model trial --tool "end mill 16" --modes 6 --json
     """
     from acquisition import DataError
-    from lobewatch.logbook import Logbook, model_picture
-    from lobewatch.machine.settings.setting_questions import guessed_bearings
-    from lobewatch.measuring import model_state, model_summary
-    from lobewatch.show.spindle.describe_model import model_json, model_texts
+    from lobewatch.logbook import Logbook, collect_model_figure
+    from lobewatch.machine.settings.setting_questions import find_template_bearings
+    from lobewatch.measurement import build_model_state, summarize_model
+    from lobewatch.show.models import model_json, model_texts
     from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine)
-    calibrated, guessed = logbook.calibrated, guessed_bearings(logbook.machine)
+    calibrated, guessed = logbook.calibrated_measurement, find_template_bearings(logbook.machine)
     if calibrated is None and guessed is not None:
         raise DataError(f"{guessed.remark}")
-    state = model_state(logbook.machine, calibrated, tool)
+    state = build_model_state(logbook.machine, calibrated, tool)
     if figure is not None:
-        from lobewatch.show.figures.model_figures import model_figure
-        from lobewatch.show.figures.style import save_figure
+        from lobewatch.show.figures.drawing import save_figure
+        from lobewatch.show.figures.spindle_figures import plot_model
 
-        save_figure(model_figure(model_picture(logbook, state, modes)), figure)
-    summary = model_summary(state, modes)
+        save_figure(plot_model(collect_model_figure(logbook, state, modes)), figure)
+    summary = summarize_model(state, modes)
     emit(model_json(summary), as_json, *model_texts(summary), *remark_lines(logbook.remarks))

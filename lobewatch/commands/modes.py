@@ -9,11 +9,18 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.file_options import Add, Drop, FileOptions, Fix, refuse_file_options, takes_file_options
+from lobewatch.commands.shared_options import (
+    AddedModes,
+    DroppedModes,
+    FileOptions,
+    FixedModes,
+    add_file_options,
+    reject_file_options,
+)
 from lobewatch.show.terminal.output import Json, emit
 
 
-@takes_file_options(without=["averages"])
+@add_file_options(without=["averages"])
 def modes(
     file: Annotated[
         Path,
@@ -64,9 +71,9 @@ def modes(
             "doubt."
         ),
     ] = None,
-    add: Add = None,
-    drop: Drop = None,
-    fix: Fix = None,
+    add: AddedModes = None,
+    drop: DroppedModes = None,
+    fix: FixedModes = None,
     by_fit: Annotated[
         bool, typer.Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
     ] = False,
@@ -96,24 +103,24 @@ def modes(
       lobewatch modes mill-3 20261102T0914 --drop 412
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.chosen_modes import choice_of, modes_of_tap
-    from lobewatch.machine.settings.sensor_loading import SensorLoading
-    from lobewatch.measuring import Window, found_beside, modes_of_file, places_beside
-    from lobewatch.notify.telling import telling
-    from lobewatch.show.spindle.describe_modes import file_modes_json, file_modes_texts
-    from modal import parse_edits
+    from lobewatch.logbook.operator_entries import read_tap_modes, resolve_edits
+    from lobewatch.machine.settings.setup_tables import SensorLoading
+    from lobewatch.measurement import Window, fit_file_modes, list_comparison_files, match_modes_across_files
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.modes import file_modes_json, file_modes_texts
+    from modal import parse_mode_edits
 
     if beside is not None and len(beside) == 1:
         raise ValueError(f"--beside {beside[0]}: one other tells nothing, its modes may be near by chance; name two")
-    edits = parse_edits(add, drop, fix)
-    taken_off = Window.said(window, window_start, hit_at)
+    edits = parse_mode_edits(add, drop, fix)
+    taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
-        refuse_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
-        logbook, choice = Logbook.open(file), choice_of(edits, by_fit)
-        measured = [modes_of_tap(logbook, name) for name in beside or ()]
-        with nullcontext() if choice is None else telling(logbook):
-            file_modes = modes_of_tap(logbook, tap, choice)
+        reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
+        logbook, choice = Logbook.open(file), resolve_edits(edits, by_fit)
+        measured = [read_tap_modes(logbook, name) for name in beside or ()]
+        with nullcontext() if choice is None else publish_on_change(logbook):
+            file_modes = read_tap_modes(logbook, tap, choice)
     elif by_fit or file.is_dir():
         text = "--by-fit takes back what is kept of a tap test" if by_fit else f"{file} is a folder"
         raise ValueError(f"{text}; name a tap test: lobewatch modes MACHINE TAP (lobewatch history lists them)")
@@ -121,15 +128,15 @@ def modes(
         said = file_options.description(averages=averages, without_force=hammer == "none")
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
-            modes_of_file, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
+            fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
         )
         file_modes = how(file, description=said, by_hand=edits)
-        measured = [how(path, description=known) for path, known in places_beside(beside or (), file, said)]
+        measured = [how(path, description=known) for path, known in list_comparison_files(beside or (), file, said)]
     if beside:
-        file_modes = found_beside(file_modes, beside, measured)
+        file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:
-        from lobewatch.show.figures.mode_figures import modes_figure
-        from lobewatch.show.figures.style import save_figure
+        from lobewatch.show.figures.drawing import save_figure
+        from lobewatch.show.figures.spindle_figures import plot_modes
 
-        save_figure(modes_figure(file_modes.extraction, file_modes.as_recorded, file.name), figure)
+        save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))

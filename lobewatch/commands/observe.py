@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
 def observe(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     program: Annotated[str, typer.Option(help='Cutting program that was cut, or "reference cut".')],
     speed: Annotated[
         float | None, typer.Option(help="Spindle speed, rpm; that of the program where not given.")
@@ -40,20 +40,22 @@ def observe(
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable --power 1.4
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.machine.additions.keep_cut import keep_cut
-    from lobewatch.machine.additions.observe_cut import contradicting_cuts, observe_cut
-    from lobewatch.machine.settings.cut_setting import cut_setting
-    from lobewatch.notify.telling import telling
-    from lobewatch.show.history.describe_cut import contradiction_remark, cut_json, cut_text, untapped_remarks
+    from lobewatch.machine.folder_updates import find_contradicting_cuts, make_observed_cut, store_cut
+    from lobewatch.machine.settings.requested_cut import find_cut_setting
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.history import contradiction_remark, test_cut_json, test_cut_text, untapped_remarks
 
     if stable == chatter:
         raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
     logbook = Logbook.open(machine)
-    setting = cut_setting(logbook.machine, program, speed, depth, power)
-    heard = observe_cut(setting, "stable" if stable else "chatter", frequency, date)
-    remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting_cuts(heard, logbook.cuts))]
-    with telling(logbook):
-        stored = keep_cut(logbook.folder, heard)
-        payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}
-        emit(payload, as_json, f"saved {cut_text(stored)}")
-    note_remarks(remarks)
+    setting = find_cut_setting(logbook.machine, program, speed, depth, power)
+    heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)
+    remarks = [
+        *untapped_remarks(logbook, heard),
+        *map(contradiction_remark, find_contradicting_cuts(heard, logbook.cuts)),
+    ]
+    with publish_on_change(logbook):
+        stored = store_cut(logbook.folder, heard)
+        payload = {"cut": test_cut_json(stored), "remarks": [remark.code for remark in remarks]}
+        emit(payload, as_json, f"saved {test_cut_text(stored)}")
+    print_remarks(remarks)

@@ -26,15 +26,15 @@ def paper(
       lobewatch paper
       lobewatch paper --out paper
     """
-    from lobewatch.commands.help_page import page_width
+    from lobewatch.commands.help_page import get_page_width
     from lobewatch.paper import study_paper
-    from lobewatch.show.paper.describe_paper import paper_json, paper_lines
+    from lobewatch.show.paper.paper_text import paper_json, paper_lines
 
     study = study_paper()
     page = None
     if out is not None:
-        from lobewatch.show.paper.paper_page import write_paper
+        from lobewatch.show.paper.paper_page import write_paper_page
 
-        page = write_paper(study, out)
+        page = write_paper_page(study, out)
     written = [f"page: {page}"] if page else []
-    emit(paper_json(study, page), as_json, *paper_lines(study, page_width()), *written)
+    emit(paper_json(study, page), as_json, *paper_lines(study, get_page_width()), *written)

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def pitch(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
     speed: Annotated[float, typer.Option(help="Spindle speed, rpm: pitches are for one speed.")],
     tool: Annotated[str | None, typer.Option(help="Tool whose teeth are to be spaced.")] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth to be judged too, mm.")] = None,
@@ -35,8 +35,8 @@ def pitch(
       lobewatch pitch trial --speed 9000 --radial 5 --material 42CrMo4 --json
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.asked_pitch import asked_pitch
-    from lobewatch.show.programs.describe_pitches import pitches_json, pitches_texts
+    from lobewatch.logbook.requested_cuts import propose_requested_pitch
+    from lobewatch.show.programs.recommendations import pitches_json, pitches_texts
 
     said = {
         "speed_rpm": speed,
@@ -51,6 +51,6 @@ def pitch(
     logbook = Logbook.open(machine)
     if notes.is_terminal:
         notes.print("judging pitches over all that is not known; this takes some seconds")
-    proposal = asked_pitch(logbook, said)
+    proposal = propose_requested_pitch(logbook, said)
     remarks = logbook.remarks
     emit(pitches_json(proposal, remarks, depth), as_json, *pitches_texts(proposal, remarks, depth))

@@ -22,8 +22,8 @@ def ports(
       lobewatch ports
       lobewatch ports --port /dev/pts/3
     """
-    from acquisition.devices import survey_ports
-    from lobewatch.show.devices.describe_ports import ports_json, ports_texts
+    from acquisition.devices import scan_ports
+    from lobewatch.show.ports import ports_json, ports_texts
 
-    survey = survey_ports(port)
+    survey = scan_ports(port)
     emit(ports_json(survey), as_json, *ports_texts(survey))

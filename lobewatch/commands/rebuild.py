@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 if TYPE_CHECKING:
-    from lobewatch.measuring.workers.share_work import Workers
-    from lobewatch.show.replays.describe_rebuild import MachineRebuild
+    from lobewatch.measurement.share_work import Workers
+    from lobewatch.show.replays import MachineRebuild
 
 
 def rebuild(
     machine: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
     ],
     jobs: Annotated[
         int, typer.Option(min=1, max=64, help="Processes that work at once; what they find is the same.")
@@ -39,9 +39,9 @@ def rebuild(
       lobewatch rebuild mills --scheduler tls://10.0.0.5:8786
     """
     from acquisition import DataError
-    from acquisition.errors import failure_text
-    from lobewatch.measuring.workers.share_work import Workers
-    from lobewatch.show.replays.describe_rebuild import (
+    from acquisition.errors import format_error
+    from lobewatch.measurement.share_work import Workers
+    from lobewatch.show.replays import (
         MachineRebuild,
         folder_rebuild_json,
         folder_rebuild_texts,
@@ -49,8 +49,8 @@ def rebuild(
         rebuild_texts,
     )
 
-    workers, folders = Workers(jobs, scheduler), _machines_in(machine)
-    note_remarks(workers.remarks)
+    workers, folders = Workers(jobs, scheduler), _find_machine_folders(machine)
+    print_remarks(workers.remarks)
     if not folders:
         outcome = _rebuild_machine(machine, workers)
         emit(rebuild_json(outcome), as_json, *rebuild_texts(outcome))
@@ -60,33 +60,32 @@ def rebuild(
         try:
             outcomes[folder.name] = _rebuild_machine(folder, workers)
         except Exception as error:  # noqa: BLE001 - whatever is wrong with it must cost only itself
-            refused.append(failure_text(error))
+            refused.append(format_error(error))
     emit(folder_rebuild_json(outcomes), as_json, *folder_rebuild_texts(outcomes, len(folders)))
     if refused:
         raise DataError("\n".join([f"{len(refused)} of {len(folders)} machines cannot be rebuilt", *refused]))
 
 
-def _machines_in(path: Path) -> list[Path]:
+def _find_machine_folders(path: Path) -> list[Path]:
     """The machine folders in a folder that is none itself."""
-    from lobewatch.machine.contents import tap_files
+    from lobewatch.machine.folder_contents import list_tap_files
 
-    if (path / "machine.toml").is_file() or tap_files(path):
+    if (path / "machine.toml").is_file() or list_tap_files(path):
         return []
-    return sorted(folder for folder in path.glob("*/") if (folder / "machine.toml").is_file() or tap_files(folder))
+    return sorted(folder for folder in path.glob("*/") if (folder / "machine.toml").is_file() or list_tap_files(folder))
 
 
 def _rebuild_machine(path: Path, workers: Workers) -> MachineRebuild:
     """Rebuild a machine, and tell whom it may concern."""
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.rebuild_history import rebuild_history
-    from lobewatch.machine.archive.rebuild import rebuild_files
-    from lobewatch.notify.telling import tell
-    from lobewatch.show.replays.describe_rebuild import MachineRebuild
-    from lobewatch.show.replays.progress import rebuild_progress
+    from lobewatch.machine.rebuild_files import rebuild_files
+    from lobewatch.notify.publish_status import publish_status
+    from lobewatch.show.replays import MachineRebuild, make_rebuild_progress
 
     repairs = rebuild_files(path)
     logbook = Logbook.open(path)
-    n_taps = rebuild_history(logbook, workers, rebuild_progress(path.name))
+    n_taps = rebuild_history(logbook, workers, make_rebuild_progress(path.name))
     is_saved = all(remark.code != "history-in-memory" for remark in logbook.remarks)
-    tell(logbook)
+    publish_status(logbook)
     return MachineRebuild(repairs, n_taps, is_saved, logbook.remarks)

@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.number_option import number
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.commands.shared_options import number
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def recommend(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
     tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
     material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
     radial: Annotated[
@@ -42,9 +42,9 @@ def recommend(
       lobewatch recommend trial --depth 1.5 --json
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.recommended import recommended
-    from lobewatch.machine.additions.save_program import refuse_taken, save_program
-    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines, saved_lines
+    from lobewatch.logbook.requested_cuts import recommend_requested
+    from lobewatch.machine.folder_updates import check_program_name, save_program
+    from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
     said = {
         "speed_rpm": speed,
@@ -59,8 +59,8 @@ def recommend(
     }
     logbook = Logbook.open(machine)
     if save is not None:
-        refuse_taken(logbook.machine, save)
-    answer = recommended(logbook, said, save)
+        check_program_name(logbook.machine, save)
+    answer = recommend_requested(logbook, said, save)
     if save is not None and answer.setting is not None:
         save_program(logbook.folder, answer.program)
     saved = save if answer.setting is not None else None

@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import Add, Drop, FileOptions, Fix, takes_file_options
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, note_remarks
+from lobewatch.commands.shared_options import AddedModes, DroppedModes, FileOptions, FixedModes, add_file_options
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, print_remarks
 
 
-@takes_file_options()
+@add_file_options()
 def replay(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     files: Annotated[
         list[Path], typer.Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')
     ],
@@ -49,9 +49,9 @@ def replay(
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
-    add: Add = None,
-    drop: Drop = None,
-    fix: Fix = None,
+    add: AddedModes = None,
+    drop: DroppedModes = None,
+    fix: FixedModes = None,
     temperature: Annotated[float | None, typer.Option(help="Of the spindle then, degC.")] = None,
     hours: Annotated[float | None, typer.Option(help="Running hours of the spindle then, h.")] = None,
     note: Annotated[str, typer.Option(help="What else is to be remembered of these tests.")] = "",
@@ -74,17 +74,15 @@ def replay(
     """
     from acquisition import Conditions, DataError
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.chosen_modes import keep_edits, refuse_edits
-    from lobewatch.logbook.preview import preview_recordings
-    from lobewatch.logbook.replaying.find_files import find_files
-    from lobewatch.logbook.replaying.store import refusal
-    from lobewatch.measuring.questions import check_codes, unasked_text
-    from lobewatch.measuring.workers.share_work import Workers
-    from lobewatch.notify.telling import telling
-    from lobewatch.show.replays.describe_preview import show_preview
-    from lobewatch.show.replays.describe_replay import show_replay
-    from lobewatch.show.replays.progress import ReplayProgress
-    from modal import parse_edits
+    from lobewatch.logbook.operator_entries import reject_edits, store_edits
+    from lobewatch.logbook.recordings.recorded_files import find_recordings
+    from lobewatch.logbook.recordings.store_recordings import format_rejections
+    from lobewatch.logbook.replay_preview import preview_replay
+    from lobewatch.measurement.recording_questions import check_question_codes, format_not_asked
+    from lobewatch.measurement.share_work import Workers
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.replays import ReplayProgress, emit_preview, emit_replay
+    from modal import parse_mode_edits
 
     description = file_options.description(
         date=date,
@@ -93,22 +91,22 @@ def replay(
         direction=direction,
         conditions=Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped),
     )
-    note_remarks((workers := Workers(jobs, scheduler)).remarks)
-    logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
-    codes, edits = check_codes(accept or ()), parse_edits(add, drop, fix)
+    print_remarks((workers := Workers(jobs, scheduler)).remarks)
+    logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
+    codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
-        refuse_edits(edits)
+        reject_edits(edits)
         with ReplayProgress() as bar:
-            previews = preview_recordings(logbook, recordings, description, bar, workers)
-        show_preview(previews, passed, as_json=as_json)
+            previews = preview_replay(logbook, recordings, description, bar, workers)
+        emit_preview(previews, passed, as_json=as_json)
         return
-    with telling(logbook):
+    with publish_on_change(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
-        not_chosen = keep_edits(logbook, outcome.tap_ids, edits)
+        not_chosen = store_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]
-        show_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)
-        wrong = outcome.refused and refusal(outcome.refused, len(recordings), stored=True)
+        emit_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)
+        wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
-            raise DataError(wrong or not_chosen or unasked_text(unasked, outcome.tap_ids, logbook.questions))
+            raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
 def report(
     machine: Annotated[
         Path,
-        typer.Argument(parser=named_folder, help="Machine folder with a tap test, or a folder of machine folders."),
+        typer.Argument(parser=to_folder_path, help="Machine folder with a tap test, or a folder of machine folders."),
     ],
     out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder where not given.")] = None,
     tool: Annotated[str, typer.Option(help="The series of this tool; that of the newest test where not given.")] = "",
@@ -37,18 +37,18 @@ def report(
     if not (machine / "machine.toml").is_file() and any(machine.glob("*/machine.toml")):
         if tool or direction:
             raise ValueError(f"--tool and --direction: name one of the machines in {machine} with them")
-        path = _of_all(machine, out)
+        path = _write_for_fleet(machine, out)
     else:
         logbook = Logbook.open(machine)
         path = write_report(logbook, out, tool, direction)
-        note_remarks(logbook.remarks)
+        print_remarks(logbook.remarks)
     emit({"report": str(path)}, as_json, f"report: {path}")
 
 
-def _of_all(folder: Path, out: Path | None) -> Path:
-    from lobewatch.plant.plant import Plant, find_machines
-    from lobewatch.show.plant.plant_rows import plant_rows
-    from lobewatch.show.report.fleet import write_fleet_report
+def _write_for_fleet(folder: Path, out: Path | None) -> Path:
+    from lobewatch.fleet.fleet import Fleet, find_machines
+    from lobewatch.show.fleet.fleet_status import fleet_rows
+    from lobewatch.show.report.report import write_fleet_report
 
-    rows = plant_rows(Plant(find_machines(folder)).standings())
+    rows = fleet_rows(Fleet(find_machines(folder)).assess_machines())
     return write_fleet_report(rows, folder, out, datetime.now().astimezone())

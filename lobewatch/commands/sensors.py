@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def sensors(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
         float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
@@ -32,8 +32,8 @@ def sensors(
     """
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.sensors import check_mass, check_skew, list_sensors
-    from lobewatch.show.devices import describe_sensors as show
-    from lobewatch.tap.plug import open_source
+    from lobewatch.show import sensors as show
+    from lobewatch.tap.device_connection import open_device
 
     folder = MachineFolder(machine)
     port = port or folder.machine.daq.port
@@ -41,19 +41,19 @@ def sensors(
         raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
     if mass_kg is not None and skew:
         raise ValueError("--mass-kg and --skew need different cabling; give one of them")
-    with folder.locked(), open_source(folder.machine.daq, port) as device:
+    with folder.locked(), open_device(folder.machine.daq, port) as device:
         if mass_kg is not None:
-            mass_check = check_mass(folder, port, device, mass_kg, _tell)
-            emit(show.mass_json(mass_check), as_json, *show.mass_texts(mass_check))
+            mass_check = check_mass(folder, port, device, mass_kg, _print_note)
+            emit(show.mass_check_json(mass_check), as_json, *show.mass_check_texts(mass_check))
         elif skew:
-            skew_check = check_skew(folder, port, device, _tell)
-            emit(show.skew_json(skew_check), as_json, *show.skew_texts(skew_check))
+            skew_check = check_skew(folder, port, device, _print_note)
+            emit(show.skew_check_json(skew_check), as_json, *show.skew_check_texts(skew_check))
         else:
-            sensor_list = list_sensors(folder, device, _tell)
-            emit(show.list_json(sensor_list), as_json, *show.list_texts(sensor_list))
+            sensor_list = list_sensors(folder, device, _print_note)
+            emit(show.sensors_json(sensor_list), as_json, *show.sensors_texts(sensor_list))
             if sensor_list.errors:
                 raise typer.Exit(2)
 
 
-def _tell(text: str) -> None:
+def _print_note(text: str) -> None:
     notes.print(text, markup=False)

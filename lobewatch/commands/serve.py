@@ -8,14 +8,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json
-from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, show_address
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show_address
 
 
 def serve(
     folder: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
     ],
     listen: Listen = "127.0.0.1",
     http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,

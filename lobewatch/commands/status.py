@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, results
 
 if TYPE_CHECKING:
-    from lobewatch.plant.plant import Plant
+    from lobewatch.fleet.fleet import Fleet
 
-FOR_THE_PAGE = ("points", "limits", "limit", "word", "why")
+DASHBOARD_ONLY_KEYS = ("points", "limits", "limit", "word", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
 
 
 def status(
     folder: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
     ],
     due: Annotated[bool, typer.Option("--due", help="Only machines whose tap test is due.")] = False,
     to_notify: Annotated[
@@ -51,52 +51,53 @@ def status(
       lobewatch status mills
       lobewatch status mills --due
     """
-    from lobewatch.decay.light import Light
-    from lobewatch.plant.plant import Plant, find_machines
-    from lobewatch.show.plant.describe_plant import plant_csv, plant_text
-    from lobewatch.show.plant.plant_rows import plant_rows
+    from lobewatch.fleet.fleet import Fleet, find_machines
+    from lobewatch.monitoring.status_rules import StatusLevel
+    from lobewatch.show.fleet.fleet_status import fleet_csv, fleet_rows, fleet_text
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
     if forget and not to_notify:
         raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
     machines = find_machines(folder)
-    plant = Plant(machines)
+    plant = Fleet(machines)
     if jobs > 1 or scheduler:
-        _renew(plant, jobs, scheduler)
-    standings = plant.standings()
-    rows = plant_rows(standings)
+        _make_missing_summaries(plant, jobs, scheduler)
+    standings = plant.assess_machines()
+    rows = fleet_rows(standings)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
-        results.out(plant_csv(shown), end="", highlight=False)
+        results.out(fleet_csv(shown), end="", highlight=False)
     else:
         lights = [row["light"] for row in rows]
-        counted = ", ".join(f"{lights.count(light)} {light.value}" for light in Light if light in lights)
+        counted = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
-        without_points = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
-        emit({"machines": without_points}, as_json, "" if as_json else plant_text(shown), count)
+        without_points = [
+            {name: value for name, value in row.items() if name not in DASHBOARD_ONLY_KEYS} for row in shown
+        ]
+        emit({"machines": without_points}, as_json, "" if as_json else fleet_text(shown), count)
     if prometheus is not None:
-        from acquisition.atomic import atomic_write
-        from lobewatch.notify.prometheus import prometheus_text
+        from acquisition.file_io import atomic_write
+        from lobewatch.notify.prometheus import format_prometheus
 
-        atomic_write(prometheus, prometheus_text(standings).encode())
+        atomic_write(prometheus, format_prometheus(standings).encode())
     failures = 0
     if to_notify:
-        from lobewatch.notify.telling import notify_folder
+        from lobewatch.notify.publish_status import publish_folder
 
-        failures = len(notify_folder(folder, machines, standings, forget))
-    needs_care = any(row["light"] is Light.ALARM or not row["can_be_judged"] for row in rows)
+        failures = len(publish_folder(folder, machines, standings, forget))
+    needs_care = any(row["light"] is StatusLevel.ALARM or not row["can_be_judged"] for row in rows)
     raise typer.Exit(1 if needs_care else 2 * (failures > 0))
 
 
-def _renew(plant: Plant, jobs: int, scheduler: str) -> None:
+def _make_missing_summaries(plant: Fleet, jobs: int, scheduler: str) -> None:
     """Have others make the standings that are missing."""
     from functools import partial
 
-    from lobewatch.measuring.workers.share_work import Workers
-    from lobewatch.plant.summarise import share_summaries
-    from lobewatch.show.terminal.output import note_remarks
+    from lobewatch.fleet.summarize import summarize_in_parallel
+    from lobewatch.measurement.share_work import Workers
+    from lobewatch.show.terminal.output import print_remarks
 
     workers = Workers(jobs, scheduler)
-    note_remarks(workers.remarks)
-    plant.renew(partial(share_summaries, workers=workers))
+    print_remarks(workers.remarks)
+    plant.make_missing_summaries(partial(summarize_in_parallel, workers=workers))

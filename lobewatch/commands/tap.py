@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, notes
-from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, serve_screen
 
 if TYPE_CHECKING:
     from acquisition import TapDirection
 
 
 def tap(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[
@@ -61,16 +60,16 @@ def tap(
       lobewatch tap mill-3 --temperature 24 --reclamped --note "after a warm-up of 20 min"
       lobewatch tap trial --port file:taps/ID.h5
     """
-    from acquisition import Conditions, tap_direction
+    from acquisition import Conditions, parse_direction
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
-    from lobewatch.notify.telling import tell
-    from lobewatch.show.history.describe_visit import emit_visit
-    from lobewatch.show.terminal.printer import TapPrinter
+    from lobewatch.notify.publish_status import publish_status
+    from lobewatch.show.measurement import emit_tap_results
+    from lobewatch.show.terminal.tap_printer import TapPrinter
     from lobewatch.show.terminal.terminal_screen import TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped
     from lobewatch.tap.session import TapSession, plan_session
-    from lobewatch.tap.visit import TapVisit, first_direction
+    from lobewatch.tap.visit import TapVisit, choose_first_direction
 
     folder, finished = MachineFolder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
@@ -83,21 +82,23 @@ def tap(
 
     def after(session: TapSession) -> None:
         finished.append(session)
-        tell(Logbook(folder))
+        publish_status(Logbook(folder))
 
     tool = tool or folder.machine.tap.tool
-    first = tap_direction(direction) if direction else first_direction(folder, tool) if leads else "x"
+    first = parse_direction(direction) if direction else choose_first_direction(folder, tool) if leads else "x"
     visit = TapVisit(plan, tool, first, leads=leads, after=after)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
                 from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
 
-                screens.enter_context(serving(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token)))
+                screens.enter_context(
+                    serve_screen(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
+                )
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
-        if not visit.waits:
+        if not visit.is_waiting:
             notes.print(f"stopped with {visit.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
-    emit_visit(Logbook(folder), finished, as_json, details)
+    emit_tap_results(Logbook(folder), finished, as_json, details)

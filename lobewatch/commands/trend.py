@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, note_remarks, results
+from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 
 def trend(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     tool: Annotated[str | None, typer.Option(help="Of this tool; else that of the series that fell most.")] = None,
     direction: Annotated[str | None, typer.Option(help="x or y; else the one that fell more.")] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="The points with commas on stdout instead of text.")] = False,
@@ -27,22 +27,22 @@ def trend(
       lobewatch trend mill-3
       lobewatch trend mill-3 --direction y --json
     """
-    from lobewatch.decay import Light
-    from lobewatch.decay.series_history import preload_of
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.outlook import outlook
-    from lobewatch.show.trends.describe_trend import trend_csv, trend_json, trend_texts
+    from lobewatch.logbook.machine_forecast import forecast_machine
+    from lobewatch.monitoring import StatusLevel
+    from lobewatch.monitoring.series_history import estimate_preload
+    from lobewatch.show.trend import trend_csv, trend_json, trend_texts
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
     logbook = Logbook.open(machine)
-    machine_outlook = outlook(logbook)
+    machine_outlook = forecast_machine(logbook)
     series = machine_outlook.series(tool, direction)
     if as_csv:
         results.out(trend_csv(series), end="", highlight=False)
     else:
-        preload = preload_of(series.history, logbook.machine)
+        preload = estimate_preload(series.history, logbook.machine)
         texts = [] if as_json else trend_texts(machine_outlook, series, preload)
         emit(trend_json(machine_outlook, series, preload), as_json, *texts)
-    note_remarks([*machine_outlook.standing.remarks, *logbook.remarks])
-    raise typer.Exit(int(machine_outlook.standing.light is Light.ALARM))
+    print_remarks([*machine_outlook.status.remarks, *logbook.remarks])
+    raise typer.Exit(int(machine_outlook.status.status is StatusLevel.ALARM))

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_path import named_folder
+from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
 
 def verify(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     as_json: Json = False,
 ) -> None:
     """Every byte of a machine folder against what was written; exit code 1 where something is damaged.
@@ -25,20 +25,20 @@ def verify(
 
       lobewatch verify mill-3
     """
-    from lobewatch.machine.archive.verify import DAMAGE
-    from lobewatch.machine.archive.verify import verify as verify_folder
+    from lobewatch.machine.verify_files import DAMAGE_CODES
+    from lobewatch.machine.verify_files import verify as verify_folder
     from lobewatch.show.terminal.output import remark_json
 
     verification = verify_folder(machine)
-    notes = [remark for remark in verification.remarks if remark.code not in DAMAGE]
+    notes = [remark for remark in verification.remarks if remark.code not in DAMAGE_CODES]
     payload = {
         "damage": [remark_json(remark) for remark in verification.damage],
         "remarks": [remark_json(remark) for remark in notes],
-        "adopted": verification.adopted,
+        "adopted": verification.entered,
         "sound_taps": verification.n_taps,
     }
     texts = [*(f"damaged: {remark}" for remark in verification.damage), *(f"note: {remark}" for remark in notes)]
-    texts += [f"entered in the journal: {name}" for name in verification.adopted]
+    texts += [f"entered in the journal: {name}" for name in verification.entered]
     last = f"{len(verification.damage)} damaged" if verification.damage else "nothing is damaged"
     emit(payload, as_json, *texts, f"{verification.n_taps} tap test(s) as they were committed, {last}")
     if verification.damage:

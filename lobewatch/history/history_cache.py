@@ -8,20 +8,19 @@ from itertools import zip_longest
 from operator import is_
 
 from acquisition import Remark
-from acquisition.errors import failure_text
-from lobewatch.history.history import History, Row, empty_history
-from lobewatch.history.kept_rows import kept_aside
-from lobewatch.history.row_bytes import decode_row, encode_row
-from lobewatch.history.still_holding import StillHolding, is_of
+from acquisition.errors import format_error
+from lobewatch.history.history import History, HistoryRow, keep_unusable_row, make_empty_history
+from lobewatch.history.row_codec import decode_row, encode_row
+from lobewatch.history.row_reuse import ReusableRows, is_row_of
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
-from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.machine.rows import add_rows, read_rows, write_rows
-from lobewatch.tool.order import Place
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.row_file import append_rows, read_rows, write_rows
+from lobewatch.tool.tap_series import TapPlace
 
-MOST_DEAD = 1_000_000
+MAX_OBSOLETE_BYTES = 1_000_000
 """Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
-ASIDE = -1
+UNPLACED_ROW_NUMBER = -1
 """Number of rows that are kept beside the history."""
 
 
@@ -31,21 +30,21 @@ class HistoryCache:
     def __init__(self, folder: MachineFolder) -> None:
         """Nothing is read yet."""
         self._folder = folder
-        self._rows: list[Row] = []
+        self._rows: list[HistoryRow] = []
         self._contents: list[bytes] = []
-        self._others: dict[str, Row] = {}
+        self._others: dict[str, HistoryRow] = {}
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
-        self._fitting: tuple[Sequence[Place], int] = (), 0
+        self._fitting: tuple[Sequence[TapPlace], int] = (), 0
         self._hashes: dict[str, str] = {}
         self.remarks: list[Remark] = []
         """Reasons why something was not written."""
-        self.behind: StillHolding | None = None
+        self.reusable: ReusableRows | None = None
         """Rows that were read behind those that `read` gave; None where there are none."""
 
     @property
-    def others(self) -> Mapping[str, Row]:
+    def other_rows(self) -> Mapping[str, HistoryRow]:
         """Rows that were read beside those of these settings and this version, by tap test."""
         return self._others
 
@@ -54,24 +53,24 @@ class HistoryCache:
 
         Rows of tap tests whose files cannot be used are kept aside.
         """
-        empty, lost_ids = empty_history(self._folder.machine), {entry.id for entry in files.lost}
-        hashes = _hashes(self._folder.machine, files.cuts)
+        empty, lost_ids = make_empty_history(self._folder.machine), {entry.id for entry in files.lost}
+        hashes = _hash_programs(self._folder.machine, files.cuts)
         if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
             self._hashes = hashes
-            self._read(_head(empty))
+            self._read(_cache_header(empty))
         stored = {row.tap_id: row for row in self._rows} | self._others if lost_ids else {}
-        kept = tuple(kept_aside(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
+        kept = tuple(keep_unusable_row(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
         valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
-        self.behind = StillHolding(self._rows, files.by_id, files.baselines) if changed else None
+        self.reusable = ReusableRows(self._rows, files.by_id, files.baselines) if changed else None
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
-    def _count_fitting(self, places: Sequence[Place]) -> int:
+    def _count_fitting(self, places: Sequence[TapPlace]) -> int:
         """Rows that are those of these tap tests; places: those that were compared before are not looked at again."""
         compared, count = self._fitting
         count = min(count, len(self._rows)) if compared is places else 0
         for row, place in zip(self._rows[count:], places[count:], strict=False):
-            if not is_of(row, place):
+            if not is_row_of(row, place):
                 break
             count += 1
         self._fitting = places, count
@@ -83,15 +82,15 @@ class HistoryCache:
             with self._folder.locked(patience=0):
                 self._store(history)
         except (BusyError, OSError) as error:
-            text = f"not brought up to date on the disk, worked out in memory: {failure_text(error)}"
-            remark = Remark("history-in-memory", self._folder.history.name, text)
+            text = f"not brought up to date on the disk, worked out in memory: {format_error(error)}"
+            remark = Remark("history-in-memory", self._folder.history_path.name, text)
             self.remarks += [] if remark in self.remarks else [remark]
 
     @property
     def _stamp_now(self) -> tuple[int, ...] | None:
         """Another one where somebody else has written the file; None where there is none."""
         try:
-            status = self._folder.history.stat()
+            status = self._folder.history_path.stat()
         except OSError:
             return None
         return status.st_size, status.st_mtime_ns, status.st_ino
@@ -101,7 +100,7 @@ class HistoryCache:
         self._rows, self._contents, self._size, self._length = [], [], 0, 0
         self._others, self._aside, hashes = {}, [], self._hashes
         try:
-            stored = read_rows(self._folder.history)
+            stored = read_rows(self._folder.history_path)
             is_current = stored.rows[:1] == (head,)
             software = "" if is_current else b"".join(stored.rows[:1]).decode().partition(" ")[2]
             for content in stored.rows[1:]:
@@ -115,12 +114,12 @@ class HistoryCache:
         except (ValueError, OSError):
             self._rows, self._contents, self._others, self._aside = [], [], {}, []
         else:
-            self._size, self._length = stored.size if is_current else 0, stored.length
+            self._size, self._length = stored.sound_bytes if is_current else 0, stored.file_bytes
 
     def _store(self, history: History) -> None:
-        path, hashes = self._folder.history, self._hashes or self._folder.machine.program_hashes
+        path, hashes = self._folder.history_path, self._hashes or self._folder.machine.program_hashes
         if self._stamp_now != self._stamp and self._stamp_now is not None:
-            self._read(_head(history))  # another program has written
+            self._read(_cache_header(history))  # another program has written
         same = [*map(is_, history.rows, self._rows), False].index(False)
         self._fitting = self._fitting[0], min(self._fitting[1], same)
         later = [
@@ -130,8 +129,8 @@ class HistoryCache:
         contents = self._contents[:same] + later
         pairs = zip_longest(later, self._contents[same : len(contents)])
         fresh = [content for content, stored in pairs if content is not stored and content != stored]
-        aside = [encode_row(ASIDE, row, hashes) for row in history.kept]
-        most = 2 * sum(map(len, contents)) + MOST_DEAD
+        aside = [encode_row(UNPLACED_ROW_NUMBER, row, hashes) for row in history.kept]
+        most = 2 * sum(map(len, contents)) + MAX_OBSOLETE_BYTES
         if (
             self._size
             and aside == self._aside
@@ -139,22 +138,22 @@ class HistoryCache:
             and self._size + sum(map(len, fresh)) < most
             and contents[len(self._contents) - 1 :]
         ):
-            self._length = add_rows(path, self._size, fresh) if fresh else self._length
+            self._length = append_rows(path, self._size, fresh) if fresh else self._length
         else:
-            self._length = write_rows(path, [_head(history), *contents, *aside])
+            self._length = write_rows(path, [_cache_header(history), *contents, *aside])
         self._aside = aside
         self._rows, self._contents, self._size = list(history.rows), contents, self._length
         self._stamp = self._stamp_now
 
 
-def _hashes(machine: Machine, cuts: Sequence[HeardCut]) -> dict[str, str]:
+def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
     """Hash of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
     taught = {
-        program.name: "".join(f" {cut.id}" for cut in cuts if cut.counts and cut.tool == program.tool)
+        program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
         for program in machine.program
     }
     return {name: text + taught[name] for name, text in machine.program_hashes.items()}
 
 
-def _head(history: History) -> bytes:
+def _cache_header(history: History) -> bytes:
     return f"{history.settings_hash} {history.software}".encode()

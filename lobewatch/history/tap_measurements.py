@@ -1,26 +1,23 @@
-"""What follows from each tap test of a machine, one after the other; each tap file is read and worked out once."""
+"""Measurements and history rows of all tap tests of a machine."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from acquisition import ACROSS, DataError
-from lobewatch.history.followed_modes import FollowedModes
-from lobewatch.history.history import Row, row_of
-from lobewatch.history.kept_rows import kept_in_place
-from lobewatch.history.still_holding import StillHolding
+from acquisition import CROSS_TAP, DataError
+from lobewatch.history.history import HistoryRow, keep_older_row, make_row
+from lobewatch.history.row_reuse import FollowedModeIndex, ReusableRows
 from lobewatch.history.usable_taps import NotTappedError
-from lobewatch.machine import DamagedTapError, MachineFolder
-from lobewatch.measuring.measurement import Measurement, TapFit, interpret_fit, measure
-from lobewatch.measuring.questions import open_questions, with_answers
+from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
+from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
+from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.tool.assembly import Assembly, assemble
-from lobewatch.tool.order import Place, earlier_numbers
-from lobewatch.tool.prediction import predict
-from lobewatch.tool.series import FollowedMode
+from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier
 from modal import Mode
 
-KEPT = 500
+MAX_MEASUREMENTS_IN_MEMORY = 500
 """Measurements kept in memory, those asked for last."""
 
 
@@ -30,45 +27,45 @@ class TapMeasurements:
     DamagedTapError for a file that turns out to be damaged.
     """
 
-    def __init__(self, folder: MachineFolder, places: Sequence[Place], fits: Mapping[str, TapFit]) -> None:
+    def __init__(self, folder: MachineFolder, places: Sequence[TapPlace], fits: Mapping[str, TapFit]) -> None:
         """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is read yet."""
         self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
-        self._followed = FollowedModes()
+        self._followed = FollowedModeIndex()
 
-    def measurement(self, place: Place, rows: Sequence[Row]) -> Measurement:
+    def measurement(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Measurement:
         """What one tap test says."""
         measurement = self._measurements.pop(place.entry.id, None)
         if measurement is None:
-            before = (rows[number] for number in earlier_numbers(place, self._places))
+            before = (rows[number] for number in iterate_earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             measurement = self._measure(place, last)
-            remarks = with_answers((*measurement.remarks, *place.remarks), place.entry)
+            remarks = mark_accepted((*measurement.remarks, *place.remarks), place.entry)
             measurement = replace(measurement, remarks=remarks)
         self._measurements[place.entry.id] = measurement
-        if len(self._measurements) > KEPT:
+        if len(self._measurements) > MAX_MEASUREMENTS_IN_MEMORY:
             del self._measurements[next(iter(self._measurements))]
         return measurement
 
-    def _measure(self, place: Place, last: Mode | None) -> Measurement:
+    def _measure(self, place: TapPlace, last: Mode | None) -> Measurement:
         fit = self._fits.get(place.entry.id)
         if fit is not None:
             return interpret_fit(fit, self._folder.machine, last)
         return measure(self._folder.read(place.entry), self._folder.machine, last, place.entry.by_hand)
 
-    def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
+    def assembly_after(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Assembly:
         """The tool of one tap test as it was known then."""
         cross = None if place.cross is None else self.measurement(self._places[place.cross], rows)
-        if place.entry.direction == ACROSS and place.across is not None:
-            place = self._places[place.across]
+        if place.entry.direction == CROSS_TAP and place.other_direction is not None:
+            place = self._places[place.other_direction]
         newest = self.measurement(place, rows)
-        other = None if place.across is None else self.measurement(self._places[place.across], rows)
+        other = None if place.other_direction is None else self.measurement(self._places[place.other_direction], rows)
         series = self._followed.before(place, rows)
-        if newest.followed is not None and not open_questions(newest.remarks):
-            series.setdefault(newest.direction, []).append(_followed_mode(newest, newest.followed))
+        if newest.followed is not None and not find_open_questions(newest.remarks):
+            series.setdefault(newest.direction, []).append(_to_followed_mode(newest, newest.followed))
         return assemble(newest, other, series, cross)
 
-    def assembly_of(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
+    def assembly_of(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
         """A tool as the newest of these tap tests with it tells, predicted where none is of it.
 
         NotTappedError where it cannot be predicted.
@@ -76,7 +73,7 @@ class TapMeasurements:
         newest = next((place for place in reversed(places) if place.entry.tool == tool), None)
         return self._prediction(tool, places, rows) if newest is None else self.assembly_after(newest, rows)
 
-    def _prediction(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
+    def _prediction(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
         newest: dict[str, Measurement] = {}
         calibrated = [place for place in reversed(places) if rows[place.number].bearing_stiffness.is_known]
         for place in calibrated:
@@ -87,13 +84,13 @@ class TapMeasurements:
             text = "no force was measured, K is not known; tap with a hammer that measures its force"
             raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {text}")
         try:
-            return predict(self._folder.machine, list(newest.values()), tool)
+            return predict_assembly(self._folder.machine, list(newest.values()), tool)
         except DataError as error:
             raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
 
     def all_rows(
-        self, rows: Sequence[Row], older_rows: Mapping[str, Row], behind: StillHolding | None = None
-    ) -> tuple[Row, ...]:
+        self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows | None = None
+    ) -> tuple[HistoryRow, ...]:
         """These rows, and those of all tap tests after them.
 
         others: rows of older versions by tap test, for those that cannot be worked out anew; behind: of those that may
@@ -101,7 +98,7 @@ class TapMeasurements:
         """
         rows = list(rows)
         for place in self._places[len(rows) :]:
-            held = behind.row(place, self._places, rows) if behind is not None else None
+            held = behind.find(place, self._places, rows) if behind is not None else None
             if held is not None:
                 rows.append(held)
                 continue
@@ -110,17 +107,42 @@ class TapMeasurements:
                 behind.note(rows[-1])
         return tuple(rows)
 
-    def _row(self, place: Place, rows: Sequence[Row], older_rows: Mapping[str, Row]) -> Row:
+    def _row(self, place: TapPlace, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow]) -> HistoryRow:
         try:
             assembly = self.assembly_after(place, rows)
-            return row_of(self.measurement(place, rows), assembly, place)
+            return make_row(self.measurement(place, rows), assembly, place)
         except DamagedTapError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
             if place.entry.id not in older_rows:
                 raise
-            return kept_in_place(older_rows[place.entry.id], place, error)
+            return keep_older_row(older_rows[place.entry.id], place, error)
 
 
-def _followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:
+def _to_followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:
     return FollowedMode(measurement.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)
+
+
+def measure_excluded_taps(
+    folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence[HistoryRow]
+) -> list[HistoryRow]:
+    """Excluded tap tests of the series of these rows as rows of their own, without diagrams; damaged ones are skipped.
+
+    rows: one series, oldest first, at least one. A tap test before its baseline is none of it.
+    """
+    rows_out = []
+    for entry in excluded:
+        if (entry.tool, entry.direction) != (rows[-1].tool, rows[-1].direction):
+            continue
+        try:
+            tap = folder.read(entry)
+        except DamagedTapError:
+            continue
+        time, baseline = tap.circumstances.created, rows[-1].baseline
+        if baseline is None or time >= baseline:
+            before = [row.mode for row in rows if row.time < time and row.mode is not None]
+            measurement = measure(tap, folder.machine, before[-1] if before else None)
+            rows_out.append(
+                make_row(measurement, assemble(measurement, None, {}), TapPlace(0, entry, None, None, baseline))
+            )
+    return rows_out

@@ -7,15 +7,13 @@ from datetime import UTC, datetime
 
 from acquisition import DataError, Remark
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
-from lobewatch.machine.contents import FolderContents
-from lobewatch.machine.journal.acknowledgement import Acknowledgement
-from lobewatch.machine.journal.event import MaintenanceEvent
-from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.machine.journal.journal import command
-from lobewatch.machine.journal.known_scatter import KnownScatter
-from lobewatch.tool.order import Order, Place
+from lobewatch.machine.folder_contents import FolderContents
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter, MaintenanceEvent
+from lobewatch.machine.journal.journal import format_command
+from lobewatch.tool.tap_series import TapOrder, TapPlace
 
-BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
+EARLIEST_TIME = datetime.min.replace(tzinfo=UTC)
 
 
 class NotTappedError(DataError):
@@ -29,20 +27,20 @@ class UsableTaps:
         """Nothing is read yet."""
         self._folder = folder
         self._contents: FolderContents | None = None
-        self._order: Order | None = None
+        self._order: TapOrder | None = None
         self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
 
     @property
-    def places(self) -> Sequence[Place]:
+    def places(self) -> Sequence[TapPlace]:
         """Those that can be used, oldest first by their time; a newer one is added to the same sequence."""
         if self._order is None:
-            self._order = Order(self._all.baselines)
+            self._order = TapOrder(self._all.baselines)
             for tap in self._all.taps:
                 if tap.id not in self._left_out and not tap.excluded:
                     self._order.add(tap)
         return self._order.places
 
-    def place(self, tap_id: str) -> Place:
+    def place(self, tap_id: str) -> TapPlace:
         """Of one of them; KeyError where it is none."""
         for place in reversed(self.places):
             if place.entry.id == tap_id:
@@ -53,17 +51,17 @@ class UsableTaps:
         """DataError for one that a person has taken out."""
         for tap in self.excluded:
             if tap.id == tap_id:
-                cure = f"{command('include', self._folder.path)} {tap_id} takes it back"
+                cure = f"{format_command('include', self._folder.path)} {tap_id} takes it back"
                 raise DataError(f"{tap_id}: stored already, but excluded, for {tap.excluded!r}; {cure}")
 
-    def until(self, tap_id: str | None) -> list[Place]:
+    def list_until(self, tap_id: str | None) -> list[TapPlace]:
         """Those up to one of them, since the baseline that counted then; None: up to now."""
         last = None if tap_id is None else self.place(tap_id)
         baseline = self.baseline if last is None else last.baseline
         places = self.places if last is None else self.places[: last.number + 1]
         return [place for place in places if place.baseline == baseline]
 
-    def since(self, tap_id: str) -> list[TapEntry]:
+    def list_series(self, tap_id: str) -> list[TapEntry]:
         """Those that are compared with one of them; none with what is none of them, a prediction."""
         series = {place.entry.id: place.series for place in self.places}
         return [place.entry for place in self.places if place.series == series.get(tap_id)]
@@ -80,7 +78,7 @@ class UsableTaps:
         return self._all.events
 
     @property
-    def cuts(self) -> Sequence[HeardCut]:
+    def cuts(self) -> Sequence[CutEntry]:
         """Test cuts, oldest first, those that a person has taken out too."""
         return self._all.cuts
 
@@ -90,9 +88,9 @@ class UsableTaps:
         return self._all.acknowledgements
 
     @property
-    def known_scatter(self) -> KnownScatter | None:
+    def fleet_scatter(self) -> FleetScatter | None:
         """What the other machines told first since the baseline of its scatter; None where they have told nothing."""
-        since = (told for told in self._all.scatters if self.baseline is None or told.time >= self.baseline)
+        since = (told for told in self._all.fleet_scatters if self.baseline is None or told.time >= self.baseline)
         return next(since, None)
 
     @property
@@ -135,19 +133,19 @@ class UsableTaps:
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
         if self.excluded:
             since += f", but {len(self.excluded)} excluded"
-            cure += f"; {command('include', self._folder.path)} TAP takes one back"
+            cure += f"; {format_command('include', self._folder.path)} TAP takes one back"
         raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}; {cure}")
 
-    def doubts(self, tool: str = "") -> tuple[Remark, ...]:
+    def newest_damaged_remarks(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
         if not self.lost:
             return ()
-        newest_usable = {_series(place.entry): _time(place.entry) for place in self.places}
-        lost = [entry for entry in self.lost if _time(entry) >= (self.baseline or BEFORE_ALL)]
+        newest_usable = {_series_key(place.entry): _entry_time(place.entry) for place in self.places}
+        lost = [entry for entry in self.lost if _entry_time(entry) >= (self.baseline or EARLIEST_TIME)]
         newer = [
             entry
             for entry in lost
-            if tool in ("", entry.tool) and _time(entry) > newest_usable.get(_series(entry), BEFORE_ALL)
+            if tool in ("", entry.tool) and _entry_time(entry) > newest_usable.get(_series_key(entry), EARLIEST_TIME)
         ]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
@@ -157,10 +155,10 @@ class UsableTaps:
 
         Where anybody else has written since, all is looked at again.
         """
-        if self._contents is None or self._folder.journal.length != self._contents.lines + 1:
+        if self._contents is None or self._folder.journal.line_count != self._contents.line_count + 1:
             self.forget()
             return False
-        self._contents = self._contents.with_one_more(entry)
+        self._contents = self._contents.with_tap(entry)
         if self._order is None or self._contents.taps[-1] is not entry:
             self._order = None
             return False
@@ -185,9 +183,9 @@ class UsableTaps:
         return self._contents
 
 
-def _series(entry: TapEntry) -> tuple[str, str]:
+def _series_key(entry: TapEntry) -> tuple[str, str]:
     return entry.tool, entry.direction
 
 
-def _time(entry: TapEntry) -> datetime:
+def _entry_time(entry: TapEntry) -> datetime:
     return datetime.fromisoformat(entry.time)

@@ -1,13 +1,12 @@
 """One machine: the logbook and the questions that are answered from it."""
 
-from .lobe_comparison import LobeComparison, compare_lobes
+from .chart_data import LobeComparison, ModelFigureData, collect_model_figure, compare_lobes
 from .logbook import Logbook
-from .model_picture import ModelPicture, model_picture
 
 __all__ = [
     "LobeComparison",
     "Logbook",
-    "ModelPicture",
+    "ModelFigureData",
+    "collect_model_figure",
     "compare_lobes",
-    "model_picture",
 ]

@@ -7,24 +7,23 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from acquisition import UNSAID, Conditions, Description, Remark, TapTest
-from lobewatch.decay.standing import Standing
-from lobewatch.history.history import History
+from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, Remark, TapTest
+from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
-from lobewatch.history.kept_rows import of_older_versions
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import UsableTaps
-from lobewatch.logbook import replaying
+from lobewatch.logbook import recordings as replaying
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, ProgramTable, TapEntry
-from lobewatch.machine.additions.keep_modes import keep_modes
-from lobewatch.machine.archive.verify import enter_explained
-from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.measuring.measurement import NOT_APPLIED, Measurement, TapFit, fit_tap
-from lobewatch.measuring.questions import accept, clock_questions
+from lobewatch.machine.folder_updates import store_mode_edits
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.verify_files import enter_orphaned_taps
+from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions
+from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap
+from lobewatch.monitoring.machine_status import MachineStatus
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.advice import Advice
-from lobewatch.verdicts.verdict import Ruling, Verdict
+from lobewatch.verdicts.recommendation import Advice
+from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 from modal import ModeEdits
 
 P = ParamSpec("P")
@@ -56,8 +55,8 @@ class Logbook:
         """What the folder holds, and what was done to the machine."""
         self.fits: dict[str, TapFit] = {}
         """Modes of tap tests that others have fitted, by tap test."""
-        self._mark, self._cache = folder.mark, HistoryCache(folder)
-        self._known: Analysis | None = None
+        self._mark, self._cache = folder.change_mark, HistoryCache(folder)
+        self._current_analysis: Analysis | None = None
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -72,15 +71,15 @@ class Logbook:
     @property
     def remarks(self) -> list[Remark]:
         """What is to be said of the files themselves."""
-        history = None if self._known is None else self._known.history_so_far
-        return [*self.files.remarks, *self._cache.remarks, *of_older_versions(history)]
+        history = None if self._current_analysis is None else self._current_analysis.cached_history
+        return [*self.files.remarks, *self._cache.remarks, *find_older_version_remarks(history)]
 
     @property
     def is_current(self) -> bool:
         """Whether journal and machine.toml are as they were then."""
-        return self.folder.mark == self._mark
+        return self.folder.change_mark == self._mark
 
-    def ask(
+    def query(
         self, question: Callable[Concatenate[Analysis, P], Answer], *arguments: P.args, **named: P.kwargs
     ) -> Answer:
         """The answer to a question; asked again where it meets a damaged tap file, of an analysis without that."""
@@ -89,7 +88,7 @@ class Logbook:
                 return question(self._analysis, *arguments, **named)
             except DamagedTapError as error:
                 self.files.leave_out(error)
-                self._known = None
+                self._current_analysis = None
 
     @property
     def taps(self) -> Sequence[TapEntry]:
@@ -97,7 +96,7 @@ class Logbook:
         return self._analysis.taps
 
     @property
-    def cuts(self) -> tuple[HeardCut, ...]:
+    def cuts(self) -> tuple[CutEntry, ...]:
         """The test cuts that something can be learnt from, oldest first."""
         return self._analysis.cuts
 
@@ -105,14 +104,14 @@ class Logbook:
         """Tap tests of one tool and direction, oldest first."""
         return [tap for tap in self.taps if (tap.tool, tap.direction) == (tool, direction)]
 
-    def newest(self, tool: str | None = None) -> TapEntry:
+    def newest_tap(self, tool: str | None = None) -> TapEntry:
         """The newest tap test, of a tool where one is named; DataError where there is none."""
         return self.files.newest(tool)
 
     @property
     def history(self) -> History:
         """All measurements in order of time, up to date; on the disk too where that could be written."""
-        return self.ask(_history)
+        return self.query(_get_history)
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
@@ -122,54 +121,56 @@ class Logbook:
     def measurement(self, tap_id: str) -> Measurement:
         """What a tap test says; KeyError for one that is not in the journal or is left out, DataError where its file is
         damaged."""
-        self.ask(_history)  # what is damaged before it is found now
+        self.query(_get_history)  # what is damaged before it is found now
         return self._analysis.measurement(tap_id)
 
     @property
-    def calibrated(self) -> Measurement | None:
+    def calibrated_measurement(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        return self.ask(_calibrated)
+        return self.query(_get_calibrated)
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
         """See `Analysis.assembly`."""
-        return self.ask(Analysis.assembly, tool, until)
+        return self.query(Analysis.assembly, tool, until)
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """See `Analysis.verdicts`."""
-        return self.ask(Analysis.verdicts, until, names)
+        return self.query(Analysis.verdicts, until, names)
 
-    def verdict_on(self, table: ProgramTable) -> Verdict:
+    def verdict_for(self, table: ProgramTable) -> Verdict:
         """See `Analysis.verdict_on`."""
-        return self.ask(Analysis.verdict_on, table)
+        return self.query(Analysis.verdict_for, table)
 
-    def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
+    def stored_verdicts(self, tap_id: str, falls: bool = False) -> Mapping[str, StoredVerdict]:
         """See `Analysis.rulings`."""
-        return self.ask(Analysis.rulings, tap_id, falls)
+        return self.query(Analysis.stored_verdicts, tap_id, falls)
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """See `Analysis.first_assembly`."""
-        return self.ask(Analysis.first_assembly, now)
+        return self.query(Analysis.first_assembly, now)
 
-    def ruling_then(self, now: Verdict) -> Ruling | None:
+    def initial_verdict(self, now: Verdict) -> StoredVerdict | None:
         """See `Analysis.ruling_then`."""
-        return self.ask(Analysis.ruling_then, now)
+        return self.query(Analysis.initial_verdict, now)
 
     def advice(self, verdict: Verdict) -> Advice:
         """What goes beyond a verdict; it takes longer than the verdict itself."""
-        return self.ask(Analysis.advice, verdict)
+        return self.query(Analysis.advice, verdict)
 
-    def standing(self, now: datetime | None = None) -> Standing:
+    def status(self, now: datetime | None = None) -> MachineStatus:
         """The light of the machine, the reasons, and one next step."""
-        return self.ask(Analysis.standing, now)
+        return self.query(Analysis.status, now)
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
         if not self.is_current:
-            self._forget()
-        codes = clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
+            self._invalidate()
+        codes = find_clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
         goes_on = self.files.add(self.folder.commit(tap, codes))
-        self._known = self._analysis_with(self._known.measurements) if goes_on and self._known else None
-        self._mark = self.folder.mark
+        self._current_analysis = (
+            self._make_analysis(self._current_analysis.measurements) if goes_on and self._current_analysis else None
+        )
+        self._mark = self.folder.change_mark
 
     def replay(
         self,
@@ -177,7 +178,7 @@ class Logbook:
         date: datetime | None = None,
         tool: str = "",
         direction: str = "",
-        conditions: Conditions = UNSAID,
+        conditions: Conditions = UNKNOWN_CONDITIONS,
         **said: Any,
     ) -> Measurement:
         """Store a recorded file as a tap test, unless it is stored already, and say what it means.
@@ -193,50 +194,52 @@ class Logbook:
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> replaying.ReplayOutcome:
         """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
-            enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
+            enter_orphaned_taps(self.folder)  # else what an interrupted replay has stored would be stored twice
             outcome = replaying.store_recordings(self.folder, files, said, **how)
             self.fits |= outcome.fits
-            self._forget()
+            self._invalidate()
         return outcome
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
         """Accept what is asked of these tap tests, for good; the codes that none of them asks."""
-        unasked = accept(self.folder, self.questions, tap_ids, codes) if codes else []
+        unasked = accept_questions(self.folder, self.questions, tap_ids, codes) if codes else []
         if len(unasked) < len(codes):
-            self._forget()
+            self._invalidate()
         return unasked
 
-    def choose_modes(self, tap_ids: Sequence[str], edits: ModeEdits) -> dict[str, str]:
+    def edit_modes(self, tap_ids: Sequence[str], edits: ModeEdits) -> dict[str, str]:
         """Keep what a person says of the modes of these tap tests, for good; the reasons why it cannot be of some.
 
         Edits that say nothing take back what was said before.
         """
         entries = {tap_id: self.files.by_id[tap_id] for tap_id in tap_ids}
         fits = {tap_id: fit_tap(self.folder.read(entry), self.machine, edits) for tap_id, entry in entries.items()}
-        reasons = {name: said.text for name, fit in fits.items() for said in fit.remarks if said.code == NOT_APPLIED}
-        keep_modes(self.folder, [tap_id for tap_id in fits if tap_id not in reasons], edits)
+        reasons = {
+            name: said.text for name, fit in fits.items() for said in fit.remarks if said.code == EDITS_NOT_APPLIED_CODE
+        }
+        store_mode_edits(self.folder, [tap_id for tap_id in fits if tap_id not in reasons], edits)
         self.fits |= {tap_id: fit for tap_id, fit in fits.items() if tap_id not in reasons}
-        self._forget()
+        self._invalidate()
         return reasons
 
-    def _forget(self) -> None:
+    def _invalidate(self) -> None:
         """What is on the disk has changed."""
         self.files.forget()
-        self._known, self._mark = None, self.folder.mark
+        self._current_analysis, self._mark = None, self.folder.change_mark
 
     @property
     def _analysis(self) -> Analysis:
-        if self._known is None:
-            self._known = self._analysis_with(TapMeasurements(self.folder, self.files.places, self.fits))
-        return self._known
+        if self._current_analysis is None:
+            self._current_analysis = self._make_analysis(TapMeasurements(self.folder, self.files.places, self.fits))
+        return self._current_analysis
 
-    def _analysis_with(self, measurements: TapMeasurements) -> Analysis:
+    def _make_analysis(self, measurements: TapMeasurements) -> Analysis:
         return Analysis(self.folder, self.files, self._cache, measurements)
 
 
-def _history(analysis: Analysis) -> History:
+def _get_history(analysis: Analysis) -> History:
     return analysis.history
 
 
-def _calibrated(analysis: Analysis) -> Measurement | None:
-    return analysis.calibrated
+def _get_calibrated(analysis: Analysis) -> Measurement | None:
+    return analysis.calibrated_measurement

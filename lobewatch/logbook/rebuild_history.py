@@ -13,20 +13,19 @@ from acquisition import DataError, read_tap
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine, ProgramTable, TapEntry
-from lobewatch.machine.contents import fault_of
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring.measurement import TapFit, fit_tap
-from lobewatch.measuring.workers.is_fit import is_fit
-from lobewatch.measuring.workers.share_work import Workers, share_work
+from lobewatch.machine.folder_contents import find_file_fault
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.verdict import Verdict, Word, judge
+from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
 
-Progress = Callable[[int, int], None]
+RebuildProgress = Callable[[int, int], None]
 """Told how many tap tests are done, and of how many."""
 
 
 @dataclass(frozen=True)
-class TapBytes:
+class TapFileBytes:
     """One tap file; empty where it is damaged."""
 
     entry: TapEntry
@@ -38,7 +37,7 @@ class TapBytes:
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class VerdictRequest:
     """What the word on each program was after a tap test."""
 
     tools: Mapping[str, Assembly | DataError]
@@ -47,77 +46,77 @@ class Question:
     """The machine as it is now."""
 
 
-def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lambda _done, _of: None) -> int:
+def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgress = lambda _done, _of: None) -> int:
     """Write it anew and say how many rows it has; equal bit by bit whoever works."""
-    logbook.folder.history.unlink(missing_ok=True)
+    logbook.folder.history_path.unlink(missing_ok=True)
     toml = logbook.folder.toml_text
-    if workers.are_elsewhere:
+    if workers.use_other_processes:
         entries = [place.entry for place in logbook.files.places]
-        contents = (_content(logbook, entry, toml) for entry in entries)
-        fits = share_work(modes_of, contents, workers, _is_fit)
+        contents = (_read_tap_bytes(logbook, entry, toml) for entry in entries)
+        fits = share_work(fit_tap_bytes, contents, workers, _is_tap_fit)
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
-    for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
-        logbook.ask(Analysis.rulings, tap_id, verdicts=verdicts)
+    for number, (tap_id, verdicts) in enumerate(_evaluate_all(logbook, tap_ids, toml, workers), 1):
+        logbook.query(Analysis.stored_verdicts, tap_id, verdicts=verdicts)
         progress(number, len(tap_ids))
     return len(tap_ids)
 
 
-def _all_judged(
+def _evaluate_all(
     logbook: Logbook, tap_ids: list[str], toml: str, workers: Workers
 ) -> Iterator[tuple[str, dict[str, Verdict]]]:
     """The verdicts after each tap test, as far as others work them out."""
-    if not workers.are_elsewhere:
+    if not workers.use_other_processes:
         yield from ((tap_id, {}) for tap_id in tap_ids)
         return
-    questions = (_question(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, share_work(verdicts_on, questions, workers, _is_verdicts), strict=True)
+    questions = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
+    yield from zip(tap_ids, share_work(evaluate_programs, questions, workers, _are_verdicts), strict=True)
 
 
-def _content(logbook: Logbook, entry: TapEntry, toml: str) -> TapBytes:
-    sound = not fault_of(logbook.folder.path, entry)
-    return TapBytes(entry, (logbook.folder.path / entry.file).read_bytes() if sound else b"", toml)
+def _read_tap_bytes(logbook: Logbook, entry: TapEntry, toml: str) -> TapFileBytes:
+    sound = not find_file_fault(logbook.folder.path, entry)
+    return TapFileBytes(entry, (logbook.folder.path / entry.file).read_bytes() if sound else b"", toml)
 
 
-def _question(logbook: Logbook, tap_id: str, toml: str) -> Question:
+def _make_verdict_request(logbook: Logbook, tap_id: str, toml: str) -> VerdictRequest:
     tools = dict.fromkeys(program.tool for program in logbook.machine.program)
-    return Question({tool: logbook.ask(Analysis.assembly_or_reason, tool, tap_id) for tool in tools}, toml)
+    return VerdictRequest({tool: logbook.query(Analysis.assembly_or_reason, tool, tap_id) for tool in tools}, toml)
 
 
-def modes_of(tap: TapBytes) -> TapFit | None:
+def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
     """The modes in a tap file; None where it cannot be read."""
     with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
         path = Path(work) / "tap.h5"
         path.write_bytes(tap.content)
         try:
-            return fit_tap(read_tap(path), _machine(tap.machine_toml), tap.entry.by_hand)
+            return fit_tap(read_tap(path), _parse_cached(tap.machine_toml), tap.entry.by_hand)
         except DataError:
             return None
 
 
-def verdicts_on(question: Question) -> dict[str, Verdict]:
+def evaluate_programs(question: VerdictRequest) -> dict[str, Verdict]:
     """On all programs, by their names."""
-    machine = _machine(question.machine_toml)
-    return {table.name: judge(table, question.tools[table.tool], machine) for table in machine.program}
+    machine = _parse_cached(question.machine_toml)
+    return {table.name: evaluate_program(table, question.tools[table.tool], machine) for table in machine.program}
 
 
-def _is_fit(tap: TapBytes, answer: Any) -> bool:
-    return answer is None or is_fit(answer, tap.entry)
+def _is_tap_fit(tap: TapFileBytes, answer: Any) -> bool:
+    return answer is None or is_fit_of(answer, tap.entry)
 
 
-def _is_verdicts(question: Question, answer: Any) -> bool:
-    programs = {table.name: table for table in _machine(question.machine_toml).program}
+def _are_verdicts(question: VerdictRequest, answer: Any) -> bool:
+    programs = {table.name: table for table in _parse_cached(question.machine_toml).program}
     return answer.keys() == programs.keys() and all(_is_verdict(programs[name], answer[name]) for name in programs)
 
 
 def _is_verdict(program: ProgramTable, answer: Any) -> bool:
     """An unknown limit is NaN, a known one is not."""
-    known = answer.word is not Word.UNKNOWN
-    return (isinstance(answer, Verdict) and isinstance(answer.word, Word) and answer.program == program) and known == (
-        answer.limit > 0
-    )
+    known = answer.word is not Stability.UNKNOWN
+    return (
+        isinstance(answer, Verdict) and isinstance(answer.stability, Stability) and answer.program == program
+    ) and known == (answer.limit > 0)
 
 
 @lru_cache(maxsize=4)
-def _machine(toml: str) -> Machine:
-    return parse_machine(toml)
+def _parse_cached(toml: str) -> Machine:
+    return parse_machine_file(toml)

@@ -1,47 +1,44 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
-from .archive.verify import verify
+from .daq_rates import apply_measured_rate, check_device_rate, find_stored_rate, has_clock
 from .folder import MachineFolder
+from .folder_files import make_machine_folder
 from .folder_lock import BusyError
-from .journal.tap_entry import BY_FIT, DamagedTapError, TapEntry
-from .known_devices import checked_rate, has_clock, known_rate, use_rate
-from .new_folder import make_machine_folder
-from .settings.cut_tables import FEED_ANGLES, CutTable, ProgramTable, Wear
-from .settings.daq_tables import Daq
-from .settings.doubt_table import DoubtTable
-from .settings.drive import drive_limit
-from .settings.known_tool import KnownTool, known_tool
+from .journal.tap_entry import NO_MODE_EDITS, DamagedTapError, TapEntry
+from .settings.cut_tables import FEED_ANGLES, CutTable, ProgramTable, ToolWear, UncertaintyTable
+from .settings.drive_power import drive_depth_limit
 from .settings.machine_file import REFERENCE_CUT, Machine
-from .settings.setup_tables import Limits, SpeedRange, TapSetup
-from .settings.tool_limits import ToolLimits, Unknown, tool_limits
+from .settings.setup_tables import DaqTable, LimitsTable, SpeedTable, TapTable
+from .settings.tool_limits import MissingToolData, ToolLimits, ToolProperties, find_tool_limits, find_tool_properties
+from .verify_files import verify
 
 __all__ = [
-    "BY_FIT",
     "FEED_ANGLES",
+    "NO_MODE_EDITS",
     "REFERENCE_CUT",
     "BusyError",
     "CutTable",
     "DamagedTapError",
-    "Daq",
-    "DoubtTable",
-    "KnownTool",
-    "Limits",
+    "DaqTable",
+    "LimitsTable",
     "Machine",
     "MachineFolder",
+    "MissingToolData",
     "ProgramTable",
-    "SpeedRange",
+    "SpeedTable",
     "TapEntry",
-    "TapSetup",
+    "TapTable",
     "ToolLimits",
-    "Unknown",
-    "Wear",
-    "checked_rate",
-    "drive_limit",
+    "ToolProperties",
+    "ToolWear",
+    "UncertaintyTable",
+    "apply_measured_rate",
+    "check_device_rate",
+    "drive_depth_limit",
+    "find_stored_rate",
+    "find_tool_limits",
+    "find_tool_properties",
     "has_clock",
-    "known_rate",
-    "known_tool",
     "make_machine_folder",
-    "tool_limits",
-    "use_rate",
     "verify",
 ]

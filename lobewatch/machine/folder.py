@@ -13,22 +13,22 @@ from pathlib import Path
 import msgspec
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
-from acquisition.atomic import make_folder, sync_folder
-from lobewatch.machine.contents import (
+from acquisition.file_io import make_folder, sync_folder
+from lobewatch.machine.folder_contents import (
     FolderContents,
-    committed_taps,
-    contents_of,
-    fault_of,
-    missing_journal,
-    tap_damage,
-    tap_files,
+    find_file_fault,
+    list_tap_files,
+    missing_journal_remark,
+    read_committed_taps,
+    read_folder_contents,
+    tap_damage_remark,
 )
-from lobewatch.machine.folder_lock import PATIENCE, FolderLock
-from lobewatch.machine.folder_path import mark_of, named_folder, path_text
-from lobewatch.machine.journal.journal import Journal, Reading, command
+from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
+from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
+from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
-from lobewatch.machine.settings.machine_file import Machine, read_machine
-from lobewatch.machine.settings.toml_text import toml_text
+from lobewatch.machine.settings.machine_file import Machine, read_machine_file
+from lobewatch.machine.settings.toml_text import read_toml_text
 
 
 class MachineFolder:
@@ -36,14 +36,14 @@ class MachineFolder:
 
     def __init__(self, path: Path | str) -> None:
         """DataError where this is no machine folder, or one whose name no file or page could hold."""
-        self.path = named_folder(path)
+        self.path = to_folder_path(path)
         """Path of the folder."""
-        if path_text(path) != str(path):
-            raise DataError(f"{path_text(path)}: the name of the folder is no UTF-8; rename it")
-        if not self.toml.exists() and tap_files(self.path):
+        if format_path(path) != str(path):
+            raise DataError(f"{format_path(path)}: the name of the folder is no UTF-8; rename it")
+        if not self.toml.exists() and list_tap_files(self.path):
             raise DataError(
                 f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, "
-                f"{command('rebuild', self.path)} takes the copy in the newest of them"
+                f"{format_command('rebuild', self.path)} takes the copy in the newest of them"
             )
         if not self.toml.exists():
             raise DataError(
@@ -57,11 +57,11 @@ class MachineFolder:
 
     @property
     def toml_text(self) -> str:
-        """The text of the machine file as it is now; what `toml_text` of the machine file raises."""
-        return toml_text(self.toml)
+        """The text of the machine file as it is now; what `read_toml_text` of the machine file raises."""
+        return read_toml_text(self.toml)
 
     @property
-    def history(self) -> Path:
+    def history_path(self) -> Path:
         """File of what was worked out of the tap tests, a cache."""
         return self.path / "history.rows"
 
@@ -78,53 +78,53 @@ class MachineFolder:
     @cached_property
     def machine(self) -> Machine:
         """The machine file as it was when first asked for."""
-        return read_machine(self.toml)
+        return read_machine_file(self.toml)
 
     @property
-    def mark(self) -> tuple[int, ...]:
+    def change_mark(self) -> tuple[int, ...]:
         """Changes with machine.toml, the journal, and the names in taps/."""
-        return mark_of(self.path)
+        return compute_change_mark(self.path)
 
     @cached_property
     def _lock(self) -> FolderLock:
         return FolderLock(self.path)
 
-    def locked(self, patience: float = PATIENCE) -> AbstractContextManager[None]:
+    def locked(self, patience: float = LOCK_TIMEOUT) -> AbstractContextManager[None]:
         """Keep other programs from writing here, once or several times over; BusyError where one still does after
         `patience` (s). 0 is for what can be left undone: a person who has asked for something waits.
 
         OSError where this folder can only be read.
         """
-        return self._lock.held(patience)
+        return self._lock.hold(patience)
 
     def contents(self) -> FolderContents:
         """The committed tap tests and their files: which can be used, which cannot, and why."""
-        return contents_of(self.path, self.journal.read())
+        return read_folder_contents(self.path, self.journal.read())
 
     def taps(self) -> list[TapEntry]:
         """The committed tap tests that can be used, oldest first by their time."""
         return list(self.contents().taps)
 
     @property
-    def committed(self) -> set[str]:
+    def committed_ids(self) -> set[str]:
         """Identities of all tap tests in the journal, whatever has become of their files."""
-        return set(committed_taps(self.journal.read()))
+        return set(read_committed_taps(self.journal.read()))
 
-    def refuse_damage(self) -> Reading:
+    def refuse_damage(self) -> JournalReading:
         """The journal; DataError where it has to be mended before anything is written here."""
         reading = self.journal.read()
         self.journal.refuse_damage(reading)
         if not reading.lines and any(remark.code == "journal-damaged" for remark in self.contents().remarks):
             self.journal.refuse_damage(
-                replace(reading, damage=(missing_journal(self.path, len(tap_files(self.path))),))
+                replace(reading, damage=(missing_journal_remark(self.path, len(list_tap_files(self.path))),))
             )
         return reading
 
     def read(self, entry: TapEntry) -> TapTest:
         """A tap test, its file checked against the journal before HDF5 sees it; DamagedTapError where it is not so."""
-        fault = fault_of(self.path, entry)
+        fault = find_file_fault(self.path, entry)
         if fault:
-            raise DamagedTapError(tap_damage(self.path, entry, fault), entry, self.path)
+            raise DamagedTapError(tap_damage_remark(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
             return read_tap(path)

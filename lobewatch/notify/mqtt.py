@@ -1,32 +1,36 @@
-"""Retained messages to MQTT 5 brokers, each acknowledged; brokers that are away cost a few seconds and no error."""
+"""Send retained MQTT 5 messages and keep undelivered ones in an outbox."""
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from acquisition import DataError
+from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
+from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
 
-PATIENCE = 4.0
+MQTT_TIMEOUT = 4.0
 """Time for all brokers together, from the lookup of their names to the last acknowledgement (s); chosen."""
-KEEP_ALIVE = 10
+MQTT_KEEP_ALIVE = 10
 """Time between signs of life (s); after half as long again without one the broker takes the sender for lost."""
-LOST, DONE = (msgspec.json.encode({"sender": word}) for word in ("lost", "done"))
+SENDER_LOST_MESSAGE, SENDER_DONE_MESSAGE = (msgspec.json.encode({"sender": word}) for word in ("lost", "done"))
 """Messages at PREFIX/sender: the last will of a sender that broke off, and the word of one that has told all."""
 
 
-def send(batches: Mapping[Broker, Mapping[str, bytes]]) -> dict[Broker, str]:
+def send_messages(batches: Mapping[Broker, Mapping[str, bytes]]) -> dict[Broker, str]:
     """Put messages, by broker and topic, where they stay: to all brokers at once, for PATIENCE at most.
 
     Returns why not, for each broker that has not acknowledged all.
     """
-    end = time.monotonic() + PATIENCE
-    sendings = {broker: Sending(broker, messages, end) for broker, messages in batches.items()}
+    end = time.monotonic() + MQTT_TIMEOUT
+    sendings = {broker: BrokerThread(broker, messages, end) for broker, messages in batches.items()}
     for sending in sendings.values():
         sending.start()
     for sending in sendings.values():
@@ -34,23 +38,23 @@ def send(batches: Mapping[Broker, Mapping[str, bytes]]) -> dict[Broker, str]:
     return {broker: why for broker, sending in sendings.items() if (why := sending.failure)}
 
 
-class Sending(threading.Thread):
+class BrokerThread(threading.Thread):
     """One attempt to send to one broker; left behind where it does not end, for nothing ends a lookup that hangs."""
 
     def __init__(self, broker: Broker, messages: Mapping[str, bytes], end: float) -> None:
         """end: when nobody waits for it any more (monotonic clock, s)."""
         super().__init__(name=f"to {broker.address}", daemon=True)
         self._broker, self._end = broker, end
-        self._waiting = {**messages, f"{broker.prefix}/sender": DONE}
-        self._n_left, self._refusal = len(self._waiting), ""
-        self._reach("cannot be reached")
+        self._messages = {**messages, f"{broker.prefix}/sender": SENDER_DONE_MESSAGE}
+        self._n_left, self._rejection = len(self._messages), ""
+        self._set_stage("cannot be reached")
 
     def run(self) -> None:
         """Send all, or set down why not; without its last word the broker publishes the last will."""
         client = None
         try:
             client = self._make_client()
-            client.connect(self._broker.host, self._broker.port, KEEP_ALIVE)
+            client.connect(self._broker.host, self._broker.port, MQTT_KEEP_ALIVE)
             self._exchange(client)
         except DataError as error:
             self.failure = f"{self._broker.address}: {error}"
@@ -60,10 +64,10 @@ class Sending(threading.Thread):
             if client is not None and (connection := client.socket()) is not None:
                 connection.close()
 
-    def _reach(self, stage: str) -> None:
+    def _set_stage(self, stage: str) -> None:
         """Set down what is to be said where it goes no further than this."""
         self._stage = stage
-        self.failure = f"{self._broker.address}: {stage} within {PATIENCE:g} s"
+        self.failure = f"{self._broker.address}: {stage} within {MQTT_TIMEOUT:g} s"
 
     def _make_client(self) -> Any:
         """Client of paho, not connected yet; DataError without paho."""
@@ -73,12 +77,14 @@ class Sending(threading.Thread):
         except ImportError as error:
             raise DataError('MQTT needs paho-mqtt; install it with: pip install "lobewatch[mqtt]"') from error
         client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
-        client.connect_timeout = PATIENCE / 2  # for each address of a name: the second has a chance where one is silent
+        client.connect_timeout = (
+            MQTT_TIMEOUT / 2
+        )  # for each address of a name: the second has a chance where one is silent
         if self._broker.user:
             client.username_pw_set(self._broker.user, self._broker.password or None)
         if self._broker.scheme == "mqtts":
             client.tls_set()
-        client.will_set(f"{self._broker.prefix}/sender", LOST, qos=1, retain=True)
+        client.will_set(f"{self._broker.prefix}/sender", SENDER_LOST_MESSAGE, qos=1, retain=True)
         client.on_socket_open = self._on_socket_open
         client.on_connect, client.on_publish = self._on_connect, self._on_publish
         return client
@@ -92,8 +98,8 @@ class Sending(threading.Thread):
                 return
             if code := client.loop(left):
                 raise ConnectionError(error_string(code).rstrip("."))
-        if self._refusal:
-            raise DataError(self._refusal)
+        if self._rejection:
+            raise DataError(self._rejection)
         client.disconnect()
         self.failure = ""
 
@@ -101,16 +107,67 @@ class Sending(threading.Thread):
         """Refuse to begin when another attempt may be under way already."""
         if time.monotonic() > self._end:
             raise TimeoutError
-        self._reach("does not answer")
+        self._set_stage("does not answer")
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            raise DataError(f"refuses ({reason}); {self._broker.withheld or 'see user and password'}")
-        self._reach("has not acknowledged")
-        for topic, content in self._waiting.items():
+            raise DataError(f"refuses ({reason}); {self._broker.password_warning or 'see user and password'}")
+        self._set_stage("has not acknowledged")
+        for topic, content in self._messages.items():
             client.publish(topic, content, qos=1, retain=True)
 
     def _on_publish(self, _client: Any, _data: Any, _number: int, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            self._refusal = f"refuses a message ({reason}); see what the user may write"
+            self._rejection = f"refuses a message ({reason}); see what the user may write"
         self._n_left -= 1
+
+
+OUTBOX_FILE = "unsent.json"
+"""Name of the file of such a message, in the folder of its machine."""
+
+
+class OutboxMessage(msgspec.Struct, frozen=True):
+    """The newest message of a machine; it stands for all before it."""
+
+    topic: str
+    """Topic that it is to stand at."""
+    message: msgspec.Raw
+    """Message as JSON."""
+    broker: tuple[str, str, int]
+    """Scheme, host and port of the broker."""
+
+
+def deliver_messages(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]]) -> dict[Broker, str]:
+    """Send messages (topic and content, by broker and machine folder) with those left over beside.
+
+    Returns why not, for each broker that did not take all. What does not go is kept beside its machine.
+    """
+    fresh = {folder.resolve() for messages in batches.values() for folder in messages}
+    pending = {broker: _read_outboxes(broker, messages, fresh) | dict(messages) for broker, messages in batches.items()}
+    failures = send_messages({broker: dict(messages.values()) for broker, messages in pending.items()})
+    for broker in failures:
+        for folder, (topic, content) in batches[broker].items():
+            _write_outbox(folder, OutboxMessage(topic, msgspec.Raw(content), broker[:3]))
+    for folder in (folder for broker in pending.keys() - failures.keys() for folder in pending[broker]):
+        with contextlib.suppress(OSError):
+            (folder / OUTBOX_FILE).unlink(missing_ok=True)
+    return failures
+
+
+def _read_outboxes(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) -> dict[Path, tuple[str, bytes]]:
+    """Messages to the same broker, of machines beside these but for those with a fresh one."""
+    messages = {}
+    places = {folder.resolve().parent for folder in folders}
+    for path in sorted(path for place in places for path in place.glob(f"*/{OUTBOX_FILE}") if path.parent not in fresh):
+        try:
+            unsent = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=OutboxMessage)
+        except (OSError, ValueError, RecursionError):
+            continue
+        if tuple(unsent.broker) == tuple(broker[:3]):
+            messages[path.parent] = unsent.topic, bytes(unsent.message)
+    return messages
+
+
+def _write_outbox(folder: Path, unsent: OutboxMessage) -> None:
+    with contextlib.suppress(DataError, OSError), MachineFolder(folder).locked(patience=0):
+        atomic_write(folder / OUTBOX_FILE, msgspec.json.encode(unsent))

@@ -5,173 +5,186 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from lobewatch.decay.light import Light
-from lobewatch.decay.reach import Reach
-from lobewatch.plant.plant import MachineStanding
-from lobewatch.plant.summary import SeriesSummary
+from lobewatch.fleet.fleet import FleetMachine
+from lobewatch.fleet.machine_summary import SeriesSummary
+from lobewatch.monitoring.status_rules import StatusLevel
+from lobewatch.monitoring.threshold_dates import ThresholdDates
 
-CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-DAY = 86400.0
+PROMETHEUS_CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+SECONDS_PER_DAY = 86400.0
 """Length of a day (s)."""
-Labels = tuple[tuple[str, str], ...]
+MetricLabels = tuple[tuple[str, str], ...]
 """Names and values of labels."""
 
 
-class Sample(NamedTuple):
+class MetricSample(NamedTuple):
     """One value of a family."""
 
-    labels: Labels
+    labels: MetricLabels
     """Names and values of its labels."""
     value: float
     """Value in the unit that the name of the family says."""
 
 
-def prometheus_text(standings: Sequence[MachineStanding]) -> str:
+def format_prometheus(standings: Sequence[FleetMachine]) -> str:
     """Text of all families, those without a value too."""
     return "".join(
         f"# HELP {name} {meaning}\n# TYPE {name} gauge\n"
-        + "".join(_line(name, sample) for sample in samples(standings))
-        for name, (meaning, samples) in FAMILIES.items()
+        + "".join(_format_sample(name, sample) for sample in samples(standings))
+        for name, (meaning, samples) in METRIC_FAMILIES.items()
     )
 
 
-def _line(name: str, sample: Sample) -> str:
-    labels = ",".join(f'{label}="{_escape(value)}"' for label, value in sample.labels)
+def _format_sample(name: str, sample: MetricSample) -> str:
+    labels = ",".join(f'{label}="{_escape_label(value)}"' for label, value in sample.labels)
     return f"{name}{{{labels}}} {sample.value!r}\n"
 
 
-def _escape(text: str) -> str:
+def _escape_label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _machine(standing: MachineStanding) -> Labels:
+def _label_machine(standing: FleetMachine) -> MetricLabels:
     return ("folder", standing.key), ("machine", standing.summary.name)
 
 
-def _labelled_series(standings: Iterable[MachineStanding]) -> Iterator[tuple[Labels, SeriesSummary]]:
+def _label_series(standings: Iterable[FleetMachine]) -> Iterator[tuple[MetricLabels, SeriesSummary]]:
     """All series, each with its labels."""
     for standing in standings:
         for series in standing.summary.series:
-            yield (*_machine(standing), ("tool", series.tool), ("direction", series.direction)), series
+            yield (*_label_machine(standing), ("tool", series.tool), ("direction", series.direction)), series
 
 
-def _lights(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_status(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
-        for light in Light:
-            yield Sample((*_machine(standing), ("light", light.value)), float(standing.dated.light is light))
+        for light in StatusLevel:
+            yield MetricSample(
+                (*_label_machine(standing), ("light", light.value)), float(standing.current.status is light)
+            )
 
 
-def _reasons(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_reasons(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
-        for code in dict.fromkeys(remark.code for remark in standing.dated.remarks):
-            count = sum(remark.code == code for remark in standing.dated.remarks)
-            yield Sample((*_machine(standing), ("code", code)), float(count))
+        for code in dict.fromkeys(remark.code for remark in standing.current.remarks):
+            count = sum(remark.code == code for remark in standing.current.remarks)
+            yield MetricSample((*_label_machine(standing), ("code", code)), float(count))
 
 
-def _falls(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_drops(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     return (
-        Sample(labels, series.fall / 100) for labels, series in _labelled_series(standings) if series.fall is not None
+        MetricSample(labels, series.drop / 100)
+        for labels, series in _label_series(standings)
+        if series.drop is not None
     )
 
 
-def _frequencies(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_frequencies(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     return (
-        Sample(labels, series.frequency)
-        for labels, series in _labelled_series(standings)
+        MetricSample(labels, series.frequency)
+        for labels, series in _label_series(standings)
         if series.frequency is not None
     )
 
 
-def _up(_standings: Iterable[MachineStanding]) -> Iterator[Sample]:
-    yield Sample((), 1.0)
+def _sample_up(_standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
+    yield MetricSample((), 1.0)
 
 
-def _judged(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
-    return (Sample(_machine(standing), standing.dated.time.timestamp()) for standing in standings)
+def _sample_evaluation_times(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
+    return (MetricSample(_label_machine(standing), standing.current.time.timestamp()) for standing in standings)
 
 
-def _judgeable(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
-    return (Sample(_machine(standing), float(standing.dated.can_be_judged)) for standing in standings)
+def _sample_readable(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
+    return (MetricSample(_label_machine(standing), float(standing.current.is_readable)) for standing in standings)
 
 
-def _alarms(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
-    return (Sample(_machine(standing), float(len(standing.summary.alarms))) for standing in standings)
+def _sample_alarms(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
+    return (MetricSample(_label_machine(standing), float(len(standing.summary.alarms))) for standing in standings)
 
 
-def _acknowledged(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_acknowledged(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
-        quiet = [alarm for alarm in standing.summary.alarms if alarm.is_quiet(standing.dated.time)]
-        yield Sample(_machine(standing), float(len(quiet)))
+        quiet = [alarm for alarm in standing.summary.alarms if alarm.is_acknowledged(standing.current.time)]
+        yield MetricSample(_label_machine(standing), float(len(quiet)))
 
 
-def _open_alarms(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_alarm_times(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         for alarm in standing.summary.alarms:
             labels = ("alarm", alarm.id), ("code", alarm.code), ("about", alarm.about)
-            yield Sample((*_machine(standing), *labels), alarm.raised.timestamp())
+            yield MetricSample((*_label_machine(standing), *labels), alarm.triggered_at.timestamp())
 
 
-def _taps(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_last_taps(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         if standing.summary.time is not None:
-            yield Sample(_machine(standing), standing.summary.time.timestamp())
+            yield MetricSample(_label_machine(standing), standing.summary.time.timestamp())
 
 
-def _due(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_due_dates(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         if standing.summary.time is not None:
-            yield Sample(_machine(standing), standing.summary.time.timestamp() + DAY * standing.summary.interval_days)
+            yield MetricSample(
+                _label_machine(standing),
+                standing.summary.time.timestamp() + SECONDS_PER_DAY * standing.summary.interval_days,
+            )
 
 
-def _limits(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_limits(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         for percent, reach in standing.summary.limits:
-            yield from _reached(standing, (("fall_percent", f"{percent:g}"),), reach)
+            yield from _sample_reach(standing, (("fall_percent", f"{percent:g}"),), reach)
 
 
-def _fates(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_program_forecasts(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         for program, fate in standing.summary.fates.items():
             for word, reach in (("doubtful", fate.doubtful), ("not stable", fate.not_stable)):
-                yield from _reached(standing, (("program", program), ("becomes", word)), reach)
+                yield from _sample_reach(standing, (("program", program), ("becomes", word)), reach)
 
 
-def _reached(standing: MachineStanding, labels: Labels, reach: Reach) -> Iterator[Sample]:
+def _sample_reach(standing: FleetMachine, labels: MetricLabels, reach: ThresholdDates) -> Iterator[MetricSample]:
     """The probable date; the last tap test where that shows it already."""
     last = standing.summary.time
     if reach.is_measured and last is not None:
-        yield Sample((*_machine(standing), *labels), last.timestamp())
+        yield MetricSample((*_label_machine(standing), *labels), last.timestamp())
     elif reach.probable is not None:
-        yield Sample((*_machine(standing), *labels), DAY * reach.probable)
+        yield MetricSample((*_label_machine(standing), *labels), SECONDS_PER_DAY * reach.probable)
 
 
-def _programs(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+def _sample_verdicts(standings: Iterable[FleetMachine]) -> Iterator[MetricSample]:
     for standing in standings:
         for program, word in standing.summary.programs.items():
-            yield Sample((*_machine(standing), ("program", program), ("word", word)), 1.0)
+            yield MetricSample((*_label_machine(standing), ("program", program), ("word", word)), 1.0)
 
 
-FAMILIES = {
-    "lobewatch_up": ("1 as long as anybody answers.", _up),
-    "lobewatch_judged_timestamp_seconds": ("When the machine was judged last.", _judged),
+METRIC_FAMILIES = {
+    "lobewatch_up": ("1 as long as anybody answers.", _sample_up),
+    "lobewatch_judged_timestamp_seconds": ("When the machine was judged last.", _sample_evaluation_times),
     "lobewatch_can_be_judged": (
         "1 where the machine can be judged, 0 where its files do not let.",
-        _judgeable,
+        _sample_readable,
     ),
-    "lobewatch_light": ("1 for the light that the machine has, 0 for the others.", _lights),
-    "lobewatch_reasons": ("How many reasons of a code the light has.", _reasons),
-    "lobewatch_alarms": ("How many alarms are open.", _alarms),
-    "lobewatch_alarms_acknowledged": ("How many of them a person has acknowledged.", _acknowledged),
-    "lobewatch_alarm_raised_timestamp_seconds": ("When each open alarm was raised.", _open_alarms),
-    "lobewatch_frequency_fall_ratio": ("Fall of the followed frequency since the first tests, 0.05 for 5 %.", _falls),
-    "lobewatch_frequency_hertz": ("Followed frequency at the newest point of its series.", _frequencies),
-    "lobewatch_last_tap_timestamp_seconds": ("When the machine was tapped last.", _taps),
-    "lobewatch_tap_due_timestamp_seconds": ("When the next tap test is due.", _due),
-    "lobewatch_limit_timestamp_seconds": ("When a fixed limit is probably reached; none where not in sight.", _limits),
+    "lobewatch_light": ("1 for the light that the machine has, 0 for the others.", _sample_status),
+    "lobewatch_reasons": ("How many reasons of a code the light has.", _sample_reasons),
+    "lobewatch_alarms": ("How many alarms are open.", _sample_alarms),
+    "lobewatch_alarms_acknowledged": ("How many of them a person has acknowledged.", _sample_acknowledged),
+    "lobewatch_alarm_raised_timestamp_seconds": ("When each open alarm was raised.", _sample_alarm_times),
+    "lobewatch_frequency_fall_ratio": (
+        "Fall of the followed frequency since the first tests, 0.05 for 5 %.",
+        _sample_drops,
+    ),
+    "lobewatch_frequency_hertz": ("Followed frequency at the newest point of its series.", _sample_frequencies),
+    "lobewatch_last_tap_timestamp_seconds": ("When the machine was tapped last.", _sample_last_taps),
+    "lobewatch_tap_due_timestamp_seconds": ("When the next tap test is due.", _sample_due_dates),
+    "lobewatch_limit_timestamp_seconds": (
+        "When a fixed limit is probably reached; none where not in sight.",
+        _sample_limits,
+    ),
     "lobewatch_program_timestamp_seconds": (
         "When a program probably becomes doubtful, or not stable; none where not in sight.",
-        _fates,
+        _sample_program_forecasts,
     ),
-    "lobewatch_program_word": ("1 for the word on each cutting program.", _programs),
+    "lobewatch_program_word": ("1 for the word on each cutting program.", _sample_verdicts),
 }
 """Families by name: meaning, and function that yields the samples."""

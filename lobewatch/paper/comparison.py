@@ -54,7 +54,7 @@ class NumberGroup:
     """Numbers, in the order of the paper."""
 
 
-def share_text(share: float, sign: str = "") -> str:
+def format_share(share: float, sign: str = "") -> str:
     """A share in percent, a small one by a power of ten; with "+" as sign also that of a positive one."""
     if abs(share) >= 1e-4:
         return f"{100 * share:{sign}.3g} %"

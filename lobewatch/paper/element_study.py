@@ -1,4 +1,4 @@
-"""The spinning element of (13) to (25) as it is printed, beside the one that has no poles."""
+"""The paper's spinning element compared with the pole-free one."""
 
 from __future__ import annotations
 
@@ -7,19 +7,61 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsm import Spindle, SpinningSegment, spinning_element
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup
-from lobewatch.paper.printed_element import fourth_powers, printed_element
 
-SPEED = 24000.0
+_Float = NDArray[np.float64]
+
+
+def printed_element(
+    segment: SpinningSegment, frequency: float, speed_rpm: float, coupling: float = 1.0, one_sign: bool = True
+) -> _Float:
+    """Stiffness of one element at a frequency (Hz) seen from the shaft, shape (8, 8), laid out as `spinning_element`.
+
+    The eight solutions exp(r z) of (13), r by (14) to (16), each with its ratio of v to u: their end forces are A,
+    their end displacements B. coupling: sign of 2 m Omega w in (5), + as printed, - for u = U cos, v = V sin.
+    one_sign: end forces have one sign at both ends, as (23) is printed; right is the opposite one at z = 0. Not finite
+    where B cannot be inverted: at speed 0, at frequency 0, and where the two are equal.
+    """
+    w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
+    length, exx, eyy = segment.length, segment.rigidity_xx, segment.rigidity_yy
+    same, other = segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin * coupling
+    q = fourth_powers(segment, frequency, speed_rpm)
+    with np.errstate(all="ignore"):
+        root = np.repeat(q + 0j, 4) ** 0.25 * np.tile(1j ** np.arange(4), 2)
+        shape = np.array([np.ones(8), -(eyy * np.repeat(q, 4) - same) / other])
+        displaced, forced = [], []
+        for end, outward in ((0.0, 1.0 if one_sign else -1.0), (length, 1.0)):
+            wave = shape * np.exp(root * end)
+            displaced += [wave, root * wave]
+            rigid = np.array([[eyy], [exx]])
+            forced += [-outward * rigid * root**3 * wave, outward * rigid * root**2 * wave]
+        try:
+            return np.asarray(np.real(np.vstack(forced) @ np.linalg.inv(np.vstack(displaced))))
+        except np.linalg.LinAlgError:
+            return np.full((8, 8), np.nan)
+
+
+def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) -> _Float:
+    """The two fourth powers of the roots of (13) by (14) to (16) (m^-4), shape (2,)."""
+    w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
+    exx, eyy, mass = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length
+    same, other = mass * (w**2 + spin**2), 2 * mass * w * spin
+    mean = same * (exx + eyy) / 2
+    half = np.sqrt(max(mean**2 - exx * eyy * (same**2 - other**2), 0.0))  # not negative but for rounding
+    return np.array([mean + half, mean - half]) / (exx * eyy)
+
+
+ELEMENT_SPEED_RPM = 24000.0
 """Speed at which the segments of the surrogate are compared (rpm)."""
-BEAM = SpinningSegment(length=0.5, rigidity_xx=1.0, rigidity_yy=4.0, mass_per_length=1.0)
+UNEQUAL_BEAM = SpinningSegment(length=0.5, rigidity_xx=1.0, rigidity_yy=4.0, mass_per_length=1.0)
 """Half of a beam of length 1 that is not round, where the signs matter."""
-BEAM_SPEED = 30 / math.pi
+UNEQUAL_BEAM_SPEED_RPM = 30 / math.pi
 """Its speed (rpm), 1 rad/s."""
-SCAN = np.linspace(0.05, 40.0, 1600)
+ROOT_SCAN_FREQUENCIES = np.linspace(0.05, 40.0, 1600)
 """Frequencies where sign changes of its determinant are looked for (rad/s)."""
 
 
@@ -47,15 +89,15 @@ class ElementStudy:
 
 def study_element(spindle: Spindle) -> ElementStudy:
     """The segments of a round shaft, and a cantilever that is not round."""
-    segments = list(_spinning(spindle))
+    segments = list(_spinning_segments(spindle))
     frequency = printed.FREQUENCY
     at_rest, at_speed = (printed_element(segments[0], frequency, speed) for speed in (0.0, 60 * frequency))
-    as_printed = printed_element(BEAM, 0.3, BEAM_SPEED)
-    right, other, wrong = _roots(-1.0, False), _roots(1.0, False), _roots(-1.0, True)
+    as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
+    right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
     return ElementStudy(
         max(_root_error(segment) for segment in segments),
-        max(_error(segment, frequency, SPEED) for segment in segments),
-        max(_error(segment, frequency, 60 * frequency * (1 + 1e-6)) for segment in segments),
+        max(_element_error(segment, frequency, ELEMENT_SPEED_RPM) for segment in segments),
+        max(_element_error(segment, frequency, 60 * frequency * (1 + 1e-6)) for segment in segments),
         (bool(np.all(np.isfinite(at_rest))), bool(np.all(np.isfinite(at_speed)))),
         float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed))),
         right[0],
@@ -69,13 +111,13 @@ def element_section(study: ElementStudy) -> NumberGroup:
     at_rest, at_speed = ("exists" if finite else "does not exist" for finite in study.is_finite)
     right, wrong = study.roots
     solver = "against an eigenvalue solver, 26 segments at 1722 Hz: right as printed"
-    rounding = f"signs put right, 26 segments, {SPEED:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
+    rounding = (
+        f"signs put right, 26 segments, {ELEMENT_SPEED_RPM:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
+    )
     near = f"1e-6 beside the speed of 1722 Hz; where both are equal A B^-1 {at_speed}, ours does"
     shapes = f"a cantilever that is not round; {study.first_root:.5f} with the right sign: shapes alone are changed"
     symmetric = "in its largest entry: end forces have one sign as printed; with the right ones K is symmetric"
-    none = (
-        f"assembled as printed, that cantilever has so many frequencies below {SCAN[-1]:.0f} rad/s; right are {right}"
-    )
+    none = f"assembled as printed, that cantilever has so many frequencies below {ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s; right are {right}"
     return NumberGroup(
         "The spinning element: eqs. (5) and (13) to (25)",
         (),
@@ -90,13 +132,13 @@ def element_section(study: ElementStudy) -> NumberGroup:
     )
 
 
-def _spinning(spindle: Spindle) -> Iterator[SpinningSegment]:
+def _spinning_segments(spindle: Spindle) -> Iterator[SpinningSegment]:
     for segment in spindle.segments:
         rigidity = spindle.youngs_modulus * segment.second_moment
         yield SpinningSegment(segment.length, rigidity, rigidity, spindle.density * segment.area)
 
 
-def _error(segment: SpinningSegment, frequency: float, speed_rpm: float) -> float:
+def _element_error(segment: SpinningSegment, frequency: float, speed_rpm: float) -> float:
     """Largest error as a share of the largest entry, moments and slopes taken times and over the length."""
     sections = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length, segment.length
     exact = spinning_element(*sections, [frequency], speed_rpm)[0]
@@ -106,7 +148,7 @@ def _error(segment: SpinningSegment, frequency: float, speed_rpm: float) -> floa
 
 
 def _root_error(segment: SpinningSegment) -> float:
-    w, spin = 2 * np.pi * printed.FREQUENCY, SPEED * np.pi / 30
+    w, spin = 2 * np.pi * printed.FREQUENCY, ELEMENT_SPEED_RPM * np.pi / 30
     same, other = segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin
     pencil = np.array(
         [
@@ -115,21 +157,25 @@ def _root_error(segment: SpinningSegment) -> float:
         ]
     )
     exact = np.sort(np.linalg.eigvals(pencil).real)[::-1]
-    return float(np.max(np.abs(fourth_powers(segment, printed.FREQUENCY, SPEED) / exact - 1)))
+    return float(np.max(np.abs(fourth_powers(segment, printed.FREQUENCY, ELEMENT_SPEED_RPM) / exact - 1)))
 
 
-def _roots(coupling: float, one_sign: bool) -> list[float]:
+def _cantilever_roots(coupling: float, one_sign: bool) -> list[float]:
     """Frequencies (rad/s) of the cantilever of two elements where its determinant changes sign."""
     from scipy.optimize import brentq  # takes longer to import than what it solves
 
     def determinant(w: float) -> float:
-        element = printed_element(BEAM, w / (2 * np.pi), BEAM_SPEED, coupling, one_sign)
+        element = printed_element(UNEQUAL_BEAM, w / (2 * np.pi), UNEQUAL_BEAM_SPEED_RPM, coupling, one_sign)
         whole = np.zeros((12, 12))
         whole[:8, :8] += element
         whole[4:, 4:] += element
         sign, size = np.linalg.slogdet(whole[4:, 4:])
         return float(sign * np.exp(size / 8))
 
-    values = [determinant(w) for w in SCAN]
-    pairs = [(a, b) for a, b, x, y in zip(SCAN, SCAN[1:], values, values[1:], strict=False) if x * y < 0]
+    values = [determinant(w) for w in ROOT_SCAN_FREQUENCIES]
+    pairs = [
+        (a, b)
+        for a, b, x, y in zip(ROOT_SCAN_FREQUENCIES, ROOT_SCAN_FREQUENCIES[1:], values, values[1:], strict=False)
+        if x * y < 0
+    ]
     return [float(brentq(determinant, a, b, xtol=1e-12)) for a, b in pairs]

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobes import Cut, StabilityLobes, aged_mode, average_angle, pocket_shifts, zero_order
+from lobes import Cut, StabilityLobes, age_mode, average_angle_lobes, match_pockets, zero_order_lobes
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup
 from modal import Mode
 
-CUT = Cut(teeth=2, immersion=1.0, direction="up", tangential=600e6, radial=180e6)
+STUDY_CUT = Cut(teeth=2, immersion=1.0, direction="up", tangential=600e6, radial=180e6)
 """A slot with two teeth. The paper says nothing of its cut: Kt scales all depths alike, the teeth all speeds."""
-SPEEDS = np.arange(6000.0, 30001.0, 2.0)
+LOBE_SPEEDS_RPM = np.arange(6000.0, 30001.0, 2.0)
 """Speeds (rpm)."""
-DEEP = 20.0
+POCKET_DEPTH_RATIO = 20.0
 """Pockets are cut off at so many times the lowest limit."""
 
 
@@ -46,11 +46,11 @@ class LobeStudy:
     @property
     def pocket(self) -> tuple[float, float]:
         """Speed of the deepest pocket below the end of the chart, new and old (rpm)."""
-        shifts = pocket_shifts(self.new, self.by_rule, DEEP * self.new.minimum.depth)
-        deepest = max(shifts, key=lambda shift: shift.then.depth)
-        return deepest.then.speed_rpm, deepest.now.speed_rpm
+        shifts = match_pockets(self.new, self.by_rule, POCKET_DEPTH_RATIO * self.new.minimum.depth)
+        deepest = max(shifts, key=lambda shift: shift.before.depth)
+        return deepest.before.speed_rpm, deepest.after.speed_rpm
 
-    def left_in_pocket(self, lobes: StabilityLobes) -> float:
+    def pocket_limit_ratio(self, lobes: StabilityLobes) -> float:
         """Limit at the speed of the new spindle's pocket over what it was there."""
         speed = self.pocket[0]
         return float(lobes.depth_at(speed) / self.new.depth_at(speed))
@@ -65,17 +65,21 @@ class LobeStudy:
 def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -> LobeStudy:
     """From the paper's mode, the model's K old over new, and the modes of the surrogate."""
     ratio = printed.OLD_FREQUENCY / printed.FREQUENCY
-    aged = aged_mode(measured, 0.9, "paper"), aged_mode(measured, ratio, "model", stiffness_ratio)
+    aged = age_mode(measured, 0.9, "paper"), age_mode(measured, ratio, "model", stiffness_ratio)
     first = modes[:1]
     new, by_rule, by_model, one_mode, six_modes = (
-        average_angle(tip, None, CUT, SPEEDS) for tip in ([measured], [aged[0]], [aged[1]], first, modes)
+        average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM)
+        for tip in ([measured], [aged[0]], [aged[1]], first, modes)
     )
-    wide = zero_order(first, first, CUT, SPEEDS), zero_order(modes, modes, CUT, SPEEDS)
-    masses = (_mass(measured), _mass(aged[0]), _mass(aged[1]))
+    wide = (
+        zero_order_lobes(first, first, STUDY_CUT, LOBE_SPEEDS_RPM),
+        zero_order_lobes(modes, modes, STUDY_CUT, LOBE_SPEEDS_RPM),
+    )
+    masses = (_modal_mass(measured), _modal_mass(aged[0]), _modal_mass(aged[1]))
     return LobeStudy(new, by_rule, by_model, one_mode, six_modes, wide, masses)
 
 
-def _mass(mode: Mode) -> float:
+def _modal_mass(mode: Mode) -> float:
     """Modal mass (kg)."""
     return float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2)
 
@@ -83,12 +87,14 @@ def _mass(mode: Mode) -> float:
 def lobe_section(study: LobeStudy) -> NumberGroup:
     """Numbers of the lobes."""
     return NumberGroup(
-        "Stability lobes, new and old: Fig. 10", ("fig-10",), (*_limits(study), *_pockets(study), *_more(study))
+        "Stability lobes, new and old: Fig. 10",
+        ("fig-10",),
+        (*_limit_numbers(study), *_pocket_numbers(study), *_further_numbers(study)),
     )
 
 
-def _limits(study: LobeStudy) -> list[Comparison]:
-    loop = CUT.specific_force * CUT.teeth_in_cut * CUT.orientation_factors[0]
+def _limit_numbers(study: LobeStudy) -> list[Comparison]:
+    loop = STUDY_CUT.specific_force * STUDY_CUT.teeth_in_cut * STUDY_CUT.orientation_factors[0]
     per_stiffness = 2 * printed.DAMPING_RATIO * (1 + printed.DAMPING_RATIO)
     new, old = study.new.minimum.depth * loop, study.by_rule.minimum.depth * loop
     form = "2 K zeta (1 + zeta) of the printed K and zeta; ours is the lowest point of the chart"
@@ -109,12 +115,12 @@ def _limits(study: LobeStudy) -> list[Comparison]:
     ]
 
 
-def _pockets(study: LobeStudy) -> list[Comparison]:
+def _pocket_numbers(study: LobeStudy) -> list[Comparison]:
     before, after = study.pocket
-    deepest = f"the deepest below {SPEEDS[-1]:.0f} rpm, two teeth"
+    deepest = f"the deepest below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two teeth"
     moved = f"x {after / before:.3f}: goes with f_1, whatever K does"
     text = "limit at the speed of that pocket over what it was: a cut that sat in it"
-    rule, model = study.left_in_pocket(study.by_rule), study.left_in_pocket(study.by_model)
+    rule, model = study.pocket_limit_ratio(study.by_rule), study.pocket_limit_ratio(study.by_model)
     return [
         Comparison("a pocket, new", "Fig. 10", None, before, "rpm", 5, deepest),
         Comparison("the same pocket, old", "Fig. 10", None, after, "rpm", 5, moved),
@@ -123,7 +129,7 @@ def _pockets(study: LobeStudy) -> list[Comparison]:
     ]
 
 
-def _more(study: LobeStudy) -> list[Comparison]:
+def _further_numbers(study: LobeStudy) -> list[Comparison]:
     rows = []
     for name, first, several in (("feed alone", study.one_mode, study.six_modes), ("x and y", *study.by_zero_order)):
         lowest, median, worst = (100 * error for error in study.errors_of_one_mode(first, several))

@@ -1,9 +1,10 @@
-"""The shaft of Figs. 3, 7, 8 and 9: frequencies, bearings calibrated to them, critical speeds."""
+"""Shaft of Figs. 3 and 7 to 9: frequencies, calibrated bearings, critical speeds, tip stiffness."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +17,30 @@ from dsm import (
     calibrate,
     critical_speed,
     natural_frequencies,
+    static_stiffness,
     stiffness_curve,
     whirl_map,
 )
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.paper import printed
-from lobewatch.paper.comparison import Comparison, NumberGroup, share_text
-from lobewatch.paper.shaft import surrogate
+from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
+
+
+def surrogate_spindle(bearing_stiffness: float, theory: Theory = "euler-bernoulli") -> Spindle:
+    """The packaged surrogate (26 segments, fitted to the paper's frequencies), each bearing as stiff as given (N/m)."""
+    text = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
+    machine = parse_machine_file(text)
+    spindle = machine.model(machine.tap.tool)
+    bearings = [replace(bearing, stiffness=bearing_stiffness) for bearing in spindle.bearings]
+    return replace(spindle, bearings=bearings, theory=theory)
+
 
 _Float = NDArray[np.float64]
-POINTS = 300
+STIFFNESS_CURVE_POINTS = 300
 """Points of Fig. 8; chosen, finer than a screen shows."""
-SPEEDS = np.linspace(0.0, 150e3, 61)
+WHIRL_SPEEDS_RPM = np.linspace(0.0, 150e3, 61)
 """Speeds of Figs. 7 and 9 (rpm)."""
-OPERATING_SPEED = 24000.0
+OPERATING_SPEED_RPM = 24000.0
 """The fastest that the machine of the example turns (rpm)."""
 
 
@@ -55,18 +67,18 @@ class ShaftStudy:
     whirl: WhirlMap
     """Frequencies over speed on calibrated bearings."""
     at_speed: tuple[float, float]
-    """Backward and forward whirl on calibrated bearings at `OPERATING_SPEED`, seen from the housing (Hz)."""
+    """Backward and forward whirl on calibrated bearings at `OPERATING_SPEED_RPM`, seen from the housing (Hz)."""
 
 
 def study_shaft(theory: Theory) -> ShaftStudy:
     """All of it by "euler-bernoulli" or "timoshenko"."""
-    shaft = surrogate(printed.BEARING_STIFFNESS, theory)
-    rigid = surrogate(math.inf, theory)
+    shaft = surrogate_spindle(printed.BEARING_STIFFNESS, theory)
+    rigid = surrogate_spindle(math.inf, theory)
     new = calibrate(shaft, printed.FREQUENCY)
     highest = float(natural_frequencies(rigid, 1)[0])
-    frequency = np.linspace(0.13, 0.9985, POINTS) * highest
-    turning = whirl_map(new.spindle, np.array([OPERATING_SPEED]), 1)
-    old = surrogate(printed.OLD_BEARING_STIFFNESS, theory)
+    frequency = np.linspace(0.13, 0.9985, STIFFNESS_CURVE_POINTS) * highest
+    turning = whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
+    old = surrogate_spindle(printed.OLD_BEARING_STIFFNESS, theory)
     return ShaftStudy(
         rigid,
         highest,
@@ -75,8 +87,8 @@ def study_shaft(theory: Theory) -> ShaftStudy:
         calibrate(new.spindle, printed.OLD_FREQUENCY),
         (critical_speed(rigid), critical_speed(new.spindle)),
         (stiffness_curve(shaft, frequency), frequency),
-        whirl_map(rigid, SPEEDS, 1),
-        whirl_map(new.spindle, SPEEDS, 1),
+        whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
+        whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
         (float(turning.backward[0, 0]), float(turning.forward[0, 0])),
     )
 
@@ -84,12 +96,14 @@ def study_shaft(theory: Theory) -> ShaftStudy:
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
     """Numbers of the model at rest and of the model that spins; plain is Euler-Bernoulli, shear Timoshenko theory."""
     return (
-        NumberGroup("The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_at_rest(plain, shear))),
-        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), tuple(_spinning(plain, shear))),
+        NumberGroup(
+            "The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_numbers_at_rest(plain, shear))
+        ),
+        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), tuple(_spinning_numbers(plain, shear))),
     )
 
 
-def _at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
+def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     fitted = "what the fit of the surrogate leaves"
     same = "as many; dimensions are not public: those of the surrogate are fitted to the frequencies"
     excess = (plain.rigid_frequency / printed.FREQUENCY - 1) * 100
@@ -102,11 +116,11 @@ def _at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         Comparison("it is above f_1 measured by", "", printed.RIGID_EXCESS, excess, "%", 3, rounded),
         Comparison("f_1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
         Comparison("f_1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
-        *_bearings(plain, shear, fitted),
+        *_bearing_numbers(plain, shear, fitted),
     ]
 
 
-def _bearings(plain: ShaftStudy, shear: ShaftStudy, fitted: str) -> list[Comparison]:
+def _bearing_numbers(plain: ShaftStudy, shear: ShaftStudy, fitted: str) -> list[Comparison]:
     theory = "a stiffness calibrated to a frequency is an equivalent number of the beam theory"
     new, old = printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
     left = "a quotient of the two above"
@@ -120,7 +134,7 @@ def _bearings(plain: ShaftStudy, shear: ShaftStudy, fitted: str) -> list[Compari
     ]
 
 
-def _spinning(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
+def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     pairs = (
         ("critical speed, rigid", "Fig. 7", printed.RIGID_CRITICAL_SPEED, 60 * printed.RIGID_FREQUENCY),
         ("critical speed, 1722 Hz", "Fig. 9", printed.CRITICAL_SPEED, 60 * printed.FREQUENCY),
@@ -128,7 +142,7 @@ def _spinning(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     lifted = "gyroscopic moments lift the forward whirl"
     rows = []
     for i, (name, where, value, exact) in enumerate(pairs):
-        off = share_text(value / exact - 1, "+")
+        off = format_share(value / exact - 1, "+")
         reason = lifted if i else f"{lifted}, shear and rotary inertia lower f_1 more"
         rows += [
             Comparison(
@@ -144,10 +158,60 @@ def _spinning(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         ]
     seen = "seen from the housing: spin changes the view from the shaft alone"
     parted = "seen from the housing: what spin does where rotary inertia counts"
-    turning = f"at {OPERATING_SPEED:.0f} rpm"
+    turning = f"at {OPERATING_SPEED_RPM:.0f} rpm"
     return [
         *rows,
         Comparison(f"f_1 {turning}", "", None, plain.at_speed[1], "Hz", 6, seen),
         Comparison("backward, with shear", "", None, shear.at_speed[0], "Hz", 6, parted),
         Comparison("forward, with shear", "", None, shear.at_speed[1], "Hz", 6, parted),
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessStudy:
+    """Stiffness at the tool tip of the surrogate, new and old."""
+
+    static: tuple[float, float]
+    """Exact static stiffness (N/m)."""
+    linearized: tuple[float, float]
+    """The same by (30) to (36), linearised at the natural frequency (N/m)."""
+    modal: tuple[float, float]
+    """Modal stiffness of mode 1 (N/m)."""
+
+
+def study_stiffness(old: Calibration) -> StiffnessStudy:
+    """From the bearings calibrated to the frequency before and after the fall."""
+    pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
+    before, after = (static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
+    return StiffnessStudy(
+        (old.static_stiffness_before, old.static_stiffness_after),
+        (before, after),
+        (old.modal_stiffness_before, old.modal_stiffness_after),
+    )
+
+
+def stiffness_section(study: StiffnessStudy) -> NumberGroup:
+    """Numbers of the tip stiffness."""
+    old = printed.OLD_STIFFNESS
+    ratio = round(old / printed.STIFFNESS, 4)
+    static, modal = study.linearized[1] / study.linearized[0], study.modal[1] / study.modal[0]
+    rounded = "0.9 x 1722, which the paper rounds"
+    rule = "equal in every printed digit: K_theo is this rule, and not (30) to (36)"
+    off = format_share(study.linearized[1] / study.static[1] - 1, "+")
+    cost = f"linearised at 1550 Hz, {off} off the exact one; and another shaft"
+    exact = "term 0 of the dynamic stiffness, exact"
+    part = "by (30) to (36) at both frequencies: the bearings are a part of the softness only"
+    shown = "what an FRF shows and the lobes need: it hardly falls"
+    return NumberGroup(
+        "Tip stiffness of the old spindle: eqs. (30) to (36)",
+        (),
+        (
+            Comparison("f_1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
+            Comparison("K_theo by the rule 0.9 K_exp", "(36)", old, 0.9 * printed.STIFFNESS, "N/m", 6, rule),
+            Comparison("K_theo by (30) to (36)", "(36)", old, study.linearized[1], "N/m", 5, cost),
+            Comparison("K static, new", "(35)", None, study.static[0], "N/m", 5, exact),
+            Comparison("K static, old", "(35)", None, study.static[1], "N/m", 5, exact),
+            Comparison("K static, old over new", "(36)", ratio, static, "-", 4, part),
+            Comparison("K of mode 1, old over new", "", ratio, modal, "-", 4, shown),
+        ),
+    )

@@ -1,26 +1,61 @@
-"""The tap test of Figs. 5 and 6: one mode as the paper measured it, picked by (28) and (29)."""
+"""Tap test of Figs. 5 and 6: one mode as the paper measured it, on emulated hits."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
-from acquisition import Frf
+from acquisition import (
+    Channel,
+    Frf,
+    HammeredStructure,
+    Hammering,
+    SimulatedSource,
+    Structure,
+    Trigger,
+    capture_hits,
+    check_hit,
+    estimate_frf,
+)
 from dsm import Spindle, mode_shapes
 from lobewatch.paper import printed
-from lobewatch.paper.comparison import Comparison, NumberGroup, share_text
-from lobewatch.paper.emulated_taps import emulated_taps
-from modal import Mode, fit_modes, pick_peaks, synthesize
+from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
+from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
-LINES = np.arange(1000.0, 2501.0)
+EMULATED_TAP_RATE = 25600.0
+"""Samples a second."""
+EMULATED_TAP_CHANNELS = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
+"""Hammer and accelerometer of the demo."""
+EMULATED_TAP_TRIGGER = Trigger(level=20.0, n_samples=6400, pre_trigger=512)
+"""Records of 0.25 s."""
+EMULATED_TAP_SECONDS = 10.0
+"""Time in which ten good hits are there."""
+
+
+def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[Frf]:
+    """The FRF of each of so many tap tests, each with random numbers of its own."""
+    values = np.array([(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes])
+    structure = Structure(values[:, 0], values[:, 1], values[:, 2])
+    for seed in range(tests):
+        signal = HammeredStructure(structure, EMULATED_TAP_RATE, np.random.default_rng(seed), Hammering())
+        source = SimulatedSource(
+            signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
+        )
+        source.start()
+        good = (hit for hit in capture_hits(source, EMULATED_TAP_TRIGGER) if not check_hit(hit))
+        yield estimate_frf(list(islice(good, hits)))
+
+
+TAP_FREQUENCY_LINES = np.arange(1000.0, 2501.0)
 """Lines of the FRF, 1 Hz apart (Hz)."""
-BAND = (1200.0, 2300.0)
+TAP_BAND = (1200.0, 2300.0)
 """Band in which the mode of a tap test is looked for (Hz)."""
-TESTS = 8
+EMULATED_TESTS = 8
 """Emulated tap tests."""
-MODES = 6
+SURROGATE_MODES = 6
 """Modes of the surrogate that are looked at."""
 
 
@@ -65,14 +100,14 @@ class TapStudy:
 def study_tap(spindle: Spindle) -> TapStudy:
     """The paper's mode, and the surrogate with its calibrated bearings."""
     measured = Mode(printed.FREQUENCY, printed.DAMPING_RATIO, printed.STIFFNESS)
-    shapes = mode_shapes(spindle, MODES)
+    shapes = mode_shapes(spindle, SURROGATE_MODES)
     modes = tuple(
         Mode(float(frequency), printed.DAMPING_RATIO, float(stiffness))
         for frequency, stiffness in zip(shapes.frequency, shapes.stiffness_at(0.0), strict=True)
     )
-    frf, other = synthesize([measured], LINES), synthesize(modes, LINES)
-    taps = list(emulated_taps(modes, TESTS))
-    picked, fitted = ([_first(method(tap, BAND)) for tap in taps] for method in (pick_peaks, fit_modes))
+    frf, other = synthesize_frf([measured], TAP_FREQUENCY_LINES), synthesize_frf(modes, TAP_FREQUENCY_LINES)
+    taps = list(emulate_taps(modes, EMULATED_TESTS))
+    picked, fitted = ([_nearest_mode(method(tap, TAP_BAND)) for tap in taps] for method in (pick_peaks, fit_modes))
     return TapStudy(
         measured,
         frf,
@@ -82,17 +117,17 @@ def study_tap(spindle: Spindle) -> TapStudy:
         other,
         pick_peaks(other)[0],
         taps[0],
-        _scatter(picked, modes[0]),
-        _scatter(fitted, modes[0]),
+        _relative_scatter(picked, modes[0]),
+        _relative_scatter(fitted, modes[0]),
     )
 
 
-def _first(modes: Sequence[Mode]) -> Mode:
+def _nearest_mode(modes: Sequence[Mode]) -> Mode:
     """The mode nearest to the measured frequency."""
     return min(modes, key=lambda mode: abs(mode.frequency - printed.FREQUENCY))
 
 
-def _scatter(modes: Sequence[Mode], truth: Mode) -> tuple[float, float]:
+def _relative_scatter(modes: Sequence[Mode], truth: Mode) -> tuple[float, float]:
     """rms error of zeta and of K as shares of the truth."""
     values = np.array([(mode.damping_ratio, mode.stiffness) for mode in modes])
     zeta, stiffness = np.sqrt(np.mean((values / (truth.damping_ratio, truth.stiffness) - 1) ** 2, axis=0))
@@ -107,13 +142,11 @@ def tap_section(study: TapStudy) -> NumberGroup:
     closed = "closed form; not printed"
     exact = "least squares has no bias"
     halves = "half by (28), half by the f_1 of the peak"
-    high = f"zeta^2 ({share_text(zeta**2)}) high for one mode alone, {halves}; the rest: lines 1 Hz apart"
-    low = f"5/4 zeta^2 ({share_text(1.25 * zeta**2)}) low for one mode alone; the rest: lines 1 Hz apart"
+    high = f"zeta^2 ({format_share(zeta**2)}) high for one mode alone, {halves}; the rest: lines 1 Hz apart"
+    low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) low for one mode alone; the rest: lines 1 Hz apart"
     other = "the surrogate is fitted to frequencies, not to K"
-    tails = (
-        f"{share_text(study.surrogate_picked.stiffness / model.stiffness - 1, '+')}: tails of modes 2 to {MODES} too"
-    )
-    often = f"rms over {TESTS} emulated tap tests of ten hits, against the truth"
+    tails = f"{format_share(study.surrogate_picked.stiffness / model.stiffness - 1, '+')}: tails of modes 2 to {SURROGATE_MODES} too"
+    often = f"rms over {EMULATED_TESTS} emulated tap tests of ten hits, against the truth"
     rest = f"{often}: picking takes three lines, 4 Hz apart, for all"
     (zeta_picked, k_picked), (zeta_fitted, k_fitted) = study.scatter_picked, study.scatter_fitted
     return NumberGroup(

@@ -1,17 +1,15 @@
 """Whether hammer, accelerometer, DAQ and computer are right: a look at them, a hung mass, a common signal."""
 
-from lobewatch.sensors.examine_computer import Finding, examine_computer
-from lobewatch.sensors.list_sensors import SensorList, list_sensors
-from lobewatch.sensors.mass_check import MassCheck, check_mass
-from lobewatch.sensors.skew_check import SkewCheck, check_skew
+from lobewatch.sensors.computer_check import Finding, check_computer
+from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck, check_mass, check_skew, list_sensors
 
 __all__ = [
     "Finding",
     "MassCheck",
     "SensorList",
     "SkewCheck",
+    "check_computer",
     "check_mass",
     "check_skew",
-    "examine_computer",
     "list_sensors",
 ]

@@ -10,34 +10,43 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
-from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
+from acquisition import DataError, Driver, EmulationSetup, EmulatorThread, Structure
+from acquisition.emulation import Housing, HousingSignal, MillingCut, Passage, make_random_housing, simulate_cut
 from dsm import Spindle
 from lobes import Cut, Program, program_limit
-from lobewatch.cuts.learning.priors import FORCE
+from lobewatch.cuts.learning.prior_samples import ROTATING_FORCE_PRIOR
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure, felt_by
-from lobewatch.verdicts.draws import DAMPING, FREQUENCY, STIFFNESS
+from lobewatch.machine.settings.requested_cut import CutSetting
+from lobewatch.tap.emulated_spindle import (
+    EMULATED_SAMPLE_RATE,
+    build_structure,
+    get_emulated_inputs,
+    map_signal_to_inputs,
+)
+from lobewatch.verdicts.program_samples import (
+    ROTATING_DAMPING_FACTOR,
+    ROTATING_FREQUENCY_FACTOR,
+    ROTATING_STIFFNESS_FACTOR,
+)
 from modal import Mode
 
-PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
+DEFAULT_PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
 """Air, cut, air (s), again and again."""
-STIFFEST, HIGHEST = 100.0, 6000.0
+MAX_MODE_STIFFNESS_RATIO, MAX_EMULATED_MODE_FREQUENCY = 100.0, 6000.0
 """Modes so many times as stiff as the softest, or so high (Hz), are left out: a cut hardly moves them, but steps for
 them take long; chosen."""
-HEARD = np.arange(100.0, 8000.0, 2.0)
+HOUSING_GAIN_FREQUENCIES = np.arange(100.0, 8000.0, 2.0)
 """Frequencies of cuts and chatter (Hz)."""
-FEED_SHARE = 5e-3
+DEFAULT_FEED_SHARE = 5e-3
 """Feed per tooth over diameter, where machine.toml does not say; chosen."""
-EDGES = (25e3, 35e3)
+DEFAULT_EDGE_COEFFICIENTS = (25e3, 35e3)
 """Tangential and radial edge coefficients (N/m), where they are not known: about those of aluminium."""
-LEAST = 0.3
+MIN_HIDDEN_FACTOR = 0.3
 """Least share of its middle that a drawn factor falls to; chosen."""
-OFF_COMMAND = 0.015
+MAX_SPEED_DEVIATION = 0.015
 """Share by which the spindle turns slower or faster than it is told, at most; chosen."""
-RUNOUT = 20e-6
+MAX_RUNOUT = 20e-6
 """Largest eccentricity of a tool in its holder (m); chosen."""
 
 
@@ -51,7 +60,7 @@ class ModeFactors(NamedTuple):
     stiffness: float
     """Factor on the stiffnesses (-)."""
 
-    def of(self, at_rest: Structure) -> Structure:
+    def apply_to(self, at_rest: Structure) -> Structure:
         """Structure at speed, from that at rest."""
         return Structure(
             at_rest.frequency * self.frequency,
@@ -103,7 +112,7 @@ def emulate_cut(
     realtime: bool = True,
     tcp: bool = False,
     spindle: Spindle | None = None,
-    passage: Passage = PASSAGE,
+    passage: Passage = DEFAULT_PASSAGE,
 ) -> EmulatedCut:
     """Somebody makes this cut, again and again; the accelerometer is on the housing, the hammer lies idle.
 
@@ -113,47 +122,49 @@ def emulate_cut(
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
-    truth, random, noise = hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
-    runout = runout_of(setting.cut, random)
-    cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
-    motion, housing = simulate_cut(cut, passage), _levelled(random_housing(random, cut.speed_rpm))
-    inputs = emulated_inputs(folder, driver)
-    bench = Bench(
-        lambda rate: felt_by(inputs, CutSound(motion, housing, cut.speed_rpm, rate, noise)),
+    truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
+    runout = draw_runout(setting.cut, random)
+    cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
+    motion, housing = simulate_cut(cut, passage), _normalize_gain(make_random_housing(random, cut.speed_rpm))
+    inputs = get_emulated_inputs(folder, driver)
+    bench = EmulationSetup(
+        lambda rate: map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise)),
         inputs,
-        SAMPLE_RATE,
+        EMULATED_SAMPLE_RATE,
         realtime,
         tcp,
         folder.machine.daq.digital_clock,
     )
-    return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _limit(cut, setting))
+    return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _find_true_limit(cut, setting))
 
 
-def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
+def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Modes of the tip that a cut moves."""
     table = folder.machine.spindle
     if table is None:
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    whole = emulated_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
+    whole = build_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
     softest = int(np.argmin(whole.stiffness))
-    moved = (whole.stiffness < STIFFEST * whole.stiffness[softest]) & (whole.frequency < HIGHEST)
+    moved = (whole.stiffness < MAX_MODE_STIFFNESS_RATIO * whole.stiffness[softest]) & (
+        whole.frequency < MAX_EMULATED_MODE_FREQUENCY
+    )
     moved[softest] = True
     return Structure(whole.frequency[moved], whole.damping_ratio[moved], whole.stiffness[moved])
 
 
-def _levelled(housing: Housing) -> Housing:
+def _normalize_gain(housing: Housing) -> Housing:
     """Housing with a gain that its own modes do not exceed: with a sensor that chatter does not overload."""
-    loudest = float(np.max(np.abs(housing.transfer(HEARD))))
+    loudest = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
     return replace(housing, gain=(housing.gain[0] / loudest, housing.gain[1] / loudest))
 
 
-def _turning_cut(
+def _build_true_cut(
     folder: MachineFolder, setting: CutSetting, at_rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
 ) -> MillingCut:
     coefficients = folder.machine.coefficients(setting.table)
     edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
-    edges = np.where(np.isfinite(edges), edges, EDGES)
-    feed = setting.table.feed_per_tooth_mm or FEED_SHARE * setting.table.tool_diameter_mm
+    edges = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS)
+    feed = setting.table.feed_per_tooth_mm or DEFAULT_FEED_SHARE * setting.table.tool_diameter_mm
     return MillingCut(
         teeth=setting.cut.teeth,
         entry_angle=setting.cut.entry_angle,
@@ -165,8 +176,8 @@ def _turning_cut(
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
         speed_rpm=setting.speed_rpm * truth.speed,
-        x=truth.x.of(at_rest),
-        y=truth.y.of(at_rest),
+        x=truth.x.apply_to(at_rest),
+        y=truth.y.apply_to(at_rest),
         runout=runout,
         helix_lag=setting.cut.helix_lag,
         pitch=setting.cut.pitch,
@@ -174,7 +185,7 @@ def _turning_cut(
     )
 
 
-def _limit(cut: MillingCut, setting: CutSetting) -> float:
+def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
     """Deepest stable depth, by semi-discretisation (m)."""
     x, y = (
         [Mode(*figures) for figures in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
@@ -185,18 +196,28 @@ def _limit(cut: MillingCut, setting: CutSetting) -> float:
     return program_limit(Program(pushed, cut.speed_rpm, cut.depth), x, y).limit
 
 
-def hidden_truth(seed: int) -> HiddenTruth:
+def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Truth of a seed, the same whatever is cut; modes in x and y differ apart."""
     random = np.random.default_rng([seed, 1])
-    x, y = (ModeFactors(*(_drawn(random, *prior) for prior in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
-    return HiddenTruth(x, y, _drawn(random, *FORCE), 1 + random.uniform(-OFF_COMMAND, OFF_COMMAND))
+    x, y = (
+        ModeFactors(
+            *(
+                _draw_factor(random, *prior)
+                for prior in (ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR)
+            )
+        )
+        for _ in range(2)
+    )
+    return HiddenTruth(
+        x, y, _draw_factor(random, *ROTATING_FORCE_PRIOR), 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION)
+    )
 
 
-def runout_of(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:
+def draw_runout(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:
     """Run-out of each tooth of an eccentric tool: how far it stands out (m)."""
-    angle = np.abs(cut.ahead) + random.uniform(0, 2 * np.pi)
-    return tuple((random.uniform(0, RUNOUT) * np.cos(angle)).tolist())
+    angle = np.abs(cut.lead_angles) + random.uniform(0, 2 * np.pi)
+    return tuple((random.uniform(0, MAX_RUNOUT) * np.cos(angle)).tolist())
 
 
-def _drawn(random: np.random.Generator, middle: float, spread: float) -> float:
-    return float(middle * max(1 + spread * random.standard_normal(), LEAST))
+def _draw_factor(random: np.random.Generator, middle: float, spread: float) -> float:
+    return float(middle * max(1 + spread * random.standard_normal(), MIN_HIDDEN_FACTOR))

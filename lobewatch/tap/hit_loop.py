@@ -1,21 +1,26 @@
-"""From the scans of a device to judged hits, and the word that stands meanwhile."""
+"""Run the phases of a live test: self-check, trial hits and counted hits."""
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
 
-from acquisition import Block, DataError, Hit, HitFlags, HitSearch, Trigger
-from lobewatch.tap.connection import Connection
-from lobewatch.tap.judged_hits import JudgedHits
-from lobewatch.tap.live_signal import LEVEL_TIME
-from lobewatch.tap.plots import plots_of
-from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import TapStep
+from acquisition import Block, DataError, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Trigger
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, DeviceConnector, estimate_resting_rms
+from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
+from lobewatch.tap.live_curves import build_curves
+from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
+from lobewatch.tap.state import Check, TapStep
+from lobewatch.tap.tap_in_progress import evaluate_safely
+from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
-VERDICT_TIME = 0.8
+MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s); the trigger may be armed before."""
-UNDO_TIME = 2.0
+LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
 
@@ -23,7 +28,7 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
     """The operator ended the test before enough hits were good; they stay in the spool, the next test goes on."""
 
 
-class Wishes:
+class OperatorRequests:
     """Undo and stop, said by any thread and heard by that of the test."""
 
     def __init__(self) -> None:
@@ -51,36 +56,36 @@ class Wishes:
 class HitLoop:
     """Finds hits, judges and shows them, and serves what is asked for between two blocks."""
 
-    def __init__(self, hits: JudgedHits, publisher: Publisher, wishes: Wishes, *, guided: bool) -> None:
+    def __init__(self, hits: EvaluatedHits, publisher: TapPublisher, wishes: OperatorRequests, *, guided: bool) -> None:
         """guided False leaves out the curves and the time to take back the last hit."""
         self._hits, self._publisher, self._wishes, self._guided = hits, publisher, wishes, guided
         self._verdict = TapStep.TAP
         self._heard = 0
         self._verdict_at: int | None = None
 
-    def blocks(self, connection: Connection) -> Iterator[Block]:
+    def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
         """Blocks that the device sends; wishes are served and levels shown in between."""
         for block in connection.blocks():
             self._heard += block.codes.shape[1]
-            for _ in range(connection.presses()):
+            for _ in range(connection.count_presses()):
                 self._undo(" by the button")
-            self.serve()
-            if news := connection.news():
+            self.handle_requests()
+            if news := connection.poll_fault_text():
                 self._publisher.show(reason=news)
             yield block
-            if self._publisher.age >= LEVEL_TIME:
+            if self._publisher.age >= LEVEL_WINDOW:
                 self._publisher.show(levels=connection.signal.levels)
         if self._hits.missing:
             raise DataError(f"the samples have ended with {self._hits.progress}; record more of them")
 
-    def serve(self) -> None:
+    def handle_requests(self) -> None:
         """Do what other threads have asked for; TapStopped where that is the end."""
         if self._wishes.stopping:
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
         while self._wishes.take_undo():
             self._undo()
 
-    def hits(self, connection: Connection, trigger: Trigger) -> Iterator[Hit | None]:
+    def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
         """Hits as they come, and None after every block; the word follows the trigger."""
         search = HitSearch(connection.channels, connection.sample_rate, trigger, connection.direction)
         early = 0
@@ -94,9 +99,9 @@ class HitLoop:
                 )
             self._follow(search, connection.sample_rate)
 
-    def take_hits(self, connection: Connection, trigger: Trigger) -> None:
+    def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
         """Hits until enough are good, and time has passed to take the last one back."""
-        grace = UNDO_TIME if self._guided else 0.0
+        grace = LAST_HIT_UNDO_TIME if self._guided else 0.0
         for hit in self.hits(connection, trigger):
             if self._hits.missing and hit is not None:
                 self._take(hit)
@@ -108,12 +113,12 @@ class HitLoop:
         self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._heard
         self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
 
-    def draw(self, hit: Hit) -> None:
+    def show_curves(self, hit: Hit) -> None:
         """The curves of a hit and of the mean; none where they cannot be worked out."""
         if not self._guided:
             return
         try:
-            plots = plots_of(hit, self._hits.mean)
+            plots = build_curves(hit, self._hits.mean)
         except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without them
             plots = None
         self._publisher.show(plots=plots)
@@ -125,7 +130,7 @@ class HitLoop:
     def _follow(self, search: HitSearch, sample_rate: float) -> None:
         """The word for where the trigger stands."""
         word = TapStep.TAP if search.armed else TapStep.WAIT
-        fresh = self._verdict_age(sample_rate) < VERDICT_TIME or not self._hits.missing
+        fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._hits.missing
         if self._verdict_at is not None and fresh and not search.recording:
             word = self._verdict
         if word != self._publisher.state.word:
@@ -133,12 +138,12 @@ class HitLoop:
 
     def _take(self, hit: Hit) -> None:
         """Judge a hit and show the verdict at once; it is counted when it is on the disk."""
-        verdict = self._hits.judge(hit)
+        verdict = self._hits.evaluate(hit)
         self.show_verdict(verdict.flags, verdict.text)
         self._hits.add(hit, verdict)
         self._publisher.show_hits(self._hits)
-        self.draw(hit)
-        misfit = None if verdict.flags else self._hits.look_back()
+        self.show_curves(hit)
+        misfit = None if verdict.flags else self._hits.recheck_first_hits()
         if misfit is not None:
             number, why = misfit
             reason = f"Hit {number + 1} does not fit the others and counts no more. {why.text}"
@@ -155,4 +160,113 @@ class HitLoop:
         word = self._publisher.state.word
         word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
         self._publisher.show_hits(self._hits, word=word, verdict=flags.words, trial=False, reason=reason)
-        self.draw(self._hits.tap.hits[-1])
+        self.show_curves(self._hits.tap.hits[-1])
+
+
+SELF_CHECK_DURATION = 1.0
+"""Time for which the self-check listens (s)."""
+
+
+class TapPhases:
+    """Self-check, trial hits, hits that count; each goes on where it stood when the device went away."""
+
+    def __init__(
+        self, folder: MachineFolder, hits: EvaluatedHits, loop: HitLoop, publisher: TapPublisher, *, guided: bool
+    ) -> None:
+        """guided False leaves out the self-check where no trial hits need it, and re-arming by decay."""
+        self._folder, self._hits, self._loop, self._publisher = folder, hits, loop, publisher
+        self._tap, self._guided = hits.tap, guided
+        self._trial: TrialHits | None = None
+
+    def run(self, connector: DeviceConnector) -> None:
+        """All of them, with as many connections as it takes; DeviceError where the first one cannot be made."""
+        connection = connector.connect(self._tap)
+        while True:
+            try:
+                with closing(connection):
+                    self._check(connection)
+                    self._try(connection)
+                    self._take(connection)
+                return
+            except DeviceError as error:
+                if not self._hits.missing:
+                    return
+                connection = connector.reconnect(error, self._tap, self._loop.handle_requests)
+
+    def _check(self, connection: DeviceConnection) -> None:
+        """The self-check, once a session."""
+        machine = self._folder.machine
+        trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.sample_rate)
+        if self._tap.baseline is not None or (trigger is not None and not self._guided):
+            return
+        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
+        self._tap.baseline = find_quiet_part(
+            connection.signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION)
+        )
+        free = shutil.disk_usage(self._folder.path).free
+        calibration = check_calibration(connection.signal.inputs.channels, machine.daq.calibration_interval_months)
+        checks = (
+            *self._publisher.state.checks,
+            *_run_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),
+            calibration,
+            *self._hearing(self._tap.baseline),
+        )
+        failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
+        self._publisher.show(checks=checks, reason=" ".join(failed))
+
+    def _hearing(self, baseline: Hit) -> tuple[Check, ...]:
+        """What the sensor can hear, where it is all there is."""
+        if baseline.has_force:
+            return ()
+        return (check_detectable_band(baseline, self._folder.machine, self._tap.circumstances.tool),)
+
+    def _try(self, connection: DeviceConnection) -> None:
+        """Trial hits, where machine.toml leaves something open."""
+        tap, setup = self._tap, self._folder.machine.tap
+        tap.trigger = tap.trigger or trigger_from_setup(setup, connection.sample_rate)
+        if tap.trigger is not None or tap.baseline is None:
+            return
+        self._trial = self._trial or TrialHits(setup, tap.baseline)
+        self._take_trial_hits(connection, self._trial)
+        tap.trigger = self._trial.trigger
+        check = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
+        self._publisher.show(checks=(*self._publisher.state.checks, check))
+
+    def _take_trial_hits(self, connection: DeviceConnection, trial: TrialHits) -> None:
+        asked = False
+        while not trial.is_done:
+            if not asked:
+                self._publisher.show(reason=f"{self._publisher.state.reason} {trial.text}".strip())
+            asked = self._take_trial_hit(connection, trial)
+
+    def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
+        """Whether the next hit is of use."""
+        hits = self._loop.hits(connection, self._at_rest(trial.trigger))
+        hit = next(hit for hit in hits if hit is not None)
+        verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
+        flags = verdict.flags
+        self._loop.show_verdict(flags, verdict.text or flags.cure or trial.text, trial=True)
+        self._loop.show_curves(hit)
+        return not flags
+
+    def _take(self, connection: DeviceConnection) -> None:
+        trigger = self._tap.trigger
+        if trigger is None or any(hit.acceleration.size != trigger.n_samples for hit in self._tap.hits):
+            raise self._tap.make_setup_error()
+        self._loop.take_hits(connection, self._at_rest(trigger))
+
+    def _at_rest(self, trigger: Trigger) -> Trigger:
+        """Trigger that is armed only while the structure is at rest, where somebody taps by hand."""
+        if not self._guided or self._tap.baseline is None:
+            return trigger
+        return replace(trigger, rest_rms=estimate_resting_rms(self._tap.baseline, trigger.pre_trigger))
+
+
+def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
+    """As `run_self_check`; where that fails, one line that says so."""
+    try:
+        return run_self_check(baseline, level, free_bytes)
+    except Exception as error:  # noqa: BLE001 - a check warns and ends no test
+        return (
+            Check("self-check", False, f"it failed ({type(error).__name__}: {error}); the test goes on without it"),
+        )

@@ -1,110 +1,113 @@
-"""The self-check before the first hit: sensors and their calibration, and about a second in which nobody taps."""
+"""Check sensors, noise, hum and detectable band before the first hit."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from datetime import UTC, date, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Channel, Hit, Remark, calibration_doubt, channel_doubts
-from dsm import rounded
-from lobewatch.machine.reserve import RESERVE_BYTES
+from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
+from dsm import format_rounded, natural_frequencies
+from lobewatch.machine import Machine
+from lobewatch.machine.folder_lock import RESERVE_BYTES
+from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
 
-PIECE = 0.01
+QUIET_PIECE_TIME = 0.01
 """Length of the pieces by which a quiet stretch is found (s)."""
-QUIET_FACTOR = 3.0
+QUIET_RMS_FACTOR = 3.0
 """A piece is quiet where its rms is at most this many times that of the quietest fifth."""
-SHORTEST = 0.1
+MIN_QUIET_TIME = 0.1
 """A quiet stretch is at least so long (s)."""
-LEVEL_NOISE_RATIO = 6.0
+MIN_TRIGGER_NOISE_RATIO = 6.0
 """The trigger level should be this many times the rms of the force at rest."""
-NOISE_SHARE = 0.02
+MAX_RESPONSE_NOISE_SHARE = 0.02
 """The noise of the response should stay below this share of its range."""
-MAINS = (50.0, 60.0)
+CHECKED_MAINS_FREQUENCIES = (50.0, 60.0)
 """Mains frequencies (Hz)."""
-HARMONICS = 6
+CHECKED_MAINS_HARMONICS = 6
 """Lines of the mains looked at."""
-HUM_SHARE = 0.5
+MIN_HUM_POWER_SHARE = 0.5
 """Share of the power at rest in the lines of the mains that is called hum; chosen."""
-TURNING_SHARE = 0.5
+MIN_SPINDLE_POWER_SHARE = 0.5
 """Share of the power at rest in another single line that is called a turning spindle; chosen."""
-FEWEST_CODES = 3.0
+MIN_LINE_CODES = 3.0
 """Steps of the converter below which the rms of such lines is nothing; chosen."""
-DISK_ROOM = 4
+MIN_DISK_RESERVES = 4
 """Free bytes of the disk over those that a test reserves, at least; chosen."""
-WRONG = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-wrong"})
+SENSOR_ERROR_CODES = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-wrong"})
 """Codes of what cannot be, and is to be put right before a sensor or a DAQ is worked with."""
 
 
-def quiet_stretch(record: Hit) -> Hit:
+def find_quiet_part(record: Hit) -> Hit:
     """The longest part of a record without hits and their ringing; all of it where no part is quiet."""
-    size = max(round(PIECE * record.sample_rate), 1)
+    size = max(round(QUIET_PIECE_TIME * record.sample_rate), 1)
     count = record.acceleration.size // size
     if count < 2:
         return record
     signals = record.signals[:, : count * size].reshape(-1, count, size)
     rms = np.std(signals, axis=2)
     floor = np.quantile(rms, 0.2, axis=1, keepdims=True)
-    quiet = np.concatenate(([0], np.all(rms <= QUIET_FACTOR * floor, axis=0).astype(np.int8), [0]))
+    quiet = np.concatenate(([0], np.all(rms <= QUIET_RMS_FACTOR * floor, axis=0).astype(np.int8), [0]))
     starts, ends = np.flatnonzero(np.diff(quiet) == 1), np.flatnonzero(np.diff(quiet) == -1)
-    if not starts.size or np.max(ends - starts) * PIECE < SHORTEST:
+    if not starts.size or np.max(ends - starts) * QUIET_PIECE_TIME < MIN_QUIET_TIME:
         return record
     best = int(np.argmax(ends - starts))
-    return _part(record, int(starts[best]) * size, int(ends[best]) * size)
+    return _slice_record(record, int(starts[best]) * size, int(ends[best]) * size)
 
 
-def self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
+def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
     """One line each on samples, sensors, noise, hum, spindle and disk; level: of the trigger (N), None where trial
     hits choose it. baseline: a record from a DAQ in which nobody taps."""
     if baseline.codes is None or baseline.channels is None:
         raise ValueError("the self-check needs a record with converter codes and channels")
     return (
-        _samples(baseline),
-        *(_sensor(codes, channel) for codes, channel in _sensors(baseline)),
-        *([_force_noise(float(np.std(baseline.force)), level)] if baseline.has_force else []),
-        _response_noise(float(np.std(baseline.acceleration)), baseline.channels[-1]),
-        _hum(baseline),
-        _spindle(baseline),
-        _disk(free_bytes),
+        _check_samples(baseline),
+        *(_check_sensor(codes, channel) for codes, channel in _iterate_sensors(baseline)),
+        *([_check_force_noise(float(np.std(baseline.force)), level)] if baseline.has_force else []),
+        _check_response_noise(float(np.std(baseline.acceleration)), baseline.channels[-1]),
+        _check_hum(baseline),
+        _check_spindle(baseline),
+        _check_disk(free_bytes),
     )
 
 
-def calibration_check(channels: Sequence[Channel], interval_months: float) -> Check:
+def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
     """Sensitivities and calibration dates."""
-    doubts = sensor_doubts(channels, datetime.now(UTC).date(), interval_months)
+    doubts = sensor_remarks(channels, datetime.now(UTC).date(), interval_months)
     return Check("calibration", not doubts, "; ".join(map(str, doubts)) or "dates known and not too old")
 
 
-def sensor_doubts(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
+def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
     """Sensitivities and ranges that are not believed, calibrations that are old, not known or of an impossible day."""
     doubts: list[Remark] = []
     for channel in channels:
-        doubts += channel_doubts(channel)
-        calibration = calibration_doubt(channel, today, interval_months)
+        doubts += channel_remarks(channel)
+        calibration = calibration_remark(channel, today, interval_months)
         if calibration is not None:
             doubts.append(calibration)
     return doubts
 
 
-def _samples(baseline: Hit) -> Check:
+def _check_samples(baseline: Hit) -> Check:
     lost = baseline.lost_scans
     text = f"{lost} scans lost in a second: lower the sample rate or use another cable or port" if lost else ""
     return Check("samples", not lost, text or f"come at {baseline.sample_rate:g} Hz, none lost")
 
 
-def _sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
+def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
     """Codes and channel of all that felt it, that across last."""
     if baseline.codes is not None and baseline.channels is not None:
         yield from zip(baseline.codes, baseline.channels, strict=True)
-    if baseline.beside is not None:
-        yield from list(_sensors(baseline.beside))[1:]
+    if baseline.cross_hit is not None:
+        yield from list(_iterate_sensors(baseline.cross_hit))[1:]
 
 
-def _sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
-    name, low, high = f"{channel.name} sensor", *channel.rails_in(codes)
+def _check_sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
+    name, low, high = f"{channel.name} sensor", *channel.effective_rails(codes)
     stuck = np.mean((codes <= low) | (codes >= high))
     if stuck > 0.5:
         return Check(name, False, "stands at the end of its range: cable open or sensor not powered")
@@ -113,67 +116,75 @@ def _sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
     return Check(name, True, "alive")
 
 
-def _force_noise(rms: float, level: float | None) -> Check:
-    if level is None or level >= LEVEL_NOISE_RATIO * rms:
+def _check_force_noise(rms: float, level: float | None) -> Check:
+    if level is None or level >= MIN_TRIGGER_NOISE_RATIO * rms:
         against = "" if level is None else f", trigger at {level:g} N"
-        return Check("force noise", True, f"{rounded(rms, digits=2)} N rms{against}")
-    cure = f"set trigger_n above {rounded(2 * LEVEL_NOISE_RATIO * rms, digits=2)}, or find the source of the noise"
-    return Check("force noise", False, f"{rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}")
+        return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
+    cure = f"set trigger_n above {format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)}, or find the source of the noise"
+    return Check(
+        "force noise", False, f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}"
+    )
 
 
-def _response_noise(rms: float, channel: Channel) -> Check:
+def _check_response_noise(rms: float, channel: Channel) -> Check:
     scale = channel.full_scale / abs(channel.sensitivity)
-    text = f"{rounded(rms, digits=2)} m/s^2 rms"
-    if rms < NOISE_SHARE * scale:
+    text = f"{format_rounded(rms, digits=2)} m/s^2 rms"
+    if rms < MAX_RESPONSE_NOISE_SHARE * scale:
         return Check("response noise", True, text)
     cure = "is the machine at rest, the sensor fixed?"
     return Check("response noise", False, f"{text}, {100 * rms / scale:.2g} % of the range: {cure}")
 
 
-def _spectrum(signal: NDArray[np.float64], rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _power_spectrum(signal: NDArray[np.float64], rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Frequencies (Hz) and power of a Hann-windowed record; the sum of the power is its mean square."""
     window = np.hanning(signal.size)
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
     return np.arange(power.size) * rate / signal.size, 2 * power / (signal.size * np.sum(window**2))
 
 
-def _near(frequency: NDArray[np.float64], line: float) -> NDArray[np.bool_]:
+def _select_line(frequency: NDArray[np.float64], line: float) -> NDArray[np.bool_]:
     """The lines that a Hann window spreads one frequency over."""
     return np.asarray(np.abs(frequency - line) <= 2 * frequency[1])
 
 
-def _mains(frequency: NDArray[np.float64], mains: float) -> NDArray[np.bool_]:
-    return np.asarray(np.any([_near(frequency, mains * k) for k in range(1, HARMONICS + 1)], axis=0))
+def _select_mains_lines(frequency: NDArray[np.float64], mains: float) -> NDArray[np.bool_]:
+    return np.asarray(
+        np.any([_select_line(frequency, mains * k) for k in range(1, CHECKED_MAINS_HARMONICS + 1)], axis=0)
+    )
 
 
-def _hum(baseline: Hit) -> Check:
+def _check_hum(baseline: Hit) -> Check:
     """Mains lines in either channel."""
     texts = []
-    for channel, signal, unit in _signals(baseline):
-        frequency, power = _spectrum(signal, baseline.sample_rate)
-        worst = max(MAINS, key=lambda mains: float(np.sum(power[_mains(frequency, mains)])))
-        hum = float(np.sum(power[_mains(frequency, worst)]))
-        if hum > HUM_SHARE * np.sum(power) and np.sqrt(hum) > FEWEST_CODES * abs(channel.scale):
+    for channel, signal, unit in _list_signals(baseline):
+        frequency, power = _power_spectrum(signal, baseline.sample_rate)
+        worst = max(
+            CHECKED_MAINS_FREQUENCIES, key=lambda mains: float(np.sum(power[_select_mains_lines(frequency, mains)]))
+        )
+        hum = float(np.sum(power[_select_mains_lines(frequency, worst)]))
+        if hum > MIN_HUM_POWER_SHARE * np.sum(power) and np.sqrt(hum) > MIN_LINE_CODES * abs(channel.scale):
             texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and its multiples in the {channel.quantity}")
     if texts:
         return Check("hum", False, f"{', '.join(texts)}: check cable shields and the ground")
     return Check("hum", True, "no mains hum")
 
 
-def _spindle(baseline: Hit) -> Check:
+def _check_spindle(baseline: Hit) -> Check:
     """One strong line in the response that is not of the mains."""
-    channel, signal, unit = _signals(baseline)[-1]
-    frequency, power = _spectrum(signal, baseline.sample_rate)
-    off_mains = np.where(np.any([_mains(frequency, mains) for mains in MAINS], axis=0), 0.0, power)
+    channel, signal, unit = _list_signals(baseline)[-1]
+    frequency, power = _power_spectrum(signal, baseline.sample_rate)
+    off_mains = np.where(
+        np.any([_select_mains_lines(frequency, mains) for mains in CHECKED_MAINS_FREQUENCIES], axis=0), 0.0, power
+    )
     line = float(frequency[int(np.argmax(off_mains))])
-    rms = float(np.sqrt(np.sum(off_mains[_near(frequency, line)])))
-    if rms**2 > TURNING_SHARE * np.sum(power) and rms > FEWEST_CODES * abs(channel.scale):
-        vibration = f"{rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
+    rms = float(np.sqrt(np.sum(off_mains[_select_line(frequency, line)])))
+    if rms**2 > MIN_SPINDLE_POWER_SHARE * np.sum(power) and rms > MIN_LINE_CODES * abs(channel.scale):
+        vibration = f"{format_rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
         return Check("spindle", False, f"a steady vibration of {vibration}: stop the spindle and what runs beside it")
     return Check("spindle", True, "no steady vibration")
 
 
-def _signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
+def _list_signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
     if baseline.channels is None:
         return []
     units = {"force": "N", "acceleration": "m/s^2"}
@@ -181,13 +192,72 @@ def _signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
     return [(channel, signal, units[channel.quantity]) for channel, signal in pairs]
 
 
-def _disk(free: int) -> Check:
-    enough = free >= DISK_ROOM * RESERVE_BYTES
+def _check_disk(free: int) -> Check:
+    enough = free >= MIN_DISK_RESERVES * RESERVE_BYTES
     return Check("disk", enough, f"{free / 1e9:.1f} GB free{'' if enough else ': make room soon'}")
 
 
-def _part(record: Hit, start: int, end: int) -> Hit:
+def _slice_record(record: Hit, start: int, end: int) -> Hit:
     if record.codes is None or record.channels is None:
         return Hit(record.force[start:end], record.acceleration[start:end], record.sample_rate)
-    part, beside = record.codes[:, start:end], None if record.beside is None else _part(record.beside, start, end)
+    part, beside = (
+        record.codes[:, start:end],
+        None if record.cross_hit is None else _slice_record(record.cross_hit, start, end),
+    )
     return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, beside=beside)
+
+
+REFERENCE_HITS = 10
+"""Hits that the error is told of."""
+TARGET_FREQUENCY_ERROR = 1e-3
+"""Standard error of f_n, relative, that such a test should reach: a third of its usual scatter."""
+FIT_ERROR_FACTOR = 2.0
+"""Error of our fit, which leaves residual terms open, over the least that is possible: 1.3 to 2.2 in simulations."""
+ASSUMED_DAMPING_RATIO = 0.03
+"""Damping ratio that is taken for it where there is no model."""
+
+
+def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
+    """Band and noise of the sensor, against the mode that is followed where the model or [mode] band_hz tells it.
+
+    baseline: a record at rest.
+    """
+    rate, band = baseline.sample_rate, machine.tap.sensor_band_hz or math.inf
+    highest, noise = min(MAX_DECAY_FREQUENCY_RATIO * rate, band), float(np.std(baseline.acceleration))
+    heard = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
+    frequency, where = _find_expected_frequency(machine, tool)
+    if frequency is None:
+        return Check("band", True, f"{heard}; whether the mode of this machine lies there nobody says", is_notable=True)
+    if frequency > highest:
+        cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
+        return Check("band", False, f"{heard}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
+    least = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
+    error = f"{REFERENCE_HITS} hits that ring at {format_rounded(least, digits=2)} m/s^2 tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
+    return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
+
+
+def min_decay_amplitude(frequency: float, damping_ratio: float, density: float) -> float:
+    """Amplitude (m/s^2) of free decays, ten of them, whose frequency white noise leaves known to GOOD_ERROR.
+
+    density: of the noise (m/s^2 per square root of Hz), its rms over the square root of the band that it fills.
+    OF_THE_FIT times the Cramer-Rao bound of A exp(-a t) cos(w t + phase) in noise of density n:
+    var(w) = 8 n^2 a^3 / A^2.
+    Source: Kay, Fundamentals of Statistical Signal Processing (1993), ch. 3, for this signal.
+    """
+    decay = damping_ratio * 2 * math.pi * frequency
+    bound = density * math.sqrt(8 * decay**3 / REFERENCE_HITS)
+    return FIT_ERROR_FACTOR * bound / (TARGET_FREQUENCY_ERROR * 2 * math.pi * frequency)
+
+
+def _find_expected_frequency(machine: Machine, tool: str) -> tuple[float | None, str]:
+    """Frequency of the mode that is followed (Hz), and who says so."""
+    try:
+        spindle = machine.model(tool)
+    except (DataError, ValueError):
+        band = machine.mode.band_hz
+        return (None, "") if band is None else (band[1], "the end of [mode] band_hz")
+    return float(natural_frequencies(spindle, machine.mode.model_mode)[-1]), "by the model"
+
+
+def _get_damping_ratio(machine: Machine) -> float:
+    return float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO

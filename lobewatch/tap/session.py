@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from functools import partial
 
 from acquisition import (
-    ACROSS,
-    UNSAID,
+    CROSS_TAP,
+    UNKNOWN_CONDITIONS,
     Circumstances,
     Conditions,
     DataError,
@@ -17,28 +17,24 @@ from acquisition import (
     DeviceError,
     Remark,
     TapTest,
-    joined,
-    tap_direction,
+    merge_remarks,
+    parse_direction,
 )
-from acquisition.errors import NOT_ALLOWED, system_failure
-from dsm import plus_minus
-from lobewatch.decay import SeriesStanding
-from lobewatch.decay.light import LIGHTS
+from acquisition.errors import PERMISSION_ERRNOS, format_os_error
+from dsm import format_with_error
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.reserve import Reserve
-from lobewatch.measuring import Measurement
-from lobewatch.measuring.questions import check_codes, open_questions
-from lobewatch.tap.connection import Connector
-from lobewatch.tap.felt_across import FeltAcross, felt_across
-from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
-from lobewatch.tap.in_progress import begin_tap
-from lobewatch.tap.judged_hits import JudgedHits
-from lobewatch.tap.phases import Phases
-from lobewatch.tap.plug import Plug
-from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import Outcome, ProgramWord, TapState, TapStep
-from lobewatch.verdicts.unsaid import CROSS_NOT_TAPPED
+from lobewatch.machine.folder_lock import DiskReserve
+from lobewatch.measurement import Measurement
+from lobewatch.measurement.recording_questions import check_question_codes, find_open_questions
+from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.status_rules import STATUS_BY_CODE
+from lobewatch.tap.device_connection import DeviceConnector, DeviceOpener
+from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
+from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases, TapStopped
+from lobewatch.tap.state import Outcome, ProgramVerdict, TapState, TapStep
+from lobewatch.tap.tap_in_progress import CrossTapResult, begin_tap, commit_cross_tap
+from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
 
 
 class TapSession:
@@ -59,18 +55,18 @@ class TapSession:
         """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
         curves, the time to take back the last hit, and the outcome. accept: questions about the recording that are
         answered already, by code; ValueError for one that there is not."""
-        self._accept = check_codes(accept)
+        self._accept = check_question_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
-        self._publisher, self._wishes = Publisher(first, clock), Wishes()
-        self._connector = Connector(folder, open_device, self._publisher, sleep)
+        self._publisher, self._wishes = TapPublisher(first, clock), OperatorRequests()
+        self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
         self.unasked: Sequence[str] = ()
-        """Codes of `accept` that the finished test does not ask."""
+        """Codes of `accept_questions` that the finished test does not ask."""
         self.saved: Sequence[str] = ()
         """Identities of what the finished test has saved: its own, then that of the tap across."""
-        self.across: FeltAcross | None = None
+        self.across: CrossTapResult | None = None
         """Tap across that the same hits tell; None where no second sensor felt them."""
 
     @property
@@ -110,115 +106,115 @@ class TapSession:
         another set-up, TapStopped after stop().
         """
         try:
-            with self._folder.locked(), Reserve(self._folder.path) as reserve:
+            with self._folder.locked(), DiskReserve(self._folder.path) as reserve:
                 hits = self._begin()
                 hits.tap.reserve = reserve
                 if hits.missing:
                     loop = HitLoop(hits, self._publisher, self._wishes, guided=self._guided)
-                    Phases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
+                    TapPhases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
                 reserve.release()
                 return self._finish(hits)
         except TapStopped:
             raise
         except Exception as error:
-            failure = _failure(error)
+            failure = _to_operator_error(error)
             self._publisher.show(word=TapStep.FAILED, reason=str(failure))
             if failure is error:
                 raise
             raise failure from error
 
-    def _begin(self) -> JudgedHits:
+    def _begin(self) -> EvaluatedHits:
         """Hits of an interrupted test, or none yet."""
-        hits = JudgedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
+        hits = EvaluatedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
         texts = []
         if hits.tap.hits:
             begun = f"{hits.tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
             texts.append(f"going on with the test begun {begun}: {hits.progress} are there")
         if hits.tap.damaged:
             texts.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
-        texts += hits.tap.left
+        texts += hits.tap.not_resumed
         if texts:
             self._publisher.show_hits(hits, resumed="; ".join(texts))
         return hits
 
-    def _finish(self, hits: JudgedHits) -> TapTest:
+    def _finish(self, hits: EvaluatedHits) -> TapTest:
         """Average, commit, and say what it means."""
         self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
         logbook.commit(tap, now)
-        self.across = felt_across(hits.tap, partial(logbook.commit, now=now))
+        self.across = commit_cross_tap(hits.tap, partial(logbook.commit, now=now))
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]
         try:
             self.unasked = logbook.accept(self.saved, self._accept)
             self._measurement = logbook.measurement(tap.id)
-            outcome = outcome_of(logbook, self._measurement, self.across) if self._guided else None
+            outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            why = _why(error, [remark for remark in logbook.remarks if tap.id in remark.about])
+            why = _explain_no_result(error, [remark for remark in logbook.remarks if tap.id in remark.about])
             raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
 
 
-def _why(error: Exception, remarks: Sequence[Remark]) -> str:
+def _explain_no_result(error: Exception, remarks: Sequence[Remark]) -> str:
     """Reason why a saved tap test has no result; remarks: about its file."""
     if isinstance(error, OSError) and error.errno:
-        return system_failure(error)
+        return format_os_error(error)
     return "; ".join(map(str, remarks)) or str(error)
 
 
-def _failure(error: Exception) -> Exception:
+def _to_operator_error(error: Exception) -> Exception:
     """Error that the operator can act on: one that says so itself, else a failure of the system (a full disk) or of
     the program in a sentence."""
     if isinstance(error, DeviceError | ValueError):
         return error
     kept = "the hits so far are kept: the same command goes on with them"
     if isinstance(error, OSError):
-        cure = "you may not write there" if error.errno in NOT_ALLOWED else kept
-        return DataError(f"{system_failure(error)}; {cure}")
+        cure = "you may not write there" if error.errno in PERMISSION_ERRNOS else kept
+        return DataError(f"{format_os_error(error)}; {cure}")
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")
 
 
-def outcome_of(logbook: Logbook, measurement: Measurement, across: FeltAcross | None = None) -> Outcome:
+def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapResult | None = None) -> Outcome:
     """The standing of the machine after a test, what was measured, and the next step, for the one who tapped.
 
     across: what became of the tap across that its hits tell.
     """
-    standing = logbook.standing(measurement.time)
+    standing = logbook.status(measurement.time)
     series = standing.series_of(measurement.tool, measurement.direction)
-    questions = open_questions(measurement.remarks)
-    remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
-    remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
-    texts = [*_values(measurement, series), *([across.text] if across else [])]
+    questions = find_open_questions(measurement.remarks)
+    remarks = [*(remark for remark in measurement.remarks if remark not in questions), *merge_remarks(standing.remarks)]
+    remarks += [remark for remark in logbook.remarks if remark.code not in STATUS_BY_CODE]
+    texts = [*_format_values(measurement, series), *([across.text] if across else [])]
     texts += [f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
-        ProgramWord(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.word.value)
+        ProgramVerdict(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.stability.value)
         for verdict in verdicts
         if (program := verdict.program)
     ]
     of_tool = [verdict.remarks for verdict in verdicts if verdict.program.tool == measurement.tool]
-    asks_across = any(remark.code == CROSS_NOT_TAPPED for remarks in of_tool for remark in remarks)
-    return Outcome(standing.light, texts, standing.next_step, standing.is_early, programs, asks_across)
+    asks_across = any(remark.code == CROSS_NOT_TAPPED_CODE for remarks in of_tool for remark in remarks)
+    return Outcome(standing.status, texts, standing.next_step, standing.is_early, programs, asks_across)
 
 
-def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str]:
+def _format_values(measurement: Measurement, series: SeriesStatus | None) -> list[str]:
     mode = measurement.followed
     if mode is None:
         return []
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "first test of this tool and direction"
-    if open_questions(measurement.remarks):
+    if find_open_questions(measurement.remarks):
         against = "in question"
-    elif series is not None and not series.is_first:
-        sign = "+" if series.fall.value < 0 else ""
-        against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
-    damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)
-    stiffness = f"Stiffness {plus_minus(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
+    elif series is not None and not series.is_baseline:
+        sign = "+" if series.drop.value < 0 else ""
+        against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % against the first test"
+    damping = format_with_error(mode.damping_ratio, zeta_std, 0.01)
+    stiffness = f"Stiffness {format_with_error(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:
         stiffness = f"Damping {damping} %; stiffness is not known, for no force was measured."
-    return [f"Frequency {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
+    return [f"Frequency {format_with_error(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
 def plan_session(
@@ -230,7 +226,7 @@ def plan_session(
     operator: str = "",
     resume: bool = True,
     accept: Sequence[str] = (),
-    conditions: Conditions = UNSAID,
+    conditions: Conditions = UNKNOWN_CONDITIONS,
 ) -> TapSession:
     """A session of today; what is left empty is taken from machine.toml. ValueError where that names no port either.
 
@@ -240,8 +236,8 @@ def plan_session(
     port = port or machine.daq.port
     if not port:
         raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
-    tool, wanted = tool or machine.tap.tool, tap_direction(direction)
-    if wanted == ACROSS and machine.tap.hammer == "none":
+    tool, wanted = tool or machine.tap.tool, parse_direction(direction)
+    if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
     about = Circumstances(
         machine.machine.name,
@@ -250,6 +246,6 @@ def plan_session(
         wanted,
         operator,
         folder.toml_text,
-        conditions=conditions.over(machine.tap.conditions(tool)),
+        conditions=conditions.with_defaults(machine.tap.conditions(tool)),
     )
-    return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume, accept=accept)
+    return TapSession(folder, DeviceOpener(machine.daq, port).open, about, resume=resume, accept=accept)

@@ -14,17 +14,17 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
-from acquisition.files.seal import is_sealed
+from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, IrregularFileError, read_regular_file
+from acquisition.files.hdf5_file import has_valid_checksum
 from acquisition.files.tap_file import read_hit_name
-from acquisition.regular_file import SMALL, IrregularFileError, read_regular
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.journal.doubtful import has_whole_hits
+from lobewatch.machine.journal.unverified_tap import has_readable_hits
 
-RESUMABLE = timedelta(hours=12)
+MAX_RESUME_AGE = timedelta(hours=12)
 """Age from which an interrupted test is not gone on with."""
-HALF_WRITTEN = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp", ".lock.holder.*.tmp")
+TEMPORARY_FILE_PATTERNS = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp", ".lock.holder.*.tmp")
 """Temporary names of what is written under the lock."""
-SETUP = "setup.json"
+SETUP_FILE_NAME = "setup.json"
 """File with the trigger of a test."""
 
 
@@ -42,45 +42,45 @@ class SpooledHit:
     """Circumstances of the test."""
 
 
-def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
+def read_spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
     """The sound hits of a test, oldest first; a damaged file is set aside, and where to is added to `damaged`.
 
     A file under the name of another one is damaged too: no hit counts twice.
     """
     for path in sorted(folder.glob("[0-9]*.h5")):
-        hit = _read(path)
+        hit = _read_spooled_hit(path)
         if hit is None:
             damaged.append(_set_aside(path))
         else:
             yield hit
 
 
-def interrupted_tests(folder: MachineFolder) -> dict[str, int]:
+def count_interrupted_hits(folder: MachineFolder) -> dict[str, int]:
     """Hits on the disk of interrupted tests of the tool of machine.toml that START would go on with, by direction."""
     counts: dict[str, int] = {}
     for path in sorted(folder.spool.iterdir()) if folder.spool.is_dir() else []:
         files = sorted(path.glob("[0-9]*.h5"))
-        first = next(filter(None, map(_read, files)), None)
+        first = next(filter(None, map(_read_spooled_hit, files)), None)
         if first is None or first.circumstances.tool != folder.machine.tap.tool:
             continue
-        if datetime.now(UTC) - first.circumstances.created < RESUMABLE and path.name not in folder.committed:
+        if datetime.now(UTC) - first.circumstances.created < MAX_RESUME_AGE and path.name not in folder.committed_ids:
             counts[first.circumstances.direction] = len(files)
     return counts
 
 
-def write_set_up(folder: Path, trigger: Trigger) -> None:
+def write_setup(folder: Path, trigger: Trigger) -> None:
     """Keep how the hits are recorded; on the disk when this returns."""
     fields = asdict(trigger)
-    atomic_write(folder / SETUP, json.dumps(fields | {"crc": _crc(fields)}).encode())
+    atomic_write(folder / SETUP_FILE_NAME, json.dumps(fields | {"crc": _compute_crc(fields)}).encode())
 
 
-def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
+def read_spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
     """Trigger by which the hits were recorded; None where it was not kept, or is damaged and set aside."""
-    path = folder / SETUP
+    path = folder / SETUP_FILE_NAME
     try:
-        fields = json.loads(read_regular(path, SMALL))
+        fields = json.loads(read_regular_file(path, MAX_SETTINGS_FILE_SIZE))
         crc = fields.pop("crc", None)  # not in the first files
-        if crc not in (None, _crc(fields)):
+        if crc not in (None, _compute_crc(fields)):
             raise ValueError("altered")
         return Trigger(**fields)
     except FileNotFoundError:
@@ -90,30 +90,30 @@ def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
         return None
 
 
-def tidy(folder: MachineFolder) -> None:
+def clean_spool(folder: MachineFolder) -> None:
     """Remove what an ended program leaves of no use: half-written files and empty folders; under the lock.
 
     Half-written files that programs without the lock may be writing just now are left alone.
     """
-    for path in [path for names in HALF_WRITTEN for path in folder.path.glob(names)]:
+    for path in [path for names in TEMPORARY_FILE_PATTERNS for path in folder.path.glob(names)]:
         path.unlink(missing_ok=True)
     spool = folder.spool
     for path in sorted(spool.iterdir()) if spool.is_dir() else []:
         if path.is_dir():
-            if [file.name for file in path.iterdir()] == [SETUP]:
-                (path / SETUP).unlink()
+            if [file.name for file in path.iterdir()] == [SETUP_FILE_NAME]:
+                (path / SETUP_FILE_NAME).unlink()
             with contextlib.suppress(OSError):  # it is not empty
                 path.rmdir()
 
 
-def _crc(fields: object) -> int:
+def _compute_crc(fields: object) -> int:
     return zlib.crc32(json.dumps(fields, sort_keys=True).encode())
 
 
-def _read(path: Path) -> SpooledHit | None:
+def _read_spooled_hit(path: Path) -> SpooledHit | None:
     """A hit; None where its file is damaged."""
     try:
-        if not is_sealed(read_regular(path)) and not has_whole_hits(path):
+        if not has_valid_checksum(read_regular_file(path)) and not has_readable_hits(path):
             return None
         if read_hit_name(path) not in ("", path.name):
             return None

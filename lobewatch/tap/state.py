@@ -46,12 +46,12 @@ class Check:
     """Whether all is well; a failed check warns and does not stop the test."""
     text: str
     """Finding with its unit, and the cure where it failed."""
-    tells: bool = False
+    is_notable: bool = False
     """Whether the finding is worth a line where all is well, too."""
 
 
 @dataclass(frozen=True)
-class TakenHit:
+class ListedHit:
     """One hit in the list of the screen."""
 
     number: int
@@ -69,7 +69,7 @@ class TakenHit:
 
 
 @dataclass(frozen=True, eq=False)
-class Plots:
+class LiveCurves:
     """The curves of the screen, thinned to what a screen can show."""
 
     time: NDArray[np.float64]
@@ -102,7 +102,7 @@ class Choice(NamedTuple):
     """Words on its button."""
 
 
-class ProgramWord(NamedTuple):
+class ProgramVerdict(NamedTuple):
     """A program and the word on it."""
 
     program: str
@@ -115,7 +115,7 @@ class ProgramWord(NamedTuple):
 class Outcome:
     """The result as it stands at the end."""
 
-    light: str
+    status: str
     """Light of the machine: "good", "warn" or "alarm", against the baseline and the limits of machine.toml."""
     texts: Sequence[str]
     """Result in sentences."""
@@ -123,9 +123,9 @@ class Outcome:
     """Sentence on what to do now."""
     is_early: bool = False
     """Whether the alarm is that of a fall short of every limit."""
-    programs: Sequence[ProgramWord] = ()
+    programs: Sequence[ProgramVerdict] = ()
     """Programs with the words on them."""
-    asks_across: bool = False
+    needs_cross_tap: bool = False
     """Whether a tap across, hit in x and seen in y, would settle what x and y leave open of the tool."""
 
 
@@ -156,7 +156,7 @@ class TapState:
     """Hits averaged so far."""
     wanted: int = 10
     """Hits to be averaged."""
-    hits: tuple[TakenHit, ...] = ()
+    hits: tuple[ListedHit, ...] = ()
     """All hits, oldest first."""
     mean_change: float | None = None
     """Share by which the last good hit moved the mean (-); None under 2 of them."""
@@ -166,7 +166,7 @@ class TapState:
     """Root mean squares of force (N; None where not measured) and acceleration (m/s^2) over the last 50 ms."""
     checks: tuple[Check, ...] = ()
     """Lines of the self-check."""
-    plots: Plots | None = None
+    plots: LiveCurves | None = None
     """Curves of the last hit and the mean."""
     outcome: Outcome | None = None
     """Result; None before the end."""

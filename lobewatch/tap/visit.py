@@ -6,22 +6,22 @@ import queue
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from acquisition import TapDirection, tap_direction
+from acquisition import TapDirection, parse_direction
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.spool import interrupted_tests
+from lobewatch.tap.spool import count_interrupted_hits
 from lobewatch.tap.state import Choice, TapState, TapStep
 
-TAP_X, TAP_Y = Choice("x", "tap x"), Choice("y", "tap y")
-TAP_ACROSS = Choice("xy", "tap xy: hit in x, sensor in y")
-NEXT_TOOL, DONE = Choice("tool", "next tool"), Choice("done", "done")
-TAPS: dict[TapDirection, Choice] = {"x": TAP_X, "y": TAP_Y}
-DIRECTIONS = [choice.key for choice in (TAP_X, TAP_Y, TAP_ACROSS)]
+TAP_X_CHOICE, TAP_Y_CHOICE = Choice("x", "tap x"), Choice("y", "tap y")
+CROSS_TAP_CHOICE = Choice("xy", "tap xy: hit in x, sensor in y")
+NEXT_TOOL_CHOICE, DONE_CHOICE = Choice("tool", "next tool"), Choice("done", "done")
+DIRECTION_CHOICES: dict[TapDirection, Choice] = {"x": TAP_X_CHOICE, "y": TAP_Y_CHOICE}
+VISIT_DIRECTIONS = [choice.key for choice in (TAP_X_CHOICE, TAP_Y_CHOICE, CROSS_TAP_CHOICE)]
 
 
-def first_direction(folder: MachineFolder, tool: str) -> TapDirection:
+def choose_first_direction(folder: MachineFolder, tool: str) -> TapDirection:
     """Direction to begin with: x, but y where only a test in y was interrupted."""
-    interrupted = interrupted_tests(folder) if tool == folder.machine.tap.tool else {}
+    interrupted = count_interrupted_hits(folder) if tool == folder.machine.tap.tool else {}
     return "y" if interrupted.keys() == {"y"} else "x"
 
 
@@ -53,25 +53,25 @@ class TapVisit:
         return self._pause or self._session.state
 
     @property
-    def waits(self) -> bool:
+    def is_waiting(self) -> bool:
         """Whether no test runs and a person is waited for."""
         return self._pause is not None and bool(self._pause.choices)
 
     def undo(self) -> None:
         """Take back the last good hit; again: the one before."""
-        if not self.waits:
+        if not self.is_waiting:
             self._session.undo()
 
     def stop(self) -> None:
         """End the test that runs, or the visit between two tests."""
-        self._answers.put((DONE.key, ""))
+        self._answers.put((DONE_CHOICE.key, ""))
         self._session.stop()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Say what comes next, by the key of a choice; tool: name of the next one. ValueError where it cannot be."""
-        if not self.waits or key not in [choice.key for choice in self.state.choices]:
+        if not self.is_waiting or key not in [choice.key for choice in self.state.choices]:
             raise ValueError(f"{key!r} cannot be chosen now; the page shows what can")
-        if key == NEXT_TOOL.key and not tool.strip():
+        if key == NEXT_TOOL_CHOICE.key and not tool.strip():
             raise ValueError("the next tool has no name; give the one that stands in machine.toml, or a new one")
         self._answers.put((key, tool.strip()))
 
@@ -86,29 +86,29 @@ class TapVisit:
             if not self._leads:
                 return
             key, tool = self._wait(tapped)
-            if key == DONE.key:
+            if key == DONE_CHOICE.key:
                 self._show(None)
                 return
-            if key == NEXT_TOOL.key:
+            if key == NEXT_TOOL_CHOICE.key:
                 self._tool, tapped = tool, set()
-            self._direction = tap_direction(key) if key in DIRECTIONS else "x"
+            self._direction = parse_direction(key) if key in VISIT_DIRECTIONS else "x"
             self._session = self._plan(self._tool, self._direction)
             self._show(None)
 
     def _wait(self, tapped: set[TapDirection]) -> tuple[str, str]:
         """Show the result, or that the sensor is to be moved first, and wait for what is chosen."""
         state, felt = self._session.state, self._session.across
-        missing = [direction for direction in TAPS if direction not in tapped]
+        missing = [direction for direction in DIRECTION_CHOICES if direction not in tapped]
         if missing:
-            tap = TAPS[missing[0]]
+            tap = DIRECTION_CHOICES[missing[0]]
             turn = "Turn hammer and accelerometer to" if felt is None else f"{felt.text} The sensor stays: hit in"
             reason = f"{self._direction} is saved. {turn} {missing[0]}, then: {tap.text}."
-            choices: Sequence[Choice] = (tap, DONE)
+            choices: Sequence[Choice] = (tap, DONE_CHOICE)
             moved = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)
             state = replace(moved, sensor_stays=felt is not None)
         else:
-            across = (TAP_ACROSS,) if state.outcome is not None and state.outcome.asks_across else ()
-            choices = (TAP_X, TAP_Y, *across, NEXT_TOOL, DONE)
+            across = (CROSS_TAP_CHOICE,) if state.outcome is not None and state.outcome.needs_cross_tap else ()
+            choices = (TAP_X_CHOICE, TAP_Y_CHOICE, *across, NEXT_TOOL_CHOICE, DONE_CHOICE)
         self._show(replace(state, revision=state.revision + 1, choices=tuple(choices)))
         return self._answers.get()
 

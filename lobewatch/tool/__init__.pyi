@@ -1,15 +1,15 @@
 """A tool in the spindle as it was tapped: its series, its mounting, x and y together, a prediction, its lobes."""
 
-from .assembly import ABOUT_DIRECTIONS, Assembly, lobes_of, speed_grid
-from .charts import Chart, Dynamics, Method, chart
+from .assembly import DIRECTION_CODES, Assembly, compute_lobes, speed_grid
+from .lobe_chart import DynamicsSource, LobeChart, LobeMethod, compute_lobe_chart
 
 __all__ = [
-    "ABOUT_DIRECTIONS",
+    "DIRECTION_CODES",
     "Assembly",
-    "Chart",
-    "Dynamics",
-    "Method",
-    "chart",
-    "lobes_of",
+    "DynamicsSource",
+    "LobeChart",
+    "LobeMethod",
+    "compute_lobe_chart",
+    "compute_lobes",
     "speed_grid",
 ]

@@ -9,20 +9,20 @@ import numpy as np
 from acquisition import DataError, Remark
 from dsm import Calibration, calibrate, modes_at
 from lobewatch.machine import Machine
-from lobewatch.measuring.measurement import Measurement
-from lobewatch.measuring.model import model_state
+from lobewatch.measurement.spindle_model import build_model_state
+from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool.assembly import Assembly, untapped_remark
-from lobewatch.tool.mean_lobes import Modes
+from lobewatch.tool.principal_directions import TipModes
 from modal import Mode
 
-MODES = 8
+PREDICTED_MODE_COUNT = 8
 """Number of modes worked out; those in which the tip is next to at rest are left out."""
-STIFFEST = 50.0
+MAX_PREDICTED_STIFFNESS_RATIO = 50.0
 """Stiffness at the tip over that of the softest mode, beyond which a mode does not move a limit by more than a few
 percent."""
 
 
-def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
+def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
     """A tool as the model has it, in each direction with the bearings of the newest calibrated measurement of it.
 
     newest: those measurements, the newest of all first. The damping ratio is that of the mode followed, and so is the
@@ -30,10 +30,10 @@ def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assem
     DataError where there is no model of the tool, or no tap test that the bearings could be found from.
     """
     if not newest:
-        model_state(machine, None, tool)
+        build_model_state(machine, None, tool)
         raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
-    predictions = {tap.direction: _in_direction(machine, tap, tool) for tap in newest}
-    modes: dict[str, Modes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
+    predictions = {tap.direction: _predict_direction(machine, tap, tool) for tap in newest}
+    modes: dict[str, TipModes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
     ids = " and ".join(tap.tap_id for tap in newest)
     remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
     directions = tuple(name for name in ("x", "y") if name in modes)
@@ -51,14 +51,14 @@ def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assem
     )
 
 
-def _in_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
+def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
     """The modes that the model shows in the band that was looked at, moved along with the softest one."""
-    state, followed = model_state(machine, tap, tool), tap.followed
+    state, followed = build_model_state(machine, tap, tool), tap.followed
     if followed is None:
         raise DataError(f"{tap.tap_id}: no mode is followed")
-    frequency, stiffness = modes_at(state.spindle, MODES)
+    frequency, stiffness = modes_at(state.spindle, PREDICTED_MODE_COUNT)
     softest = int(np.argmin(stiffness))
-    shown = stiffness < STIFFEST * stiffness[softest]
+    shown = stiffness < MAX_PREDICTED_STIFFNESS_RATIO * stiffness[softest]
     if machine.mode.band_hz is not None:
         low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
         shown &= (frequency >= low) & (frequency <= high)

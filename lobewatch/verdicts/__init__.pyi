@@ -1,20 +1,20 @@
 """What a tool allows: doubt, word and limit of each program, why, and settings that would be safe."""
 
-from .advice import Advice, advise, robust_pockets
-from .doubt import Doubt, doubt_of
-from .setting import Setting
+from .recommendation import Advice, advise, find_stable_pockets
+from .setting_robustness import Setting
 from .spindle_at_speed import SpindleAtSpeed
-from .verdict import Ruling, Verdict, Word
+from .uncertainty import Uncertainty, uncertainty_of
+from .verdict import Stability, StoredVerdict, Verdict
 
 __all__ = [
     "Advice",
-    "Doubt",
-    "Ruling",
     "Setting",
     "SpindleAtSpeed",
+    "Stability",
+    "StoredVerdict",
+    "Uncertainty",
     "Verdict",
-    "Word",
     "advise",
-    "doubt_of",
-    "robust_pockets",
+    "find_stable_pockets",
+    "uncertainty_of",
 ]

@@ -15,43 +15,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import DataError
-from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pattern
-from lobes.floquet.program_limit import DEEPEST
+from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
+from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.drawn_limits import drawn_limits, settled_limits
-from lobewatch.verdicts.draws import ProgramDraws
-from lobewatch.verdicts.hard_draws import deepest_calm
-from lobewatch.verdicts.judgement import QUANTILES, weigh
-from lobewatch.verdicts.mean_force import MeanForce
-from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-from lobewatch.verdicts.verdict import Verdict, Word, judge, word_of
+from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
+from lobewatch.verdicts.program_samples import ProgramSamples
+from lobewatch.verdicts.safe_depth_estimates import find_deepest_stable
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, evaluate_program
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
-HARDEST, SPREAD = 8, 40
+N_LOWEST_PITCH_SAMPLES, PITCH_SAMPLE_STEP = 8, 40
 """Number of draws, those that equal pitch has the lowest limits in, and step between others, in which patterns are
 compared before the best are judged ..."""
-FEEDS = 2
+N_PITCH_FEEDS = 2
 """... in so many ways of the cut, the worst ..."""
-DEEPER = 2.0
+PITCH_DEPTH_FACTOR = 2.0
 """... down to so many times their lowest limit by zero order."""
-TRIES, DISAPPOINTING = 3, 0.9
+MAX_PITCH_TRIES, MIN_CONFIRMED_SHARE = 3, 0.9
 """Number of patterns of a kind that are judged, and share of the depth that few draws allow, as much of which is good
 enough: below it the draws that chatter first join the few."""
-JOINING = 8
+N_ADDED_SAMPLES = 8
 """Number of draws that do."""
-WORTH = 1.05
+MIN_PITCH_GAIN = 1.05
 """Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedPitch:
+class PitchEvaluation:
     """Pitches of a cutter with what the judge says of the cut."""
 
     pattern: PitchPattern
     """Pitches."""
-    word: Word
+    stability: Stability
     """Word on the cut at its depth."""
     limit: float
     """Deepest stable depth in the middle of the doubt (m); inf where there is none as deep as the tool cuts."""
@@ -75,42 +74,42 @@ class PitchProposal:
 
     verdict: Verdict
     """Verdict on the cut with equal pitch."""
-    equal: JudgedPitch
+    equal: PitchEvaluation
     """Equal pitch."""
-    unequal: tuple[JudgedPitch, ...]
+    unequal: tuple[PitchEvaluation, ...]
     """The best pattern of each kind, and the pitches that the cutter has, the highest low end of the limit first."""
     half_wave_deg: float
     """Difference of neighbouring pitches that the closed form has as the best (deg); NaN where nothing chatters."""
 
     @property
-    def proposed(self) -> JudgedPitch | None:
+    def proposed(self) -> PitchEvaluation | None:
         """The pitches to choose; None where equal ones are as good."""
         best = next(iter(self.unequal), None)
-        return best if best is not None and best.low >= WORTH * self.equal.low else None
+        return best if best is not None and best.low >= MIN_PITCH_GAIN * self.equal.low else None
 
 
 def propose_pitch(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
+    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS
 ) -> PitchProposal:
     """Pitches for a cut at its speed; limits are looked for up to 20 times its depth.
 
     DataError where the cut cannot be judged, ValueError for less than two teeth.
     """
     equal = equal_pitch(table.teeth)
-    verdict = judge(_with(table, equal), assembly, machine, at_speed)
-    if verdict.word is Word.UNKNOWN or verdict.draws is None:
+    verdict = evaluate_program(_with_pitch(table, equal), assembly, machine, at_speed)
+    if verdict.stability is Stability.UNKNOWN or verdict.samples is None:
         raise DataError("; ".join(str(remark) for remark in verdict.remarks))
-    table = at_speed.taught(table)
-    limits, half_wave = _limits(verdict.draws, table), half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
-    search = PitchSearch(table, assembly, machine, at_speed, verdict.draws, limits)
-    unequal = search.best_of_each(half_wave) if np.isfinite(verdict.limit) else []
+    table = at_speed.apply_coefficients(table)
+    limits, half_wave = _pitch_limits(verdict.samples, table), half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
+    search = PitchSearch(table, assembly, machine, at_speed, verdict.samples, limits)
+    unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
     if present := machine.build_cut(table).pitch:
         pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
-        unequal.append(search.judged(pattern)[0])
+        unequal.append(search.evaluate(pattern)[0])
     band = verdict.limit, verdict.limit_low, verdict.limit_high
     return PitchProposal(
         verdict,
-        _judged(equal, verdict.word, band, limits, limits),
+        _build_evaluation(equal, verdict.stability, band, limits, limits),
         tuple(sorted(unequal, key=lambda judged: -judged.low)),
         half_wave,
     )
@@ -128,65 +127,72 @@ class PitchSearch:
     """Machine."""
     at_speed: SpindleAtSpeed
     """Spindle as test cuts have taught it."""
-    draws: ProgramDraws
+    samples: ProgramSamples
     """Draws of the cut with equal pitch."""
-    equal: Floats
+    equal_limits: Floats
     """Their limits (m), the middle first."""
 
-    def best_of_each(self, half_wave: float) -> list[JudgedPitch]:
+    def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
         """The pattern of each kind with the highest low end of its limit, as far as few draws tell before the judge."""
         kinds = itertools.groupby(pitch_patterns(self.table.teeth, half_wave), key=lambda pattern: pattern.name)
-        return [self._best(list(patterns)) for _, patterns in kinds]
+        return [self._find_best(list(patterns)) for _, patterns in kinds]
 
-    def _best(self, patterns: list[PitchPattern]) -> JudgedPitch:
+    def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
         """The best of one kind."""
-        places = [*np.argsort(self.equal)[:HARDEST].tolist(), *range(0, self.equal.size, SPREAD)]
-        judged = dict[PitchPattern, JudgedPitch]()
-        for _ in range(TRIES):
-            calm = {pattern: self._calm(pattern, np.unique(places)) for pattern in patterns}
+        places = [
+            *np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist(),
+            *range(0, self.equal_limits.size, PITCH_SAMPLE_STEP),
+        ]
+        judged = dict[PitchPattern, PitchEvaluation]()
+        for _ in range(MAX_PITCH_TRIES):
+            calm = {pattern: self._stable_depth(pattern, np.unique(places)) for pattern in patterns}
             likely = max(patterns, key=lambda pattern: judged[pattern].low if pattern in judged else calm[pattern])
             if likely in judged:
                 break
-            judged[likely], limits = self.judged(likely)
-            if judged[likely].low >= DISAPPOINTING * calm[likely]:
+            judged[likely], limits = self.evaluate(likely)
+            if judged[likely].low >= MIN_CONFIRMED_SHARE * calm[likely]:
                 break
-            places += np.argsort(limits)[:JOINING].tolist()
+            places += np.argsort(limits)[:N_ADDED_SAMPLES].tolist()
             patterns = [pattern for pattern in patterns if calm[pattern] > judged[likely].low]
         return max(judged.values(), key=lambda judged: judged.low)
 
-    def _calm(self, pattern: PitchPattern, places: NDArray[np.intp]) -> float:
+    def _stable_depth(self, pattern: PitchPattern, places: NDArray[np.intp]) -> float:
         """The deepest (m) at which the draws at some places are stable."""
-        cuts, limits = self.draws.cuts[:FEEDS], self.draws.limits[:FEEDS]
-        few = replace(self.draws[places], cuts=tuple(with_pattern(cut, pattern) for cut in cuts), limits=limits)
+        cuts, limits = self.samples.cuts[:N_PITCH_FEEDS], self.samples.limits[:N_PITCH_FEEDS]
+        few = replace(self.samples[places], cuts=tuple(with_pitch_pattern(cut, pattern) for cut in cuts), limits=limits)
         speeds = few.rows.speed_rpm[:, np.newaxis]
-        mean = min(float(np.min(MeanForce.of(few.rows.making(cut)).limits(speeds)[0])) for cut in few.cuts)
-        return deepest_calm(few, min(DEEPER * mean, DEEPEST * self.table.depth_mm / 1e3))
+        mean = min(float(np.min(ZeroOrderBatch.of(few.rows.with_cut(cut)).limits(speeds)[0])) for cut in few.cuts)
+        return find_deepest_stable(
+            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.table.depth_mm / 1e3)
+        )
 
-    def judged(self, pattern: PitchPattern) -> tuple[JudgedPitch, Floats]:
+    def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
         """Pitches by the judge, and the limit of each draw (m), the middle first."""
-        table = _with(self.table, pattern)
-        judgement = weigh(table, self.assembly, self.machine, self.at_speed)
-        band = judgement.middle.limit, judgement.low, judgement.high
-        word, limits = word_of(table, judgement, self.assembly), _limits(judgement.draws, table)
-        return _judged(pattern, word, band, limits, self.equal), limits
+        table = _with_pitch(self.table, pattern)
+        judgement = run_monte_carlo(table, self.assembly, self.machine, self.at_speed)
+        band = judgement.median.limit, judgement.low, judgement.high
+        word, limits = classify_stability(table, judgement, self.assembly), _pitch_limits(judgement.samples, table)
+        return _build_evaluation(pattern, word, band, limits, self.equal_limits), limits
 
 
-def _with(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
+def _with_pitch(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
     return msgspec.structs.replace(table, pitch_deg=pattern.pitch_deg)
 
 
-def _limits(draws: ProgramDraws, table: ProgramTable) -> Floats:
+def _pitch_limits(draws: ProgramSamples, table: ProgramTable) -> Floats:
     """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
     depth = table.depth_mm / 1e3
-    limits = settled_limits(draws, drawn_limits(draws, depth))
+    limits = refine_sample_limits(draws, find_sample_limits(draws, depth))
     limits[0] = draws.limits[0]
-    return np.minimum(limits, DEEPEST * depth)
+    return np.minimum(limits, MAX_PROGRAM_DEPTH_RATIO * depth)
 
 
-def _judged(
-    pattern: PitchPattern, word: Word, band: tuple[float, float, float], limits: Floats, equal: Floats
-) -> JudgedPitch:
+def _build_evaluation(
+    pattern: PitchPattern, word: Stability, band: tuple[float, float, float], limits: Floats, equal: Floats
+) -> PitchEvaluation:
     """Pitches from the limits of their draws and those of equal pitch (m), the middle first."""
     gains = limits / equal - 1
-    low, high = np.quantile(gains[1:], QUANTILES)
-    return JudgedPitch(pattern, word, *band, float(gains[0]), float(low), float(high), float(np.mean(gains[1:] < 0)))
+    low, high = np.quantile(gains[1:], LIMIT_QUANTILES)
+    return PitchEvaluation(
+        pattern, word, *band, float(gains[0]), float(low), float(high), float(np.mean(gains[1:] < 0))
+    )

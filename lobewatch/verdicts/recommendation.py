@@ -1,42 +1,105 @@
-"""The speed and the depth that are recommended for a cut, or why none is and what would change that."""
+"""Recommend settings for a program or a cut, or say why there are none."""
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from acquisition import DataError, Remark
-from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import MM, CutRange
-from lobewatch.machine.settings.setting_questions import questions_of_program
+from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
+from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
+from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
+from lobewatch.verdicts.program_remarks import missing_tool_remarks
+from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
-from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
-from lobewatch.verdicts.tool_remarks import not_described
-from lobewatch.verdicts.verdict import Verdict, Word, judge, unanswered
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, find_open_question, is_compliance_known
 
-MOST_CHIPS, HERE = "most chips", "deepest at the present speed"
+
+@dataclass(frozen=True)
+class Advice:
+    """What goes beyond the word."""
+
+    best: Setting | None = None
+    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the most chips per
+    time. None where the program is stable, nothing is safe, or nothing can be said."""
+    deepest_here: Setting | None = None
+    """Deepest cut at the program's own speed, where `best` has another depth."""
+    tolerable_drop: float = math.nan
+    """Tolerable fall of the frequency in the middle of the doubt, relative; 0 where it is not stable now, inf where
+    nothing happens down to 80 %, NaN where the program could not be checked."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what the decay rests on, and what would have to be known of the tool."""
+
+
+def advise(verdict: Verdict, machine: Machine) -> Advice:
+    """Advice beside a verdict; empty where it is unknown."""
+    tool, draws = verdict.assembly, verdict.samples
+    if tool is None or draws is None:
+        return Advice()
+    stiffness_at, remark = model_softening(tool)
+    decay = find_tolerable_drop(draws, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.is_stable else 0.0
+    remarks = (remark,) if verdict.is_stable else ()
+    if verdict.stability is Stability.STABLE or not is_compliance_known(verdict.program, tool):
+        return Advice(tolerable_drop=decay, remarks=remarks)
+    search, program = SettingSearch(verdict.program, tool, machine, verdict.at_speed), verdict.program
+    remarks = (*remarks, *missing_tool_remarks(program, search.cut_range.limits))
+    elsewhere = search.nearest_window(program.depth_mm, program.speed_rpm)
+    if elsewhere is not None:
+        return Advice(elsewhere, None, decay, remarks)
+    return Advice(search.best, search.deepest_at(program.speed_rpm, program.depth_mm), decay, remarks)
+
+
+def find_stable_pockets(
+    table: CutTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS, count: int = 3
+) -> list[Setting]:
+    """Speeds and depths that would be called stable with depth to spare, the largest removal rate first.
+
+    The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
+    range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
+    """
+    if not is_compliance_known(table, assembly):
+        return []
+    program = build_cut_program(at_speed.apply_coefficients(table), assembly.tool, machine)
+    return SettingSearch(program, assembly, machine, at_speed).pockets(count)
+
+
+def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
+    """A cut as a program of a tool, at any speed and depth where it has none: no search rests on them."""
+    if isinstance(table, ProgramTable):
+        return table
+    place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
+    return ProgramTable(**{"name": REFERENCE_CUT, "tool": tool} | msgspec.structs.asdict(table) | place)
+
+
+MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
 """What an alternative is good for."""
-OTHER_CUT = (
+CUT_REMEDIES = (
     "a shorter stick-out: tap it again with it",
     "another tool: a thicker one, or with fewer teeth",
     "a smaller radial depth",
 )
 """What makes a cut safe that is not, in words."""
-SLOWER = ("a smaller diameter", "tool_material and cutting_speed_m_min in its [[tool]], where it bears more")
+TOOL_SPEED_REMEDIES = (
+    "a smaller diameter",
+    "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
+)
 """What makes a tool one that the spindle is slow enough for ..."""
-FASTER = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
+MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """... where max_speed_rpm holds it down."""
-OTHER_SPEED = ("a speed within that", SLOWER[1])
+FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
 """... or where a program is set to run at a speed that it does not bear."""
-THIN = 0.1
+THIN_CUT_IMMERSION = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
-ITS_OWN = ("speed_rpm", "depth_mm")
+REQUESTED_KEYS = ("speed_rpm", "depth_mm")
 """Keys of a program that do not count where a setting is asked for."""
 
 
@@ -44,7 +107,7 @@ ITS_OWN = ("speed_rpm", "depth_mm")
 class Alternative:
     """A setting beside the recommended one."""
 
-    what: str
+    label: str
     """Name of what it is good for."""
     setting: Setting
     """Speed and depth."""
@@ -56,7 +119,7 @@ class Recommendation:
 
     program: ProgramTable
     """Cut that is asked about, as it would stand in machine.toml; at the recommended setting where there is one."""
-    either: bool = False
+    any_direction: bool = False
     """Direction left open: it holds for up and down milling, and the program is milled in the worse."""
     setting: Setting | None = None
     """Recommended setting; None where there is none."""
@@ -64,7 +127,7 @@ class Recommendation:
     """Verdict on the program at that setting; None where there is none."""
     reason: str = ""
     """Reason why there is none."""
-    cures: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()
     """Measures that would change that."""
     alternatives: tuple[Alternative, ...] = ()
     """Settings beside it, two at most."""
@@ -91,92 +154,102 @@ def recommend(
     """
     if isinstance(tool, DataError):
         tap = f"tap it: lobewatch tap MACHINE --tool {shlex.quote(table.tool)}"
-        return Recommendation(table, either, reason=str(tool), cures=(tap,))
-    if gap := _gap(table, tool, machine):
-        return Recommendation(table, either, reason=gap[0], cures=gap[1:])
-    if too_fast := _too_fast(CutRange.of(machine, table)):
-        return Recommendation(table, either, reason=too_fast[0], cures=too_fast[1:])
-    search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
+        return Recommendation(table, either, reason=str(tool), remedies=(tap,))
+    if gap := _find_gap(table, tool, machine):
+        return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
+    if too_fast := _find_speed_conflict(CutRange.of(machine, table)):
+        return Recommendation(table, either, reason=too_fast[0], remedies=too_fast[1:])
+    search = SettingSearch(at_speed.apply_coefficients(table), tool, machine, at_speed, either)
     if is_set and present_rpm is not None:
-        setting = search.here(present_rpm, search.reach.deepest_mm)
+        setting = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     else:
-        setting = search.best if depth_mm is None else search.fastest(depth_mm)
-    others = tuple(_alternatives(search, setting, present_rpm))
+        setting = search.best if depth_mm is None else search.fastest_window(depth_mm)
+    others = tuple(_list_alternatives(search, setting, present_rpm))
     if setting is None:
-        reason, cures = _no_safe(search, depth_mm, present_rpm if is_set else None)
-        feed = _feed(search, table)
-        return Recommendation(table, either, reason=reason, cures=cures, alternatives=others, feed_mm=feed)
-    return _entered(search, table, setting, others)
+        reason, cures = _explain_no_setting(search, depth_mm, present_rpm if is_set else None)
+        feed = _feed_range(search, table)
+        return Recommendation(table, either, reason=reason, remedies=cures, alternatives=others, feed_mm=feed)
+    return _recommend_setting(search, table, setting, others)
 
 
-def _gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
+def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
     """Why nothing can be called safe at any speed and depth, and what to do; empty where it can be."""
-    asked = questions_of_program(machine, table, tool.predicted or machine.tap.position_mm > 0)
-    asked = [doubted for doubted in asked if doubted.key not in ITS_OWN]
+    asked = find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0)
+    asked = [doubted for doubted in asked if doubted.key not in REQUESTED_KEYS]
     if asked:
-        return ("; ".join(f"{doubted.claim} {doubted.why}" for doubted in asked), asked[0].remark.cure)
-    return unanswered(table, tool) or ()
+        return ("; ".join(f"{doubted.statement} {doubted.reason}" for doubted in asked), asked[0].remark.cure)
+    return find_open_question(table, tool) or ()
 
 
-def _too_fast(reach: CutRange) -> tuple[str, ...]:
+def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     """Why no speed of the spindle is one that the tool bears, and what would change it; empty where one is."""
     speed, limits = reach.machine.speed, reach.limits
     if not reach.is_empty:
         return ()
     edge = limits.cutting_speed_m_min
     edge_text = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
-    why, cures = (" (its max_speed_rpm)", FASTER) if limits.is_capped else (edge_text, SLOWER)
+    why, cures = (" (its max_speed_rpm)", MAX_SPEED_REMEDIES) if limits.is_capped else (edge_text, TOOL_SPEED_REMEDIES)
     slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
     return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
 
 
-def _entered(
+def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
     """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
-    judgement = search.judged[setting.speed_rpm, setting.depth_mm]
-    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": judgement.draws.cuts[0].direction}
+    judgement = search.results[setting.speed_rpm, setting.depth_mm]
+    at = {
+        "speed_rpm": setting.speed_rpm,
+        "depth_mm": setting.depth_mm,
+        "direction": judgement.samples.cuts[0].direction,
+    }
     program = msgspec.structs.replace(table, **at)
-    verdict = judge(program, search.assembly, search.machine, search.at_speed, judgement)
-    if verdict.word is not Word.STABLE or verdict.is_beyond_drive:
-        reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
-        return Recommendation(table, search.either, reason=reason, alternatives=others)
-    remarks = (*verdict.remarks, *not_described(table, search.reach.limits))
-    return Recommendation(program, search.either, setting, verdict, "", (), others, _feed(search, table), remarks)
+    verdict = evaluate_program(program, search.assembly, search.machine, search.at_speed, judgement)
+    if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
+        reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
+        return Recommendation(table, search.any_direction, reason=reason, alternatives=others)
+    remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
+    return Recommendation(
+        program, search.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
+    )
 
 
-def _feed(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
+def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
     """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
-    own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
+    own, borne = table.feed_per_tooth_mm, search.cut_range.limits.feed_per_tooth_mm
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
-def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:
+def _list_alternatives(
+    search: SettingSearch, setting: Setting | None, present_rpm: float | None
+) -> Iterator[Alternative]:
     places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
-    wanted = {MOST_CHIPS: search.best}
+    wanted = {MAX_REMOVAL_LABEL: search.best}
     if present_rpm is not None:
-        wanted[HERE] = search.here(present_rpm, search.reach.deepest_mm)
+        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
             yield Alternative(what, other)
 
 
-def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
+def _explain_no_setting(
+    search: SettingSearch, depth_mm: float | None, set_rpm: float | None
+) -> tuple[str, tuple[str, ...]]:
     """What there is not, and what would change that."""
-    if set_rpm is not None and not search.reach.low_rpm <= set_rpm <= search.reach.high_rpm:
-        return f"{set_rpm:g} rpm is outside {search.reach.words}", OTHER_SPEED
+    if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
+        return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES
     if set_rpm is not None:
-        return f"no safe depth at {set_rpm:g} rpm", _cures(search, depth_mm)
+        return f"no safe depth at {set_rpm:g} rpm", _list_remedies(search, depth_mm)
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    return f"no safe {named} in {search.reach.words}", _cures(search, depth_mm)
+    return f"no safe {named} in {search.cut_range.text}", _list_remedies(search, depth_mm)
 
 
-def _cures(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
+def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
     """What would make it safe: what settles the doubt first, where that alone stands in the way."""
-    likely = search.likely
+    likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])
-    probe = msgspec.structs.replace(search.table, speed_rpm=speed, depth_mm=depth_mm or MM)
-    verdict = judge(probe, search.assembly, search.machine, search.at_speed)
+    probe = msgspec.structs.replace(search.table, speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)
+    verdict = evaluate_program(probe, search.assembly, search.machine, search.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(OTHER_CUT if search.table.immersion > THIN else OTHER_CUT[:2]))
+    return (*settles, *(CUT_REMEDIES if search.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))

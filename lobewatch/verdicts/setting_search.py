@@ -1,7 +1,7 @@
 """The one search for settings that would be called stable, with something to spare: advice, pockets, recommendations.
 
-Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`HardDraws`). What
-is recommended has been judged like any program: `weigh` finds it stable throughout, and the same draws are stable
+Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`CriticalSamples`). What
+is recommended has been judged like any program: `run_monte_carlo` finds it stable throughout, and the same draws are stable
 around it and as the spindle will be when it is tapped again (`room`). Where no speed of the grid has such a depth,
 nothing is recommended.
 """
@@ -19,50 +19,62 @@ from numpy.typing import NDArray
 
 from lobes import Cut, Program
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import MM, RPM, CutRange
+from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.aging import StiffnessAt, softening
-from lobewatch.verdicts.doubt import Doubt, doubt_of
-from lobewatch.verdicts.draws import DRAWS, ProgramDraws
-from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
-from lobewatch.verdicts.judgement import SURELY, Judgement, drawn_program, weighed
-from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
-from lobewatch.verdicts.needed_fall import needed_fall
-from lobewatch.verdicts.room import APART, DEEPER, all_around, frequency_left, window_rpm
-from lobewatch.verdicts.setting import Setting
-from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-from lobewatch.verdicts.ways import ways
+from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
+from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, cutting_conditions_of
+from lobewatch.verdicts.safe_depth_estimates import (
+    CriticalSamples,
+    LikelyDepths,
+    estimate_likely_depths,
+    find_deepest_stable,
+    select_critical_samples,
+)
+from lobewatch.verdicts.setting_robustness import (
+    ROBUST_DEPTH_FACTOR,
+    ROBUST_SPEED_FACTOR,
+    Setting,
+    find_drop_margin,
+    find_needed_drop,
+    find_speed_window,
+    sweep_neighborhood,
+)
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.uncertainty import Uncertainty, uncertainty_of
 
-SPARE = 0.20
+MIN_DEPTH_MARGIN = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
-MOST_SPARE = 20.0
+MAX_DEPTH_MARGIN = 20.0
 """Depth to spare that stands for more too, and for no limit: no deeper is looked."""
-MOST_PLACES = 12
+MAX_SEARCHED_SPEEDS = 12
 """Number of speeds that few draws are looked at at before it is said that there is none."""
-HOPE = 1.1
+PROMISING_FACTOR = 1.1
 """A speed is looked at where the depth that is likely times this, and times the largest share of such a depth that few
 draws have left elsewhere, would be more chips than are known of."""
-NEAR = np.concatenate([sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)])
+NEIGHBOR_SPEED_STEPS = np.concatenate(
+    [sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)]
+)
 """Relative distances of speeds that are looked at beside that of most chips ..."""
-CLIMBS = 2
+N_CLIMBS = 2
 """... and number of times that they are."""
-SEVERAL = 3
+MIN_FAILED_SPEEDS = 3
 """Number of speeds judged in vain that say what is left at others of their pocket."""
-TRIES, MOST_TRIES = 4, 12
+TRIES_PER_SPEED, MAX_SETTING_TRIES = 4, 12
 """Number of depths that are judged at one speed, and at all of them."""
-NEARLY = 0.85
+NEARLY_SAFE_SHARE = 0.85
 """Share of a depth that is wanted, where so much is likely it may be safe too."""
-REMEMBERED = 8
+MAX_REMEMBERED_SAMPLES = 8
 """Draws of each judgement that are remembered where they chatter."""
-LESS = 0.98
+NEXT_DEPTH_SHARE = 0.98
 """Share of a depth, at least as much less of which is looked at where draws chatter."""
-FEW = 24
+N_WINDOW_SAMPLES = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
 
 Floats = NDArray[np.float64]
-Depths = dict[float, float]
+DepthsBySpeed = dict[float, float]
 """Depths (mm) that may be safe, by speeds (rpm)."""
-Shares = dict[float, float]
+SharesBySpeed = dict[float, float]
 """Shares that all draws left of the depths that few allowed, by speeds (rpm) that were judged in vain."""
 
 
@@ -76,225 +88,239 @@ class SettingSearch:
     """Tool as tapped."""
     machine: Machine
     """Machine, with its speeds, its drive and its tap interval."""
-    at_speed: SpindleAtSpeed = AT_REST
+    at_speed: SpindleAtSpeed = NO_TEST_CUTS
     """Spindle as test cuts have taught it."""
-    either: bool = False
+    any_direction: bool = False
     """Direction left open: milled up or down, the worse counts."""
-    hard: dict[float, HardDraws] = field(default_factory=dict)
+    critical: dict[float, CriticalSamples] = field(default_factory=dict)
     """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
-    judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
+    results: dict[tuple[float, float], MonteCarloResult] = field(default_factory=dict)
     """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def spindle(self) -> Assembly:
         """The tool in the middle of what was learnt."""
-        return self.at_speed.moved(self.assembly)
+        return self.at_speed.scale_modes(self.assembly)
 
     @cached_property
-    def reach(self) -> CutRange:
+    def cut_range(self) -> CutRange:
         """Speeds and depths that may be recommended."""
         return CutRange.of(self.machine, self.table)
 
     @cached_property
     def cuts(self) -> tuple[Cut, ...]:
         """Cuts that it makes on its way."""
-        return ways(self.table, self.machine, self.spindle, self.either)
+        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
 
     @cached_property
-    def fall(self) -> float:
+    def needed_drop(self) -> float:
         """Fall of the frequency that a setting must stand, relative."""
-        return needed_fall(self.assembly, self.machine)
+        return find_needed_drop(self.assembly, self.machine)
 
     @cached_property
-    def doubt(self) -> Doubt:
+    def uncertainty(self) -> Uncertainty:
         """What is not known."""
-        return self.at_speed.doubt or doubt_of(self.assembly, self.table, self.machine)
+        return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
         """Stiffness over that of now by the fall of the frequency."""
-        return softening(self.assembly)[0]
+        return model_softening(self.assembly)[0]
 
     @cached_property
-    def likely(self) -> LikelyDepths:
+    def likely_depths(self) -> LikelyDepths:
         """Where to look."""
-        return likely_depths(self.reach, self.cuts, self.spindle, self.doubt, self.fall, SPARE)
+        return estimate_likely_depths(
+            self.cut_range, self.cuts, self.spindle, self.uncertainty, self.needed_drop, MIN_DEPTH_MARGIN
+        )
 
     @cached_property
     def best(self) -> Setting | None:
         """The setting of largest removal rate at the same feed per tooth; None where nothing is safe."""
-        return next(self._settings(), None)
+        return next(self._search_settings(), None)
 
     def pockets(self, count: int) -> list[Setting]:
         """The best setting, and the next best of other pockets."""
         taken: list[Setting] = []
-        for setting in self._settings(taken):
+        for setting in self._search_settings(taken):
             taken.append(setting)
             if len(taken) == count:
                 break
         return taken
 
-    def nearest(self, depth_mm: float, speed_rpm: float) -> Setting | None:
+    def nearest_window(self, depth_mm: float, speed_rpm: float) -> Setting | None:
         """A depth (mm) at the window of speeds nearest to one (rpm)."""
-        return self._first_at(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
+        return self._first_safe(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
 
-    def fastest(self, depth_mm: float) -> Setting | None:
+    def fastest_window(self, depth_mm: float) -> Setting | None:
         """A depth (mm) at the fastest window of speeds."""
-        return self._first_at(depth_mm, lambda speed: -speed)
+        return self._first_safe(depth_mm, lambda speed: -speed)
 
-    def here(self, speed_rpm: float, most_mm: float) -> Setting | None:
+    def deepest_at(self, speed_rpm: float, most_mm: float) -> Setting | None:
         """The deepest at a speed (rpm), up to a depth (mm)."""
-        if self.best is None or not self.reach.low_rpm <= speed_rpm <= self.reach.high_rpm:
+        if self.best is None or not self.cut_range.low_rpm <= speed_rpm <= self.cut_range.high_rpm:
             return None
-        return self._deepest(speed_rpm, min(most_mm, self._calm(speed_rpm)))
+        return self._deepest_setting(speed_rpm, min(most_mm, self._deepest_stable(speed_rpm)))
 
-    def _first_at(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
+    def _first_safe(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
         """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
-        for speed in self._windows(depth_mm, rank):
-            if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
-                setting = self.verified(speed, depth_mm)
+        for speed in self._candidate_speeds(depth_mm, rank):
+            if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
+                setting = self.verify(speed, depth_mm)
                 if isinstance(setting, Setting):
                     return setting
         return None
 
-    def _windows(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
+    def _candidate_speeds(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
         """Speeds (rpm) to look for a depth (mm) at; that of most chips, which takes a search, is the last."""
-        if self.reach.is_empty:
+        if self.cut_range.is_empty:
             return
-        middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
-        yield from map(_rounded, sorted(middles, key=rank)[:MOST_PLACES])
+        middles = {
+            *self.likely_depths.window_centers(depth_mm),
+            *self.likely_depths.window_centers(NEARLY_SAFE_SHARE * depth_mm),
+        }
+        yield from map(_round_speed, sorted(middles, key=rank)[:MAX_SEARCHED_SPEEDS])
         if self.best is not None:
             yield self.best.speed_rpm
 
-    def _settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
+    def _search_settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
         """The deepest at speeds of the grid, the most chips first as far as few draws tell.
 
         What was judged in vain comes back with less depth, and the draws that chattered count from then on. Pockets
         that are taken while it goes on are passed over.
         """
-        if self.reach.is_empty:
+        if self.cut_range.is_empty:
             return
-        tops = [(_rounded(speed), depth) for speed, depth in self.likely.tops(MOST_PLACES)][::-1]
-        depths, kept = Depths(), Shares()
+        tops = [(_round_speed(speed), depth) for speed, depth in self.likely_depths.removal_peaks(MAX_SEARCHED_SPEEDS)][
+            ::-1
+        ]
+        depths, kept = DepthsBySpeed(), SharesBySpeed()
         looked, left = set[float](), 0.0
-        for _ in range(MOST_TRIES):
+        for _ in range(MAX_SETTING_TRIES):
             tops = [top for top in tops if self._is_free(top[0], taken)]
             depths = {speed: depth for speed, depth in depths.items() if self._is_free(speed, taken)}
-            speed = self._most_chips(depths, kept)
-            while tops and HOPE * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
+            speed = self._best_speed(depths, kept)
+            while tops and PROMISING_FACTOR * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
                 top, likely = tops.pop()
-                depths[top] = self.reach.floored(self._calm(top))
-                left, speed = max(left, depths[top] / likely), self._most_chips(depths, kept)
+                depths[top] = self.cut_range.round_down_depth(self._deepest_stable(top))
+                left, speed = max(left, depths[top] / likely), self._best_speed(depths, kept)
             if not depths.get(speed):
                 return
-            speed = self._climbed(speed, depths, kept, looked)
+            speed = self._climb(speed, depths, kept, looked)
             if not self._is_free(speed, taken):
                 continue
-            setting = self.verified(speed, depths[speed])
+            setting = self.verify(speed, depths[speed])
             if isinstance(setting, Setting):
                 del depths[speed]
                 yield setting
             else:
                 kept[speed] = kept.get(speed, 1.0) * setting / depths[speed]
-                depths[speed] = self.reach.floored(setting)
+                depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
         """Whether a speed (rpm) lies in none of the pockets that are taken."""
-        return not any(self.likely.is_joined(speed, setting.speed_rpm) for setting in taken)
+        return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
-    def _climbed(self, speed: float, depths: Depths, kept: Shares, looked: set[float]) -> float:
+    def _climb(self, speed: float, depths: DepthsBySpeed, kept: SharesBySpeed, looked: set[float]) -> float:
         """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), once for each top."""
-        for _ in range(0 if speed in looked else CLIMBS):
+        for _ in range(0 if speed in looked else N_CLIMBS):
             looked.add(speed)
-            if (beside := self._beside(speed, depths[speed])) in looked:
+            if (beside := self._better_neighbor(speed, depths[speed])) in looked:
                 break
             looked.add(beside)
-            depths[beside] = self.reach.floored(self._calm(beside))
-            speed = self._most_chips(depths, kept)
+            depths[beside] = self.cut_range.round_down_depth(self._deepest_stable(beside))
+            speed = self._best_speed(depths, kept)
         return speed
 
-    def _most_chips(self, depths: Depths, kept: Shares) -> float:
+    def _best_speed(self, depths: DepthsBySpeed, kept: SharesBySpeed) -> float:
         """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
         while True:
-            speed = max(depths, key=lambda speed: speed * depths[speed] * self._share(speed, kept), default=0.0)
-            if not speed or self.hard[speed].chattered == self.chattered:
+            speed = max(
+                depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, kept), default=0.0
+            )
+            if not speed or self.critical[speed].chattered == self.chattered:
                 return speed
-            depths[speed] = min(depths[speed], self.reach.floored(self._calm(speed)))
+            depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
 
-    def _share(self, speed: float, kept: Shares) -> float:
+    def _expected_share(self, speed: float, kept: SharesBySpeed) -> float:
         """Share of its depth that is likely to be left at a speed (rpm), when several of its pocket were judged."""
-        shares = [share for other, share in kept.items() if self.likely.is_joined(speed, other)]
-        return 1.0 if speed in kept or len(shares) < SEVERAL else max(shares)
+        shares = [share for other, share in kept.items() if self.likely_depths.is_same_pocket(speed, other)]
+        return 1.0 if speed in kept or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
-    def _beside(self, speed: float, depth_mm: float) -> float:
+    def _better_neighbor(self, speed: float, depth_mm: float) -> float:
         """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""
-        speeds = np.round(speed * (1 + NEAR) / RPM) * RPM
-        depths = (np.floor(speed * depth_mm / speeds / MM) + 1) * MM
-        held = [self.reach.holds(*place) for place in zip(speeds.tolist(), depths.tolist(), strict=True)]
+        speeds = np.round(speed * (1 + NEIGHBOR_SPEED_STEPS) / SPEED_STEP_RPM) * SPEED_STEP_RPM
+        depths = (np.floor(speed * depth_mm / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM
+        held = [self.cut_range.contains(*place) for place in zip(speeds.tolist(), depths.tolist(), strict=True)]
         if not any(held):
             return speed
-        grown = self.hard[speed].growth_beside(speeds[held] / speed, depths[held] / 1e3)
+        grown = self.critical[speed].growth_at_speeds(speeds[held] / speed, depths[held] / 1e3)
         return float(speeds[held][np.argmin(grown)]) if np.min(grown) < 0 else speed
 
-    def _calm(self, speed: float) -> float:
+    def _deepest_stable(self, speed: float) -> float:
         """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
-        most = float(self.reach.depths(np.array([speed]))[0]) / 1e3
-        hard = self.hard[speed] = replace(self._hard(speed), chattered=frozenset(self.chattered))
-        return 1e3 * hard.deepest(most)
+        most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
+        hard = self.critical[speed] = replace(self._critical_samples(speed), chattered=frozenset(self.chattered))
+        return 1e3 * hard.deepest_stable(most)
 
-    def _hard(self, speed: float) -> HardDraws:
+    def _critical_samples(self, speed: float) -> CriticalSamples:
         """The few draws at a speed (rpm)."""
-        if speed in self.hard:
-            return self.hard[speed]
-        likely = float(np.interp(speed, self.likely.speeds, self.likely.depths)) / 1e3
-        program = Program(self.machine.build_cut(self.table), speed, max(likely, MM / 1e3))
-        spindle = self.spindle, self.doubt, self.fall, self.stiffness_at
-        return hard_draws(program, self.cuts, *spindle, SPARE)
+        if speed in self.critical:
+            return self.critical[speed]
+        likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
+        program = Program(self.machine.build_cut(self.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
+        spindle = self.spindle, self.uncertainty, self.needed_drop, self.stiffness_at
+        return select_critical_samples(program, self.cuts, *spindle, MIN_DEPTH_MARGIN)
 
-    def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
+    def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
         """The deepest setting up to a depth (mm)."""
-        for _ in range(TRIES):
-            if not (depth_mm := self.reach.floored(depth_mm)):
+        for _ in range(TRIES_PER_SPEED):
+            if not (depth_mm := self.cut_range.round_down_depth(depth_mm)):
                 return None
-            setting = self.verified(speed, depth_mm)
+            setting = self.verify(speed, depth_mm)
             if isinstance(setting, Setting):
                 return setting
-            depth_mm = min(setting, self._calm(speed))
+            depth_mm = min(setting, self._deepest_stable(speed))
         return None
 
-    def verified(self, speed: float, depth_mm: float) -> Setting | float:
+    def verify(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
-        deep = DEEPER * depth
-        program = drawn_program(table, self.assembly, self.machine, self.at_speed, self.either)
-        limit = program.middle.limit
-        if limit < depth * (1 + SPARE):
-            return 1e3 * limit / (1 + SPARE)
-        near = program.draws.fed_where(program.draws.around(SURELY * deep, self.fall, APART) >= 0)
-        around = all_around(near, self.fall, self.stiffness_at)
-        grown = around.growth_that_counts(deep)
+        deep = ROBUST_DEPTH_FACTOR * depth
+        program = sample_program(table, self.assembly, self.machine, self.at_speed, self.any_direction)
+        limit = program.median.limit
+        if limit < depth * (1 + MIN_DEPTH_MARGIN):
+            return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
+        near = program.samples.with_cuts(
+            program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR) >= 0
+        )
+        around = sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
+        grown = around.critical_growth(deep)
         if np.any(grown >= 0):
-            return self._less(around, grown, depth_mm)
-        judgement = weighed(program)
+            return self._reduced_depth(around, grown, depth_mm)
+        judgement = evaluate_samples(program)
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
-            self.chattered.update(places[:REMEMBERED].tolist())
-            calm = min(deepest_calm(program.draws[places[:FEW]], depth), judgement.lowest)
-            return min(1e3 * calm, LESS * depth_mm, depth_mm - MM)
-        hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
-        window = window_rpm(near, hardest, speed, depth, self.reach)
-        left = frequency_left(hardest, depth, self.stiffness_at)
-        self.judged[speed, depth_mm] = judgement
-        return Setting(speed, depth_mm, window, min(limit / depth - 1, MOST_SPARE), left)
+            self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
+            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), judgement.lowest)
+            return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
+        hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
+        window = find_speed_window(near, hardest, speed, depth, self.cut_range)
+        left = find_drop_margin(hardest, depth, self.stiffness_at)
+        self.results[speed, depth_mm] = judgement
+        return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
 
-    def _less(self, draws: ProgramDraws, grown: Floats, depth_mm: float) -> float:
+    def _reduced_depth(self, draws: ProgramSamples, grown: Floats, depth_mm: float) -> float:
         """A depth (mm) that these draws may let pass, which grow by so much at one (mm) with room (n,)."""
-        places = np.argsort(-grown)[:FEW]
-        self.chattered.update((places[grown[places] >= 0] % (DRAWS + 1))[:REMEMBERED].tolist())
-        return min(1e3 * deepest_calm(draws[places], DEEPER * depth_mm / 1e3) / DEEPER, depth_mm - MM)
+        places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
+        self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
+        return min(
+            1e3 * find_deepest_stable(draws[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
+            depth_mm - DEPTH_STEP_MM,
+        )
 
 
-def _rounded(speed: float) -> float:
-    return round(speed / RPM) * RPM
+def _round_speed(speed: float) -> float:
+    return round(speed / SPEED_STEP_RPM) * SPEED_STEP_RPM

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from acquisition import Remark
 from lobewatch.machine import CutTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.mean_lobes import Modes
-from lobewatch.verdicts.doubt import Doubt, Span
+from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
-Table = TypeVar("Table", bound=CutTable)
+AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
 Floats = NDArray[np.float64]
 
 
@@ -25,11 +25,11 @@ Floats = NDArray[np.float64]
 class SpindleAtSpeed:
     """What test cuts have taught of one program and its spindle; without any, the spindle is taken as tapped."""
 
-    cuts: int = 0
+    n_cuts: int = 0
     """Number of test cuts that it was learnt from."""
     remarks: tuple[Remark, ...] = ()
     """Cuts that contradict the others, and frequencies far from those at rest."""
-    doubt: Doubt | None = None
+    uncertainty: Uncertainty | None = None
     """Doubt that the cuts have left; None where none has taught anything."""
     factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
     """Frequency, damping ratio and stiffness in the middle over those tapped, modes in x, then y, shape (n, 3)."""
@@ -37,31 +37,31 @@ class SpindleAtSpeed:
     """Cutting coefficient Kt in the middle of what was learnt (N/mm2)."""
     radial: float = math.nan
     """Cutting coefficient Kr in the middle of what was learnt (N/mm2)."""
-    before: Mapping[str, Span] = field(default_factory=dict)
+    prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """Intervals of 95 % before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...)."""
-    after: Mapping[str, Span] = field(default_factory=dict)
+    posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """Intervals of 95 % with the cuts, alike."""
 
-    def moved(self, assembly: Assembly) -> Assembly:
+    def scale_modes(self, assembly: Assembly) -> Assembly:
         """A tool with its modes in the middle of what was learnt; as tapped where nothing was."""
-        if self.doubt is None:
+        if self.uncertainty is None:
             return assembly
         count = len(assembly.x or ())
-        x, y = _scaled(assembly.x, self.factors[:count]), _scaled(assembly.y, self.factors[count:])
+        x, y = _scale_modes(assembly.x, self.factors[:count]), _scale_modes(assembly.y, self.factors[count:])
         return replace(assembly, x=x, y=y)
 
-    def taught(self, table: Table) -> Table:
+    def apply_coefficients(self, table: AnyCutTable) -> AnyCutTable:
         """A cut with the coefficients that were learnt; as it stands in machine.toml where none were."""
-        if self.doubt is None:
+        if self.uncertainty is None:
             return table
         return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
 
 
-AT_REST = SpindleAtSpeed()
+NO_TEST_CUTS = SpindleAtSpeed()
 """Nothing learnt: the spindle is judged as it was tapped."""
 
 
-def _scaled(modes: Modes, factors: Floats) -> Modes:
+def _scale_modes(modes: TipModes, factors: Floats) -> TipModes:
     """Modes with frequency, damping ratio and stiffness times factors (n, 3)."""
     return modes and [
         replace(

@@ -12,32 +12,31 @@ import scipy
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal.bands.line_weights import incoherent, measuring_factor
-from modal.bands.without_drift import without_drift
+from modal.bands.frf_lines import incoherent_noise, measured_over_receptance, remove_drift
 
-FEWEST_LINES = 8
+MIN_FRF_LINES = 8
 """One mode and its residual terms have seven unknowns."""
-SCALES = 4 ** np.arange(10)
+SMOOTHING_LENGTHS = 4 ** np.arange(10)
 """Lengths of the running means (lines), up to a sixteenth of the FRF."""
-PROMINENCE_DB = 1.0
+MIN_PEAK_PROMINENCE_DB = 1.0
 """A peak stands this far above its saddles (dB of mobility) ..."""
-NOISE_MULTIPLE = 8.0
+MIN_PEAK_TO_NOISE = 8.0
 """... and this many rms of the noise, which no ripple among a million lines reaches."""
-SEEN_OVER = 65
+NOISE_MEDIAN_LINES = 65
 """Lines that the noise of each is told from, by their median."""
-NOISE_LOSS = 4.0
+MAX_SMOOTHING_LOSS = 4.0
 """Height of a peak that may be the luck of its highest line (rms of the noise)."""
-LEAST_TURN = 0.5
+MIN_PHASE_TURN = 0.5
 """Angle between the chords of the mobility from the lower side to the peak and from there to the upper side (rad).
 
 On the circle of a mode, from half-power point to half-power point, it is -pi/2, whatever its neighbours add."""
-MOST_TURN = 2.6
+MAX_PHASE_TURN = 2.6
 """Of a mode narrower than the line spacing the chords lie side by side; which way it turns is not to be seen (rad)."""
-LEAST_COHERENCE = 0.3
+MIN_RESONANCE_COHERENCE = 0.3
 """Mean coherence over a peak, of hum at random phase one over the number of hits; below 0.5 a mode is doubtful."""
-BESIDE = 2.0
+MIN_RESIDUAL_PEAK_DISTANCE = 2.0
 """A peak of the residual counts this many times the sum of the half-widths away from all known ones ..."""
-LEAST_BESIDE = 0.02
+MIN_RESIDUAL_PEAK_SHARE = 0.02
 """... and from this share of the height of its neighbour; a real peak is a linear mode to a percent or so."""
 
 
@@ -75,20 +74,20 @@ def find_resonances(frf: Frf) -> list[Resonance]:
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
-    _check(frf)
-    frf = without_drift(frf)
-    peaks = [peak for peak in _peaks_at_all_scales(frf) if peak.coherence >= LEAST_COHERENCE]
+    _check_frf(frf)
+    frf = remove_drift(frf)
+    peaks = [peak for peak in _find_peaks_at_all_scales(frf) if peak.coherence >= MIN_RESONANCE_COHERENCE]
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
             "the FRF is real on every line: its phase is missing, and without it damping and stiffness cannot be told "
             "from neighbouring modes; export real and imaginary part, or magnitude and phase"
         )
     _check_phase(frf, peaks)
-    turning = [peak.resonance for peak in peaks if peak.turn < -LEAST_TURN or peak.turn > MOST_TURN]
+    turning = [peak.resonance for peak in peaks if peak.turn < -MIN_PHASE_TURN or peak.turn > MAX_PHASE_TURN]
     return sorted(turning, key=lambda r: r.frequency)
 
 
-def resonances_beside(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
+def add_residual_resonances(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
     """Known resonances with those that stand out of what the fit of these leaves, by rising frequency.
 
     left: the measured FRF less all that was fitted. Where a known resonance stands its residual does not count, and
@@ -96,26 +95,26 @@ def resonances_beside(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
     """
     if not known:
         return []
-    least = LEAST_BESIDE * min(r.height for r in known)
-    peaks = [peak for peak in _peaks_at_all_scales(left, least) if peak.coherence >= LEAST_COHERENCE]
-    turning = [peak.resonance for peak in peaks if -MOST_TURN < peak.turn < -LEAST_TURN]
-    return sorted([*known, *(new for new in turning if _is_beside(known, new))], key=lambda r: r.frequency)
+    least = MIN_RESIDUAL_PEAK_SHARE * min(r.height for r in known)
+    peaks = [peak for peak in _find_peaks_at_all_scales(left, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
+    turning = [peak.resonance for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
+    return sorted([*known, *(new for new in turning if _is_separate_resonance(known, new))], key=lambda r: r.frequency)
 
 
-def _is_beside(known: Sequence[Resonance], new: Resonance) -> bool:
+def _is_separate_resonance(known: Sequence[Resonance], new: Resonance) -> bool:
     """Whether it is apart from all known ones, and high enough against the one with the highest tail there."""
     distance = np.array([abs(new.frequency - old.frequency) for old in known])
-    apart = BESIDE * np.array([new.half_width + old.half_width for old in known])
+    apart = MIN_RESIDUAL_PEAK_DISTANCE * np.array([new.half_width + old.half_width for old in known])
     if np.any(distance <= apart):
         return False
     tail = np.array([old.height * old.half_width for old in known]) / distance
-    return new.height > LEAST_BESIDE * known[int(np.argmax(tail))].height
+    return new.height > MIN_RESIDUAL_PEAK_SHARE * known[int(np.argmax(tail))].height
 
 
-def _check(frf: Frf) -> None:
+def _check_frf(frf: Frf) -> None:
     n = frf.frequency.size
-    if n < FEWEST_LINES:
-        raise ValueError(f"{n} lines are too few to find a mode; at least {FEWEST_LINES} are needed: widen the band")
+    if n < MIN_FRF_LINES:
+        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
 
@@ -125,8 +124,8 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
 
     Not of the mobility, where the drift near 0 Hz would have the last word.
     """
-    falling = sum(p.resonance.frequency * p.resonance.height for p in peaks if p.turn < -LEAST_TURN)
-    rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if LEAST_TURN < p.turn < MOST_TURN)
+    falling = sum(p.resonance.frequency * p.resonance.height for p in peaks if p.turn < -MIN_PHASE_TURN)
+    rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if MIN_PHASE_TURN < p.turn < MAX_PHASE_TURN)
     phase_step = np.imag(frf.accelerance[1:] * frf.accelerance[:-1].conj())
     if rising > falling and np.sum(phase_step) > 0:
         raise ConjugateError(
@@ -136,7 +135,7 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
         )
 
 
-def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
+def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
     """Every peak of any running mean, from the longest mean that costs it no more height than noise explains.
 
     least: height of the mobility below which none is looked at (m/s/N).
@@ -144,15 +143,15 @@ def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
     noise, mobility = mobility_noise(frf), frf.mobility
     peaks: list[_Peak] = []
     longest = max(1, frf.frequency.size // 16)
-    for length in SCALES[longest >= SCALES]:
+    for length in SMOOTHING_LENGTHS[longest >= SMOOTHING_LENGTHS]:
         mean = _running_mean(mobility, length)
         gain = (2 * length**2 + 1) / (3 * length**3)
         rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
-        for new in _peaks(frf, mean, rms, least):
-            same = [i for i, old in enumerate(peaks) if _is_same(new, old)]
+        for new in _find_peaks(frf, mean, rms, least):
+            same = [i for i, old in enumerate(peaks) if _is_same_peak(new, old)]
             if not same:
                 peaks.append(new)
-            elif len(same) == 1 and _is_as_high(new, peaks[same[0]]):
+            elif len(same) == 1 and _is_not_lower(new, peaks[same[0]]):
                 peaks[same[0]] = new
     return peaks
 
@@ -164,34 +163,36 @@ def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
     return np.asarray(scipy.ndimage.uniform_filter1d(scipy.ndimage.uniform_filter1d(values, length), length))
 
 
-def _is_same(a: _Peak, b: _Peak) -> bool:
+def _is_same_peak(a: _Peak, b: _Peak) -> bool:
     distance = abs(a.resonance.frequency - b.resonance.frequency)
     return distance < max(a.resonance.half_width, b.resonance.half_width)
 
 
-def _is_as_high(new: _Peak, old: _Peak) -> bool:
-    return old.resonance.height - new.resonance.height < NOISE_LOSS * old.noise
+def _is_not_lower(new: _Peak, old: _Peak) -> bool:
+    return old.resonance.height - new.resonance.height < MAX_SMOOTHING_LOSS * old.noise
 
 
-def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
+def _find_peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
     size = np.abs(mobility)
     faintest = 1e-12 * size.max()
-    floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
+    floor = np.maximum(MIN_PEAK_TO_NOISE * noise, max(least, faintest))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
-    tops = tops[_may_be_clear(size, tops)]
+    tops = tops[_has_deep_valleys(size, tops)]
     lowest = float(size.min())
     saddle = np.array([_higher_saddle(size, int(top), lowest) for top in tops])
-    clear = saddle <= size[tops] * 10 ** (-PROMINENCE_DB / 20)
-    high = tops[clear & (size[tops] - saddle > NOISE_MULTIPLE * noise[tops])]
-    return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
+    clear = saddle <= size[tops] * 10 ** (-MIN_PEAK_PROMINENCE_DB / 20)
+    high = tops[clear & (size[tops] - saddle > MIN_PEAK_TO_NOISE * noise[tops])]
+    return [_measure_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
 
-def _may_be_clear(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _has_deep_valleys(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Whether the valley before a neighbour that is higher is deep enough, for each peak."""
     if tops.size < 2:
         return np.ones(tops.size, dtype=bool)
     height = size[tops]
-    valley = np.minimum.reduceat(size, tops)[:-1] > np.minimum(height[1:], height[:-1]) * 10 ** (-PROMINENCE_DB / 20)
+    valley = np.minimum.reduceat(size, tops)[:-1] > np.minimum(height[1:], height[:-1]) * 10 ** (
+        -MIN_PEAK_PROMINENCE_DB / 20
+    )
     shallow = np.zeros(tops.size, dtype=bool)
     shallow[1:] |= valley & (height[:-1] > height[1:])
     shallow[:-1] |= valley & (height[1:] > height[:-1])
@@ -200,19 +201,21 @@ def _may_be_clear(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDArray[
 
 def _higher_saddle(size: NDArray[np.float64], top: int, lowest: float) -> float:
     """The higher of the lowest values between a peak and what is higher on either side, or the lowest of all."""
-    return max(_lowest_before_higher(side, lowest) for side in (size[top::-1], size[top:]))
+    return max(_lowest_before_higher_value(side, lowest) for side in (size[top::-1], size[top:]))
 
 
-def _lowest_before_higher(side: NDArray[np.float64], lowest: float) -> float:
+def _lowest_before_higher_value(side: NDArray[np.float64], lowest: float) -> float:
     """Lowest value between side[0] and the next higher one; the lowest of all where none is higher."""
     higher = int(np.argmax(side > side[0]))
     return float(side[:higher].min()) if higher else lowest
 
 
-def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64], top: int, noise: float) -> _Peak:
+def _measure_peak(
+    frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64], top: int, noise: float
+) -> _Peak:
     """size: of the mobility."""
     f = frf.frequency
-    below, above = _lines_down(size[top::-1]), _lines_down(size[top:])
+    below, above = _lines_to_half_power(size[top::-1]), _lines_to_half_power(size[top:])
     low, high = top - math.ceil(below), top + math.ceil(above)
     lower, upper = np.interp([top - below, top + above], np.arange(low, high + 1), f[low : high + 1])
     turn = np.angle((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
@@ -220,18 +223,18 @@ def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64],
         resonance=Resonance(float(f[top]), float(min(f[top] - lower, upper - f[top])), float(size[top])),
         noise=noise,
         turn=float(turn),
-        coherence=_mean_coherence(frf, slice(low, high + 1)),
+        coherence=_peak_coherence(frf, slice(low, high + 1)),
     )
 
 
-def _mean_coherence(frf: Frf, lines: slice) -> float:
+def _peak_coherence(frf: Frf, lines: slice) -> float:
     """1 where no coherence of meaning is known."""
     if frf.coherence is None or not frf.has_random_error:
         return 1.0
     return float(np.mean(frf.coherence[lines]))
 
 
-def _lines_down(size: NDArray[np.float64]) -> float:
+def _lines_to_half_power(size: NDArray[np.float64]) -> float:
     """Lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
     level = size[0] / np.sqrt(2)
     higher = np.flatnonzero(size > size[0])
@@ -248,8 +251,10 @@ def mobility_noise(frf: Frf) -> NDArray[np.float64]:
 
     Third differences do not see noise that is alike on neighbouring lines, as that of an overloaded sensor is.
     """
-    factor = measuring_factor(frf)
+    factor = measured_over_receptance(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
-    scatter = np.pad(scipy.ndimage.median_filter(rough, size=SEEN_OVER) / np.sqrt(np.log(2)), (1, 2), mode="edge")
-    noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent(frf), size=SEEN_OVER))
+    scatter = np.pad(
+        scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2)), (1, 2), mode="edge"
+    )
+    noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent_noise(frf), size=NOISE_MEDIAN_LINES))
     return np.asarray(noise * 2 * np.pi * frf.frequency / factor)

@@ -1,18 +1,23 @@
 """Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
 
-from .band_fit import BandFit
-from .fit_band import fit_band, values_nearby, with_real_constants
-from .projected_band import beyond_terms, gain_of_a_pair, gain_of_a_term
-from .residual_terms import LEAST_TERMS, MOST_TERMS
+from .band_fit import MAX_RESIDUAL_TERMS, MIN_RESIDUAL_TERMS, BandFit
+from .fit_band import (
+    fit_band,
+    fit_real_constants,
+    mode_pair_gain,
+    refit_nearby,
+    remove_residual_terms,
+    residual_term_gain,
+)
 
 __all__ = [
-    "LEAST_TERMS",
-    "MOST_TERMS",
+    "MAX_RESIDUAL_TERMS",
+    "MIN_RESIDUAL_TERMS",
     "BandFit",
-    "beyond_terms",
     "fit_band",
-    "gain_of_a_pair",
-    "gain_of_a_term",
-    "values_nearby",
-    "with_real_constants",
+    "fit_real_constants",
+    "mode_pair_gain",
+    "refit_nearby",
+    "remove_residual_terms",
+    "residual_term_gain",
 ]

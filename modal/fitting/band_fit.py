@@ -1,14 +1,203 @@
-"""What a fit of a band found."""
+"""Result of a band fit: modal constants at given poles, their errors, and residual terms."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+MIN_SINGULAR_VALUE_SHARE = 1e-10
+"""Share of the largest singular value below which an unknown cannot be told from the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPoleFit:
+    """Modes of p FRFs at given poles.
+
+    c unknowns of each FRF are its modal constants: m real parts, and m imaginary ones where they are complex; k poles
+    may move.
+    """
+
+    poles: Floats
+    """Frequencies (Hz) and damping ratios, (2, m)."""
+    free: NDArray[np.bool_]
+    """Whether each of them may move, (2 m,)."""
+    q: Floats
+    """Orthonormal bases of what the residual terms leave of the modes, (p, 2 n, c)."""
+    inverse: Floats
+    """Inverses of their triangles, (p, c, c)."""
+    linear: Floats
+    """Best modal constants, (p, c)."""
+    left: Floats
+    """Weighted data that is left, (p, 2 n)."""
+    unknowns: int
+    """Modal constants and residual terms of all FRFs, real and imaginary parts."""
+    squares: Floats
+    """What the residual terms leave of the squares of partial fractions of each mode, (p, 2, m, 2 n): their slopes by
+    its pole for residues that are real, and imaginary."""
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares; infinite for what are no poles."""
+        cost = float(self.residual @ self.residual)
+        is_legal = self.poles.min() > 0 and self.poles[1].max() < 1
+        return cost if is_legal and math.isfinite(cost) else np.inf
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Real values less unknowns."""
+        return int(self.left.size - np.sum(self.free) - self.unknowns)
+
+    @property
+    def scale(self) -> Floats:
+        """What a step of one means: zeta f and zeta of those that may move, (k,)."""
+        return np.concatenate([self.poles[0] * self.poles[1], self.poles[1]])[self.free]
+
+    @property
+    def residual(self) -> Floats:
+        """Of all FRFs, (2 n p,)."""
+        return self.left.reshape(-1)
+
+    @cached_property
+    def slope(self) -> Floats:
+        """Slope of the models by what may move, frequencies in zeta f, damping ratios in shares of themselves, while
+        their residues A f / (2i sqrt(1 - zeta^2)) stay, (p, k, 2 n).
+
+        Only these differ from FRF to FRF: the squares that they multiply are worked out once.
+        """
+        zeta = self.poles[1]
+        turning = np.sqrt(1 - zeta**2)
+        moved = 2 * zeta * np.array([turning * (1j * turning - zeta), -(turning + 1j * zeta)])
+        by_pole = (-1j * self.constant[:, np.newaxis] * moved)[..., np.newaxis]
+        along, across = self.squares[:, :1], self.squares[:, 1:]
+        slope = by_pole.real * along + by_pole.imag * across
+        every = slope.reshape(len(slope), self.free.size, -1)
+        return np.asarray(every if self.free.all() else every[:, self.free])
+
+    @cached_property
+    def _follow(self) -> Floats:
+        """What the constants take up of the slopes, in their bases, (p, k, c)."""
+        return np.asarray(self.slope @ self.q)
+
+    @cached_property
+    def by_frf(self) -> Floats:
+        """Slope of the residual by the scaled poles, the constants following (Kaufman), FRF by FRF, (p, k, 2 n)."""
+        taken = self._follow @ self.q.mT
+        return np.asarray(np.subtract(taken, self.slope, out=taken))
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """Slope of the residual of all FRFs, (k, 2 n p)."""
+        return np.asarray(self.by_frf.swapaxes(0, 1).reshape(-1, self.left.size))
+
+    @cached_property
+    def gram(self) -> Floats:
+        """Products of these slopes with each other, (k, k)."""
+        return np.asarray(self.jacobian @ self.jacobian.T)
+
+    @property
+    def gradient(self) -> Floats:
+        """Half the slope of the cost by the scaled poles, (k,)."""
+        return np.asarray(self.jacobian @ self.residual)
+
+    @property
+    def constant(self) -> Complexes:
+        """Modal constants, (p, m)."""
+        m, linear = self.poles.shape[1], self.linear
+        return np.asarray(linear + 0j if linear.shape[1] == m else linear[:, :m] + 1j * linear[:, m:])
+
+    def spread(self, values: Floats) -> Floats:
+        """Values (k, ...) of what may move, with 0 for all that may not, (2 m, ...)."""
+        everything = np.zeros((self.free.size, *values.shape[1:]))
+        everything[self.free] = values
+        return everything
+
+    @cached_property
+    def _solution(self) -> tuple[Floats, Floats]:
+        """Norms of the columns of the Jacobian, (k,), and inverse of its triangle when they are one, (k, k)."""
+        norm = np.linalg.norm(self.jacobian, axis=1)
+        triangle = np.linalg.qr(self.jacobian.T / norm, mode="r")
+        left, singular, right = np.linalg.svd(triangle)
+        if not np.min(singular, initial=np.inf) > MIN_SINGULAR_VALUE_SHARE * np.max(singular, initial=0.0):
+            raise np.linalg.LinAlgError("an unknown cannot be told from the others")
+        return norm, (right.T / singular) @ left.T
+
+    def gain(self, rows: Floats) -> float:
+        """Fall of the cost, to first order, with a further linear unknown for each row of each FRF, (p, rows, 2 n)."""
+        norm, inverse = self._solution
+        new = rows - rows @ self.q @ self.q.mT
+        taken = (new @ (self.by_frf.mT / norm @ inverse)).reshape(-1, norm.size)
+        size = -taken @ taken.T
+        p, each = len(new), np.arange(len(new))
+        size.reshape(p, -1, p, rows.shape[1])[each, :, each] += new @ new.mT
+        fall = (new @ self.left[..., np.newaxis]).ravel() - taken @ (inverse.T @ (self.gradient / norm))
+        return float(fall @ np.linalg.lstsq(size, fall, rcond=None)[0])
+
+    @cached_property
+    def _turned(self) -> Floats:
+        """Constants along themselves and across, from the bases, (p, 2, m, c); c = 2 m."""
+        constant, m = self.constant[..., np.newaxis], self.poles.shape[1]
+        off = constant.conj() / np.abs(constant) * (self.inverse[:, :m] + 1j * self.inverse[:, m:])
+        return np.stack([off.real, off.imag], axis=1)
+
+    @cached_property
+    def _by_poles(self) -> Floats:
+        """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
+        by_poles = -(self._turned @ self._follow.mT[:, np.newaxis]).swapaxes(0, 1)
+        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._own
+        return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
+
+    @property
+    def _own(self) -> Floats:
+        """Shares of itself by which each residue changes with its own pole while the constant stays, (m, k)."""
+        zeta = self.poles[1]
+        return np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of the errors of a complex fit by independent ones of variance 1, (2 m + 2 p m, 2 m + 2 p m).
+
+        Raises LinAlgError where an unknown cannot be told from the others.
+        """
+        norm, inverse = self._solution
+        moved = self._by_poles @ (inverse / norm[:, np.newaxis])
+        covariance, (p, _, m, _) = moved @ moved.T, self._turned.shape
+        at_once = covariance[2 * m :, 2 * m :].reshape(2, p, m, 2, p, m)
+        each = np.arange(p)
+        at_once[:, each, :, :, each] += np.einsum("pamc,pbnc->pambn", self._turned, self._turned)
+        return covariance
+
+    @cached_property
+    def influence(self) -> Floats:
+        """Of the weighted FRFs on the errors of a complex fit, one Gauss-Newton step, (2 m + 2 p m, 2 n p)."""
+        norm, inverse = self._solution
+        p, _, m, _ = self._turned.shape
+        steps = (inverse / norm[:, np.newaxis]) @ inverse.T @ (self.jacobian / norm[:, np.newaxis])
+        influence = -self._by_poles @ steps
+        at_once = influence[2 * m :].reshape(2, p, m, p, -1)
+        each = np.arange(p)
+        at_once[:, each, :, each] += self._turned @ self.q.mT[:, np.newaxis]
+        return influence
+
+
+RESIDUAL_POWERS = (-2, 0, 2, 4, 6, 8)
+"""Of the frequency, in the order in which residual terms are taken."""
+MIN_RESIDUAL_TERMS = 4
+"""Complex residual terms that every band has."""
+MAX_RESIDUAL_TERMS = len(RESIDUAL_POWERS)
+"""Complex residual terms that a band has at most."""
+
+
+def residual_powers(frequency: Floats, terms: int) -> Floats:
+    """The first powers of the frequency, shape (terms, n)."""
+    square = (frequency / np.mean(frequency)) ** 2
+    return np.stack([square ** (power // 2) for power in RESIDUAL_POWERS[:terms]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,56 +208,56 @@ class BandFit:
     along itself (its size), then FRF by FRF what it is off across (its phase, times its size): 2 m + 2 p m values.
     """
 
-    frequency: Array
+    frequency: Floats
     """Natural frequencies (Hz), shape (m,)."""
-    damping_ratio: Array
+    damping_ratio: Floats
     """Damping ratios (-), shape (m,)."""
-    constant: ComplexArray
+    constant: Complexes
     """Modal constants A (m/N), shape (p, m); all of them real where complex ones were not asked for."""
-    freedom: int
+    degrees_of_freedom: int
     """Real values that were fitted less unknowns."""
-    with_phases: FitAtPoles
+    complex_fit: FixedPoleFit
     """The fit with complex constants, whose errors are those of the modes."""
-    residual: Array
+    residual: Floats
     """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
-    unasked: Array
+    phase_if_complex: Floats
     """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
     held: NDArray[np.bool_]
     """Modes whose frequency and damping ratio were given and have no error, shape (m,)."""
 
     @cached_property
-    def covariance(self) -> Array:
+    def covariance(self) -> Floats:
         """Of the errors, by what the fit leaves, shape (2 m + 2 p m, 2 m + 2 p m)."""
-        return self.with_phases.covariance * (self.sum_of_squares / self.freedom)
+        return self.complex_fit.covariance * (self.sum_of_squares / self.degrees_of_freedom)
 
     @property
-    def influence(self) -> Array:
+    def influence(self) -> Floats:
         """Errors by a change of the weighted FRFs, one Gauss-Newton step, shape (2 m + 2 p m, 2 n p)."""
-        return self.with_phases.influence
+        return self.complex_fit.influence
 
     @property
-    def standard_error(self) -> Array:
+    def standard_error(self) -> Floats:
         """Standard errors, shape (2 + 2 p, m)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)).reshape(-1, self.frequency.size))
 
     @property
-    def size_error(self) -> Array:
+    def size_error(self) -> Floats:
         """Standard errors of the sizes of the modal constants, relative to them, shape (p, m)."""
         return np.asarray(self.standard_error[2 : 2 + len(self.constant)] / np.abs(self.constant))
 
     @property
-    def complex_residual(self) -> ComplexArray:
+    def complex_residual(self) -> Complexes:
         """The residual line by line, shape (p, n)."""
         parts = self.residual.reshape(len(self.constant), 2, -1)
         return np.asarray(parts[:, 0] + 1j * parts[:, 1])
 
     @property
-    def mobility_peak(self) -> Array:
+    def mobility_peak(self) -> Floats:
         """|mobility| of each mode alone at its natural frequency, largest of all FRFs (m/s/N), shape (m,)."""
         return np.asarray(np.pi * self.frequency * np.abs(self.constant / self.damping_ratio).max(axis=0))
 
     @property
-    def poles(self) -> Array:
+    def poles(self) -> Floats:
         """Natural frequencies (Hz) and damping ratios, shape (2, m)."""
         return np.stack([self.frequency, self.damping_ratio])
 
@@ -77,17 +266,17 @@ class BandFit:
         """Of the weighted residuals."""
         return float(self.residual @ self.residual)
 
-    def influence_of(self, i: int) -> Array:
+    def influence_of(self, i: int) -> Floats:
         """The part of the influence that belongs to FRF i, shape (2 m + 2 p m, 2 n)."""
         return np.hsplit(self.influence, len(self.constant))[i]
 
-    def of_mode(self, i: int, frequency: Array) -> ComplexArray:
+    def of_mode(self, i: int, frequency: Floats) -> Complexes:
         """Mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""
         return replace(
             self, frequency=self.frequency[[i]], damping_ratio=self.damping_ratio[[i]], constant=self.constant[:, [i]]
         ).receptance(frequency)
 
-    def receptance(self, frequency: Array) -> ComplexArray:
+    def receptance(self, frequency: Floats) -> Complexes:
         """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
         fn, zeta = self.poles[:, :, np.newaxis]
         r = frequency / fn
@@ -97,6 +286,6 @@ class BandFit:
         return np.asarray(steady @ curve + 1j * turn @ (r * curve))
 
 
-def split(values: ComplexArray) -> Array:
+def split_complex(values: Complexes) -> Floats:
     """Real, then imaginary parts along the last axis."""
     return np.concatenate([values.real, values.imag], axis=-1)

@@ -1,43 +1,180 @@
-"""Poles by Levenberg-Marquardt, modal constants real unless the sum of squares asks for complex ones."""
+"""Fit poles by Levenberg-Marquardt with the linear unknowns eliminated.
+
+Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
+"""
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.fitting.band_fit import BandFit
-from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
-from modal.fitting.projected_band import ProjectedBand, projected_band
-from modal.fitting.residual_terms import LEAST_TERMS
+from modal.fitting.band_fit import (
+    MIN_RESIDUAL_TERMS,
+    BandFit,
+    Complexes,
+    FixedPoleFit,
+    Floats,
+    residual_powers,
+    split_complex,
+)
 
-AKAIKE = 2.0
+MIN_CURVE_SEPARATION = 1e-2
+"""Share of itself that each curve has beyond all others where normal equations lose no more than four digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedBand:
+    """Weighted FRFs of a band, and the modes that they are fitted with."""
+
+    frequency: Floats
+    weight: Floats
+    """Weights, (p, n)."""
+    bases: Floats
+    """Orthonormal bases of the residual terms of each FRF, the same of real and imaginary parts, (p, n, terms)."""
+    data: Floats
+    """Values that they leave of each weighted FRF, (p, 1, 2 n)."""
+    held: NDArray[np.bool_]
+    """Modes whose poles stay where they are, (m,)."""
+
+    @cached_property
+    def _free(self) -> NDArray[np.bool_]:
+        """Whether each frequency and damping ratio may move, (2 m,)."""
+        return np.tile(~self.held, 2)
+
+    @cached_property
+    def _root(self) -> Complexes:
+        """i f, (n,)."""
+        return np.asarray(1j * self.frequency)
+
+    @cached_property
+    def _both(self) -> Floats:
+        """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
+        return np.tile(self.weight, 2)[:, np.newaxis]
+
+    def at(self, poles: Floats, is_complex: bool) -> FixedPoleFit:
+        """The best modal constants at these poles, (2, m)."""
+        m = poles.shape[1]
+        rows = _project_out(self.bases, self._both * _model_rows(self._root, poles))
+        q, inverse = _orthonormal(rows[:, : 2 * m if is_complex else m])
+        part = self.data @ q
+        left = self.data - part @ q.mT
+        linear = part @ inverse.mT
+        unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
+        squares = rows[:, 2 * m :].reshape(len(rows), 2, m, -1)
+        return FixedPoleFit(poles, self._free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
+
+
+def project_band(
+    frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: NDArray[np.bool_]
+) -> ProjectedBand:
+    """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,)."""
+    bases = _term_bases(frequency, weight, terms)
+    return ProjectedBand(
+        frequency, weight, bases, _project_out(bases, split_complex(weight * receptance)[:, np.newaxis]), held
+    )
+
+
+def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
+    """What residual terms leave of weighted receptances, (p, 2 n); arguments as `project_band`."""
+    return _project_out(_term_bases(frequency, weight, terms), split_complex(weight * receptance)[:, np.newaxis])[:, 0]
+
+
+def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
+    """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
+    power = residual_powers(frequency, terms + 1)[-1]
+    return _linear_gain(fit, frequency, weight, terms, np.stack([power, 1j * power]))
+
+
+def mode_pair_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int, i: int) -> float:
+    """Fall of the sum of squares, to first order, that two modes close together in place of mode i would bring.
+
+    Two poles at lambda - d and lambda + d add the second derivative of R / (i w - lambda) by lambda, which goes with
+    its third power; what is odd in d the pole of the one mode follows.
+    """
+    fn, zeta = fit.poles[:, i]
+    pole, r = complex(-zeta, np.sqrt(1 - zeta**2)), 1j * frequency / fn
+    here, conjugate = 1 / (r - pole) ** 3, 1 / (r - pole.conjugate()) ** 3
+    return _linear_gain(fit, frequency, weight, terms, np.stack([here + conjugate, 1j * (here - conjugate)]))
+
+
+def _linear_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int, columns: Complexes) -> float:
+    rows = np.tile(weight, 2)[:, np.newaxis] * split_complex(columns)
+    return fit.complex_fit.gain(_project_out(_term_bases(frequency, weight, terms), rows))
+
+
+def _term_bases(frequency: Floats, weight: Floats, terms: int) -> Floats:
+    columns = weight[:, np.newaxis] * residual_powers(frequency, terms)
+    return np.asarray(np.linalg.qr(columns.mT)[0])
+
+
+def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
+    """Orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse of their triangle, (p, c, c).
+
+    By Cholesky, in half the time, where no row is all but a sum of the others, so that this is as exact.
+    """
+    gram = rows @ rows.mT
+    with contextlib.suppress(np.linalg.LinAlgError):
+        lower = np.linalg.cholesky(gram)
+        apart = lower.diagonal(axis1=1, axis2=2) ** 2 > MIN_CURVE_SEPARATION**2 * gram.diagonal(axis1=1, axis2=2)
+        if apart.all():
+            inverse = np.linalg.inv(lower).mT
+            return rows.mT @ inverse, inverse
+    q, triangle = np.linalg.qr(rows.mT)
+    return q, np.linalg.inv(triangle)
+
+
+def _model_rows(root: Complexes, poles: Floats) -> Floats:
+    """Modes of constants 1, of constants i, and their slopes by both parts of the pole, (4 m, 2 n); root is i f, (n,).
+
+    With lambda in Hz, h = g / (i f - lambda), g = f_n / (2 sqrt(1 - zeta^2)), and h' for its conjugate: -i (h - h'),
+    h + h', h^2 + h'^2 and i (h^2 - h'^2).
+    """
+    fn, zeta = poles[:, :, np.newaxis]
+    turning = np.sqrt(1 - zeta**2)
+    pole, size = fn * (1j * turning - zeta), fn / (2 * turning)
+    here, there = size / (root - pole), size / (root - pole.conj())
+    square, of_there = here * here, there * there
+    return split_complex(
+        np.concatenate([1j * (there - here), here + there, square + of_there, 1j * (square - of_there)])
+    )
+
+
+def _project_out(bases: Floats, values: Floats) -> Floats:
+    """Values (p, k, 2 n) less their part in orthonormal bases (p, n, terms) of real and of imaginary parts."""
+    parts = values.reshape(len(bases), -1, bases.shape[1])
+    taken = parts @ bases @ bases.mT
+    return np.subtract(parts, taken, out=taken).reshape(values.shape)
+
+
+AKAIKE_PENALTY = 2.0
 """Complex constants are taken where they lower the sum of squares by this many times what an unknown does by chance."""
-MOST_TRIALS = 60
+MAX_FIT_EVALUATIONS = 60
 """Evaluations of the model; a mode in its own band takes some five."""
-CONVERGED = 1e-13
+FIT_STEP_TOLERANCE = 1e-13
 """Step (share of the half-power half-width) after which there is nothing left to gain."""
-FIRST_DAMPING = 1e-3
+INITIAL_FIT_DAMPING = 1e-3
 """Damping of the first step, over the diagonal of the scaled normal matrix."""
-FELT = 0.1
+MIN_EFFECTIVE_FIT_DAMPING = 0.1
 """Damping after a step that led nowhere, at least; less hardly changes the step."""
-KEPT, BROKEN = 0.75, 0.25
+GOOD_GAIN_RATIO, POOR_GAIN_RATIO = 0.75, 0.25
 """Share of the promised fall from which the damping falls, and below which it rises."""
-NEAR_TRIALS = 2
+NEARBY_FIT_STEPS = 2
 """Steps after which the values of much the same fit are taken as they are; with five, sensors of the same measured hits
 agree no more often."""
-GAINED = 1e-3
+MIN_WORTHWHILE_GAIN = 1e-3
 """Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thirtieth of an error."""
 
 
 def fit_band(
-    frequency: Array,
-    receptance: ComplexArray,
-    weight: Array,
-    starts: Array,
-    terms: int = LEAST_TERMS,
+    frequency: Floats,
+    receptance: Complexes,
+    weight: Floats,
+    starts: Floats,
+    terms: int = MIN_RESIDUAL_TERMS,
     held: NDArray[np.bool_] | None = None,
 ) -> BandFit | None:
     """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None where nothing fits.
@@ -57,12 +194,12 @@ def fit_band(
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         fixed = np.zeros(m, bool) if held is None else held
-        state = _solved(projected_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
-        return None if state is None or not np.all(np.isfinite(state.covariance)) else _fit_of(state, state)
+        state = _solve(project_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
+        return None if state is None or not np.all(np.isfinite(state.covariance)) else _band_fit(state, state)
     return None
 
 
-def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> BandFit:
+def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> BandFit:
     """The same modes with real constants, where Akaike's criterion allows.
 
     It does where they raise the sum of squares by no more than twice what phases take off by chance. The errors stay
@@ -71,19 +208,19 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
 
     Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.
     """
-    allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
+    allowed = AKAIKE_PENALTY * fit.constant.size * fit.sum_of_squares / fit.degrees_of_freedom
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
-        band = projected_band(frequency, receptance, weight, terms, fit.held)
-        state = _solved(band, _poles_of_real(fit), is_complex=False)
+        band = project_band(frequency, receptance, weight, terms, fit.held)
+        state = _solve(band, _poles_for_real_constants(fit), is_complex=False)
         if state is not None and state.cost - fit.sum_of_squares <= allowed:
             across = fit.constant / state.constant
-            return replace(_fit_of(state, fit.with_phases), unasked=np.angle(across * np.sign(across.real)))
+            return replace(_band_fit(state, fit.complex_fit), phase_if_complex=np.angle(across * np.sign(across.real)))
     return fit
 
 
-def values_nearby(
-    fit: BandFit, frequency: Array, receptance: ComplexArray, weight: Array, terms: int
-) -> tuple[Array, ComplexArray] | None:
+def refit_nearby(
+    fit: BandFit, frequency: Floats, receptance: Complexes, weight: Floats, terms: int
+) -> tuple[Floats, Complexes] | None:
     """Poles (2, m) and modal constants (p, m) of the same modes with other residual terms or on other lines, nearly.
 
     After a few steps, with real constants where those of the fit are; None where nothing fits. Arguments as `fit_band`.
@@ -92,13 +229,13 @@ def values_nearby(
     if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size:
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
-        band = projected_band(frequency, receptance, weight, terms, fit.held)
-        state, _ = _descended(band, fit.poles, bool(np.any(fit.constant.imag)), NEAR_TRIALS)
+        band = project_band(frequency, receptance, weight, terms, fit.held)
+        state, _ = _descend(band, fit.poles, bool(np.any(fit.constant.imag)), NEARBY_FIT_STEPS)
         return (state.poles, state.constant) if np.isfinite(state.cost) else None
     return None
 
 
-def _poles_of_real(fit: BandFit) -> Array:
+def _poles_for_real_constants(fit: BandFit) -> Floats:
     """Poles (2, m) that real constants would have, to first order in the phases taken off."""
     m, covariance = fit.frequency.size, fit.covariance
     across = slice(2 * m + fit.constant.size, None)
@@ -108,12 +245,12 @@ def _poles_of_real(fit: BandFit) -> Array:
     return moved if np.all(moved > 0) and np.all(moved[1] < 1) else fit.poles
 
 
-def _fit_of(state: FitAtPoles, with_phases: FitAtPoles) -> BandFit:
+def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     return BandFit(
         state.poles[0],
         state.poles[1],
         state.constant,
-        state.freedom,
+        state.degrees_of_freedom,
         with_phases,
         state.residual,
         np.zeros(state.constant.shape),
@@ -121,34 +258,37 @@ def _fit_of(state: FitAtPoles, with_phases: FitAtPoles) -> BandFit:
     )
 
 
-def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> FitAtPoles | None:
+def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:
     """Levenberg-Marquardt; None where it does not converge."""
-    state, has_converged = _descended(band, starts, is_complex, MOST_TRIALS)
+    state, has_converged = _descend(band, starts, is_complex, MAX_FIT_EVALUATIONS)
     return state if has_converged else None
 
 
-def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int) -> tuple[FitAtPoles, bool]:
+def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:
     """Where so many evaluations lead, and whether there is nothing left to gain there."""
-    state, damping = band.at(starts, is_complex), FIRST_DAMPING
+    state, damping = band.at(starts, is_complex), INITIAL_FIT_DAMPING
     for _ in range(trials):
         if not np.isfinite(state.cost):
             break
-        step, gain, promise = _step(state, damping)
+        step, gain, promise = _damped_step(state, damping)
         size = float(np.abs(step).max(initial=0.0))
-        if gain < GAINED * state.cost / state.freedom or size < CONVERGED:
+        if gain < MIN_WORTHWHILE_GAIN * state.cost / state.degrees_of_freedom or size < FIT_STEP_TOLERANCE:
             return state, True
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             kept = (state.cost - trial.cost) / promise
-            state, damping = trial, damping * (0.1 if kept > KEPT else 1.0 if kept > BROKEN else 4.0)
+            state, damping = (
+                trial,
+                damping * (0.1 if kept > GOOD_GAIN_RATIO else 1.0 if kept > POOR_GAIN_RATIO else 4.0),
+            )
         elif damping > 1e8 or size < 1e-6:
             return state, True
         else:
-            damping = max(10 * damping, FELT)
+            damping = max(10 * damping, MIN_EFFECTIVE_FIT_DAMPING)
     return state, False
 
 
-def _step(state: FitAtPoles, damping: float) -> tuple[Array, float, float]:
+def _damped_step(state: FixedPoleFit, damping: float) -> tuple[Floats, float, float]:
     """Damped Gauss-Newton step in units of the scale, shape (k,), the squared change of the model that it makes to
     first order, and the fall of the cost that it promises."""
     gram, gradient = state.gram, state.gradient

@@ -1,18 +1,18 @@
-"""A vibration mode as seen in one FRF."""
+"""A vibration mode as seen in one FRF, and the FRF of several modes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from acquisition import Remark
+from acquisition import Frf, Remark
 
-UNKNOWN_PHASE = 90.0
+UNKNOWN_PHASE_STD_DEG = 90.0
 """Standard error (degrees) of a phase of which nothing is known."""
 
 
@@ -48,7 +48,7 @@ class Mode:
 
     That takes the errors of neighbouring lines as independent; what noise of the hammer adds, alike over many lines,
     is in it where the hits were given. None where not estimated."""
-    freedom: float = np.inf
+    degrees_of_freedom: float = np.inf
     """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
     method: str = ""
     """Method it was found by."""
@@ -70,15 +70,15 @@ class Mode:
     """rms of what the fit leaves in its band over the height of its peak."""
     edge_distance: float | None = None
     """Distance from its frequency to the nearer end of the lines, in its half-power half-widths zeta f_n."""
-    left_ringing: float | None = None
+    remaining_decay: float | None = None
     """Share of its decay that is left when the record ends; None where the length of the record is not known."""
     half_power_damping: float | None = None
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
     shape: NDArray[np.float64] | None = None
-    """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
-    found_again: tuple[int, int] | None = None
+    """Mode shape over the FRFs of `fit_common_modes`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
+    match_count: tuple[int, int] | None = None
     """Number of other FRFs of the same structure that have it too, and number of those looked at; None where nobody
-    looked (`found_again`)."""
+    looked (`match_modes`)."""
     relative_peak: float | None = None
     """Its peak of receptance over the highest of the same free decays, had all been excited alike; None where the
     force was measured and K tells."""
@@ -110,8 +110,8 @@ class Mode:
                 yield f"{name} has shape {np.shape(matrix)}, not (3, 3)"
         if not (np.isfinite(self.phase_deg_std) and self.phase_deg_std >= 0):
             yield f"phase_deg_std={self.phase_deg_std} is not a finite number >= 0"
-        if not self.freedom > 0:
-            yield f"freedom={self.freedom} is not a number > 0"
+        if not self.degrees_of_freedom > 0:
+            yield f"freedom={self.degrees_of_freedom} is not a number > 0"
         if self.jackknife is not None and self.n_hits < 2:
             yield f"n_hits={self.n_hits}: a jackknife has at least 2 hits"
 
@@ -177,7 +177,7 @@ class Mode:
         if not 0 < level < 1:
             raise ValueError(f"level={level} is not between 0 and 1")
         p = (1 + level) / 2
-        return float(scipy.special.stdtrit(self.freedom if self.jackknife is None else self.n_hits - 1, p))
+        return float(scipy.special.stdtrit(self.degrees_of_freedom if self.jackknife is None else self.n_hits - 1, p))
 
     def interval(self, level: float = 0.95) -> NDArray[np.float64]:
         """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
@@ -214,3 +214,15 @@ def ratio_or_zero(value: NDArray[np.float64], error: NDArray[np.float64]) -> NDA
 
 def _root_of_diagonal(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:
     return np.full(3, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
+
+
+def synthesize_frf(modes: Sequence[Mode], frequency: ArrayLike) -> Frf:
+    """Sum of the receptances of modes at frequency (Hz), shape (n,). Raises ValueError for an axis that Frf refuses.
+
+    >>> modes = [Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)]
+    >>> frf = synthesize_frf(modes, np.arange(1.0, 1501.0))
+    >>> round(float(abs(frf.receptance).max()) * 1e6, 2), int(frf.frequency[abs(frf.receptance).argmax()])  # um/N, Hz
+    (1.25, 500)
+    """
+    f = np.asarray(frequency, dtype=np.float64)
+    return Frf(f, sum((mode.receptance(f) for mode in modes), np.zeros(f.shape, complex)))

@@ -58,12 +58,12 @@ class ModeEdits:
         dampings = ["" for _ in (*self.add, *self.drop)] + [f":{zeta:.10g}" for _, zeta in self.fix]
         return ", ".join(map("".join, zip(words, dampings, strict=True)))
 
-    def under_window(self, time_constant: float) -> ModeEdits:
+    def with_window(self, time_constant: float) -> ModeEdits:
         """The same of an FRF whose response is under exp(-t/time_constant) (s), which adds to the damping held."""
-        return ModeEdits(self.add, self.drop, tuple(_under_window(*held, time_constant) for held in self.fix))
+        return ModeEdits(self.add, self.drop, tuple(_add_window_damping(*held, time_constant) for held in self.fix))
 
 
-def _under_window(frequency: float, zeta: float, time_constant: float) -> tuple[float, float]:
+def _add_window_damping(frequency: float, zeta: float, time_constant: float) -> tuple[float, float]:
     """Its damped frequency stays."""
     size = 2 * np.pi * frequency
     decay = zeta * size + 1 / time_constant
@@ -71,12 +71,12 @@ def _under_window(frequency: float, zeta: float, time_constant: float) -> tuple[
     return w / (2 * np.pi), decay / w
 
 
-def parse_edits(
+def parse_mode_edits(
     add: Sequence[str] | None = None, drop: Sequence[str] | None = None, fix: Sequence[str] | None = None
 ) -> ModeEdits:
     """Edits from "298" (Hz) and "1500:0.03" (Hz and damping ratio); ValueError for any other text.
 
-    >>> parse_edits(add=["298"], fix=["1500:0.03"])
+    >>> parse_mode_edits(add=["298"], fix=["1500:0.03"])
     ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
     """
     pairs = [

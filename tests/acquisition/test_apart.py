@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.apart import run_apart
+from acquisition.subprocess_guard import run_in_subprocess
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_what_a_module_prints_comes_back_and_it_gets_its_arguments(program: Path) -> None:
     program.write_text("import sys\nprint(sys.argv[1:], __name__)")
-    assert run_apart("told_apart", "a", "b c") == b"['a', 'b c'] __main__\n"
+    assert run_in_subprocess("told_apart", "a", "b c") == b"['a', 'b c'] __main__\n"
 
 
 def test_modules_that_lie_in_the_folder_of_the_user_are_not_taken(
@@ -31,7 +31,7 @@ def test_modules_that_lie_in_the_folder_of_the_user_are_not_taken(
     folder.mkdir()
     (folder / "statistics.py").write_text("raise SystemExit('not meant to be imported')")
     monkeypatch.chdir(folder)
-    assert run_apart("told_apart") == b"2\n"
+    assert run_in_subprocess("told_apart") == b"2\n"
 
 
 def test_one_that_computes_for_longer_than_it_may_is_ended(program: Path) -> None:
@@ -39,7 +39,7 @@ def test_one_that_computes_for_longer_than_it_may_is_ended(program: Path) -> Non
         "from acquisition.apart import limit_this_program\nlimit_this_program(0.5, 1e9)\nwhile True:\n    pass"
     )
     with pytest.raises(subprocess.CalledProcessError) as ended:
-        run_apart("told_apart")
+        run_in_subprocess("told_apart")
     assert ended.value.returncode == -signal.SIGXCPU
 
 
@@ -49,10 +49,10 @@ def test_one_that_takes_more_memory_than_it_may_is_refused_it(program: Path) -> 
         "from acquisition.apart import limit_this_program\nlimit_this_program(60, 200e6)\nfew = bytes(100_000_000)\n"
         "try:\n    bytes(400_000_000)\nexcept MemoryError:\n    print('refused')"
     )
-    assert run_apart("told_apart") == b"refused\n"
+    assert run_in_subprocess("told_apart") == b"refused\n"
 
 
 def test_one_that_waits_for_ever_is_ended(program: Path) -> None:
     program.write_text("import time\ntime.sleep(600)")
     with pytest.raises(subprocess.TimeoutExpired):
-        run_apart("told_apart", patience=0.5)
+        run_in_subprocess("told_apart", patience=0.5)

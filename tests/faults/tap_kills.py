@@ -24,8 +24,8 @@ from tap_rounds import machine, say
 
 from acquisition import Hit, read_tap_hits
 from lobewatch.cli import main as command
-from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.verify_files import verify
 
 LINES = 10
 """About as many as the command prints."""

@@ -37,10 +37,10 @@ from acquisition import (
     TapTest,
     read_tap,
 )
-from acquisition.errors import system_failure
-from lobewatch.machine.archive.verify import verify
+from acquisition.errors import format_os_error
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.verify_files import verify
 from lobewatch.tap.session import TapSession
 
 RATE = 25600.0
@@ -93,7 +93,7 @@ def session(path: Path, seed: int, announce: Any = lambda _: None) -> TapSession
 def digest(tap: TapTest) -> str:
     """Of all that was measured."""
     codes = (hit.codes for hit in tap.hits)
-    parts = [*(code.tobytes() for code in codes if code is not None), tap.known_frf.receptance.tobytes()]
+    parts = [*(code.tobytes() for code in codes if code is not None), tap.required_frf.receptance.tobytes()]
     return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
@@ -134,7 +134,7 @@ def _child(path: Path, seed: int, files: FaultyFiles, pipe: int) -> None:
     except DataError as error:
         tell("error", str(error))
     except OSError as error:  # before the test has begun; the command says it so
-        tell("error", system_failure(error))
+        tell("error", format_os_error(error))
     except BaseException as error:  # noqa: BLE001  (what no operator should see)
         tell("error", f"{type(error).__name__}: {error}")
         code = 1

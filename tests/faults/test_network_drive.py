@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from acquisition.errors import failure_text
+from acquisition.errors import format_error
 from lobewatch import Logbook
 from lobewatch.cli import app
 from tests.lobewatch.conftest import Shop
@@ -49,12 +49,12 @@ def run(shop: Shop, command: list[str]) -> tuple[int, str]:
     if done.exception is None or isinstance(done.exception, SystemExit):
         return done.exit_code, done.output
     assert isinstance(done.exception, OSError | ValueError), done.exception
-    return 2, failure_text(done.exception)
+    return 2, format_error(done.exception)
 
 
 def rows(shop: Shop) -> list[str]:
     """Without rulings, which are worked out as they are asked for."""
-    return [repr(replace(row, rulings=None)) for row in Logbook.open(shop.path).history.rows]
+    return [repr(replace(row, verdicts=None)) for row in Logbook.open(shop.path).history.rows]
 
 
 def failing(number: int, real: Callable[..., Any], when: Callable[..., bool]) -> Callable[..., Any]:
@@ -115,7 +115,7 @@ def test_where_nothing_can_be_renamed_nothing_is_lost(
         assert code in (0, 1), said
     with pytest.raises(OSError, match=os.strerror(number)) as refusal:
         tapped.tap(30, 1700.0)
-    assert str(tapped.path / "taps") in failure_text(refusal.value)
+    assert str(tapped.path / "taps") in format_error(refusal.value)
     monkeypatch.undo()
     assert run(tapped, ["verify", "MACHINE"])[0] == 0
     assert rows(tapped) == expected

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from scan_table import write_table
 
-from acquisition import Channel, Faults, HammeredStructure
+from acquisition import Channel, HammeredStructure, TapsFaults
 from acquisition.emulation import EmulatorThread, quantise
 
 ROOT = Path(__file__).parents[2]
@@ -88,7 +88,7 @@ class Board:
 class HarmfulCable(EmulatorThread):
     """A cable from a board to the host that loses, alters, cuts or doubles frames of samples."""
 
-    def __init__(self, port: str, faults: Faults) -> None:
+    def __init__(self, port: str, faults: TapsFaults) -> None:
         super().__init__(tcp=True)
         self._board, self._faults = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK), faults
         self._rest, self._frames = b"", 0
@@ -113,7 +113,7 @@ class HarmfulCable(EmulatorThread):
         if frame[1:2] != b"\x10":  # DATA
             return frame
         self._frames += 1
-        return self._faults.on_wire(frame, self._frames)
+        return self._faults.apply(frame, self._frames)
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Block, DeviceError, EventKind, Faults, Hit, HitFlags, TapsSource, TapTest
+from acquisition import Block, DeviceError, EventKind, Hit, HitFlags, TapsFaults, TapsSource, TapTest
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.tap.session import TapSession, plan_session
 from lobewatch.tap.state import TapState
 
@@ -55,16 +55,16 @@ def test_scans_arrive_unchanged_and_complete(board: Any, codes: Codes) -> None:
 @pytest.mark.parametrize(
     ("fault", "lost_each", "is_damaged"),
     [
-        (Faults(drop_every=7), 1, False),
-        (Faults(corrupt_every=7), 1, True),
-        (Faults(noise_every=7), 1, True),
-        (Faults(cut_every=7), 2, True),
-        (Faults(duplicate_every=7), 0, True),
+        (TapsFaults(drop_every=7), 1, False),
+        (TapsFaults(corrupt_every=7), 1, True),
+        (TapsFaults(noise_every=7), 1, True),
+        (TapsFaults(cut_every=7), 2, True),
+        (TapsFaults(duplicate_every=7), 0, True),
     ],
     ids=["dropped", "wrong CRC", "noise", "cut", "doubled"],
 )
 def test_frames_lost_on_the_way_are_counted_exactly(
-    board: Any, codes: Codes, harmful_cable: Any, fault: Faults, lost_each: int, is_damaged: bool
+    board: Any, codes: Codes, harmful_cable: Any, fault: TapsFaults, lost_each: int, is_damaged: bool
 ) -> None:
     with harmful_cable(board.port, fault) as cable, TapsSource(cable.port) as source:
         source.start()
@@ -136,7 +136,7 @@ def watched(session: TapSession, watch: Callable[[TapState], None]) -> TapTest:
 def test_a_whole_tap_test_over_a_cable_with_every_fault(
     board: Any, codes: Codes, harmful_cable: Any, folder: MachineFolder
 ) -> None:
-    faults = Faults(drop_every=197, corrupt_every=189, duplicate_every=183, cut_every=179, noise_every=173)
+    faults = TapsFaults(drop_every=197, corrupt_every=189, duplicate_every=183, cut_every=179, noise_every=173)
     with harmful_cable(board.port, faults) as cable:
         session = plan_session(folder, port=cable.port)
         tap = session.run()

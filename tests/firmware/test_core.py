@@ -16,11 +16,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition.taps.protocol import (
-    LOST_BEFORE,
+    LOST_BEFORE_FLAG,
+    DeviceStatus,
     Frame,
     FrameDecoder,
     MessageType,
-    Status,
     decode_data,
     encode_data,
     encode_frame,
@@ -210,12 +210,12 @@ def test_what_was_lost_is_the_jump_of_the_index(core: Core) -> None:
     for index in range(3000, 3000 + FRAME):
         core.scan((index % 2000, -1))
     (after,) = data_of(core.exchange())
-    assert (after.flags, decode_data(after.body).first_scan) == (LOST_BEFORE, 3000)
+    assert (after.flags, decode_data(after.body).first_scan) == (LOST_BEFORE_FLAG, 3000)
     core.scan(None)
     for index in range(FRAME):
         core.scan((index, 0))
     (after,) = data_of(core.exchange())
-    assert (after.flags, decode_data(after.body).first_scan) == (LOST_BEFORE, 3001 + FRAME)
+    assert (after.flags, decode_data(after.body).first_scan) == (LOST_BEFORE_FLAG, 3001 + FRAME)
 
 
 def test_as_many_scans_as_were_asked_for(plain: Core) -> None:
@@ -242,9 +242,9 @@ def test_status_twice_a_second_and_the_button_at_any_time(plain: Core) -> None:
     for _ in range(400):
         for _ in range(128):
             plain.scan((0, 0))
-        states += [Status.decode(frame.body) for frame in plain.exchange() if frame.type == MessageType.STATUS]
+        states += [DeviceStatus.decode(frame.body) for frame in plain.exchange() if frame.type == MessageType.STATUS]
     assert [state.samples_taken for state in states] == [12_800 * i for i in range(1, 5)]
-    assert states[-1] == Status(51_200, 51_200 - FRAME, 25, 0, -327.68)
+    assert states[-1] == DeviceStatus(51_200, 51_200 - FRAME, 25, 0, -327.68)
 
 
 def test_a_stop_ends_the_stream_and_a_start_begins_another(plain: Core) -> None:

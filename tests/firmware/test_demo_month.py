@@ -13,10 +13,10 @@ from acquisition import HammeredStructure, Hammering
 from acquisition.emulation import quantise
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.demo import TakenTap, compare_with_truth, plan_taps
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE
 from lobewatch.tap.session import plan_session
-from lobewatch.tap.stories.demo import TakenTap, compare_with_truth, plan_taps
 
 SECONDS = 30.0
 MONTH = 18
@@ -30,8 +30,8 @@ def test_a_month_of_the_demo_is_found_as_it_was_emulated(switched_on: Callable[.
     plans = plan_taps(folder, 24, random, 0.001)[2 * MONTH : 2 * MONTH + 2]
     taken = []
     for plan, hammering in zip(plans, random.spawn(2), strict=True):
-        tapper = HammeredStructure(plan.structure, SAMPLE_RATE, hammering, Hammering())
-        codes = quantise(tapper(0, round(SECONDS * SAMPLE_RATE)), CHANNELS)
+        tapper = HammeredStructure(plan.structure, EMULATED_SAMPLE_RATE, hammering, Hammering())
+        codes = quantise(tapper(0, round(SECONDS * EMULATED_SAMPLE_RATE)), EMULATED_CHANNELS)
         with switched_on("qemu", codes) as board:
             taken.append(TakenTap(plan, plan_session(folder, port=board.port, direction=plan.direction).run().id))
     logbook = Logbook(folder)
@@ -42,4 +42,4 @@ def test_a_month_of_the_demo_is_found_as_it_was_emulated(switched_on: Callable[.
         assert damping < 2e-3
         assert stiffness < 2e-3
         assert bearing < 5e-4
-    assert {verdict.word for verdict in logbook.verdicts()} <= {"stable", "doubtful", "not stable"}
+    assert {verdict.stability for verdict in logbook.verdicts()} <= {"stable", "doubtful", "not stable"}

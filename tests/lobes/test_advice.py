@@ -16,19 +16,19 @@ import pytest
 from numpy.typing import NDArray
 
 from lobes import (
-    Coefficients,
     Cut,
+    CuttingCoefficients,
     Program,
     StabilityLobes,
-    aged_mode,
-    average_angle,
-    best_pockets,
-    cutting_coefficients,
-    deepest_for_drive,
+    age_mode,
+    all_cutting_coefficients,
+    average_angle_lobes,
+    find_pockets,
+    match_pockets,
+    max_depth_for_drive,
     mean_torque,
-    pocket_shifts,
-    pockets,
     program_limit,
+    rank_pockets,
     spectral_radius,
     tangential_and_radial,
 )
@@ -41,29 +41,31 @@ MODE = Mode(1200.0, 0.03, 2e7)
 
 def test_the_paper_s_spindle_in_an_aluminium_slot() -> None:
     """The lowest limit falls by 10 %, but at 5200 rpm, inside the 8.7 mm pocket at 5262 rpm, from 7.97 to 3.48 mm."""
-    old = aged_mode(SPINDLE, 0.9, "paper")
+    old = age_mode(SPINDLE, 0.9, "paper")
     around = np.linspace(5000, 5500, 5001)
-    new_lobes, old_lobes = (average_angle([mode], None, SLOT, around) for mode in (SPINDLE, old))
-    deepest = pockets(new_lobes, 1.0)[0]
+    new_lobes, old_lobes = (average_angle_lobes([mode], None, SLOT, around) for mode in (SPINDLE, old))
+    deepest = find_pockets(new_lobes, 1.0)[0]
     assert deepest.speed_rpm == pytest.approx(5262, abs=1)
     assert deepest.depth * 1e3 == pytest.approx(8.7, abs=0.05)
     assert new_lobes.depth_at(5200) * 1e3 == pytest.approx(7.97, abs=0.005)
     assert old_lobes.depth_at(5200) * 1e3 == pytest.approx(3.48, abs=0.005)
-    charts = [average_angle([m], None, SLOT, np.linspace(3000, 20000, 20001)).minimum.depth for m in (SPINDLE, old)]
+    charts = [
+        average_angle_lobes([m], None, SLOT, np.linspace(3000, 20000, 20001)).minimum.depth for m in (SPINDLE, old)
+    ]
     assert charts[1] / charts[0] == pytest.approx(0.9, abs=1e-4)
 
 
 def test_rules_for_k() -> None:
     covariance = np.diag([1.0, 1e-8, 1e10])
     base = replace(SPINDLE, covariance=covariance, method="tap")
-    paper = aged_mode(base, 0.9, "paper")
+    paper = age_mode(base, 0.9, "paper")
     assert paper.frequency == pytest.approx(1549.8)
     assert paper.damping_ratio == 0.029136
     assert paper.stiffness == pytest.approx(0.9 * 3.2289e7)
     np.testing.assert_allclose(paper.standard_error, [0.9, 1e-4, 0.9e5])
-    assert aged_mode(base, 0.9, "model", 0.985).stiffness == pytest.approx(0.985 * 3.2289e7)
-    assert aged_mode(base, 0.9, "measured", 1.02).stiffness == pytest.approx(1.02 * 3.2289e7)
-    constant = aged_mode(base, 0.9, "model")
+    assert age_mode(base, 0.9, "model", 0.985).stiffness == pytest.approx(0.985 * 3.2289e7)
+    assert age_mode(base, 0.9, "measured", 1.02).stiffness == pytest.approx(1.02 * 3.2289e7)
+    constant = age_mode(base, 0.9, "model")
     assert constant.stiffness == 3.2289e7
     assert constant.method == "tap, aged, K constant, no model"
     assert paper.method == "tap, aged, K by rule paper"
@@ -82,7 +84,7 @@ def test_rules_for_k() -> None:
 )
 def test_bad_aging_is_refused(arguments: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        aged_mode(SPINDLE, *arguments)
+        age_mode(SPINDLE, *arguments)
 
 
 def test_an_island_above_the_limit_is_no_place_to_work() -> None:
@@ -110,23 +112,23 @@ def chart(depth: list[float], speed: NDArray[np.float64] | None = None) -> Stabi
 
 
 def test_pockets_are_the_tops_of_the_diagram() -> None:
-    found = pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, math.inf, 2.0]), 5.0)
+    found = find_pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, math.inf, 2.0]), 5.0)
     assert [pocket[:2] for pocket in found] == [(1000.0, 4.0), (3000.0, 3.0), (6000.0, 5.0)]
-    assert [pocket[:2] for pocket in best_pockets(found, 2)] == [(6000.0, 5.0), (1000.0, 4.0)]
-    assert [pocket[:2] for pocket in best_pockets(found, 2, by="removal")] == [(6000.0, 5.0), (3000.0, 3.0)]
+    assert [pocket[:2] for pocket in rank_pockets(found, 2)] == [(6000.0, 5.0), (1000.0, 4.0)]
+    assert [pocket[:2] for pocket in rank_pockets(found, 2, by="removal")] == [(6000.0, 5.0), (3000.0, 3.0)]
     with pytest.raises(ValueError, match="by='speed'"):
-        best_pockets(found, by="speed")
+        rank_pockets(found, by="speed")
     with pytest.raises(ValueError, match="deepest"):
-        pockets(chart([1.0, 2.0]), 0.0)
+        find_pockets(chart([1.0, 2.0]), 0.0)
 
 
 def test_the_drive_cuts_pockets_off() -> None:
     lobes = chart([1.0, 8.0, 1.0, 1.0, 9.0, 1.0])
-    assert pockets(lobes, np.array([9.0, 9, 9, 2, 2, 2]))[1][:2] == (5000.0, 2.0)
+    assert find_pockets(lobes, np.array([9.0, 9, 9, 2, 2, 2]))[1][:2] == (5000.0, 2.0)
 
 
 def test_a_pocket_reaches_as_far_as_four_fifths_of_its_depth() -> None:
-    found = pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, 5.0, 2.0, 9.0]), 5.0)
+    found = find_pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, 5.0, 2.0, 9.0]), 5.0)
     ends = [(pocket.from_rpm, pocket.to_rpm) for pocket in found]
     np.testing.assert_allclose(
         ends, [(1000, 1000 + 800 / 3), (2700, 3300), (4750, 7000 + 1000 / 3), (8000 + 2000 / 3, 9000)]
@@ -135,10 +137,10 @@ def test_a_pocket_reaches_as_far_as_four_fifths_of_its_depth() -> None:
 
 def test_pockets_move_with_the_frequency() -> None:
     speeds = np.linspace(6000, 30000, 2401)
-    then, now = (average_angle([aged_mode(MODE, ratio, "paper")], None, SLOT, speeds) for ratio in (1.0, 0.95))
-    shifts = pocket_shifts(then, now, 50e-3)
+    then, now = (average_angle_lobes([age_mode(MODE, ratio, "paper")], None, SLOT, speeds) for ratio in (1.0, 0.95))
+    shifts = match_pockets(then, now, 50e-3)
     assert len(shifts) >= 2
-    inside = [shift for shift in shifts if 7000 < shift.then.speed_rpm < 28000]
+    inside = [shift for shift in shifts if 7000 < shift.before.speed_rpm < 28000]
     for shift in inside:
         assert shift.speed_change == pytest.approx(-0.05, abs=2e-3)
         assert shift.depth_change == pytest.approx(-0.05, abs=0.03)
@@ -159,7 +161,7 @@ def test_power_is_the_tangential_force_times_the_removal_rate() -> None:
 
 
 def test_depth_for_power_and_torque() -> None:
-    depth = deepest_for_drive(SLOT, [3000.0, 12000.0], 0.02, 1e-4, power=2000.0, torque=4.0)
+    depth = max_depth_for_drive(SLOT, [3000.0, 12000.0], 0.02, 1e-4, power=2000.0, torque=4.0)
     at_torque = 4.0 / mean_torque(SLOT, 1.0, 0.02, 1e-4)
     at_power = 2000 / (2 * math.pi * 200) / mean_torque(SLOT, 1.0, 0.02, 1e-4)
     assert depth == pytest.approx([at_torque, at_power])
@@ -169,11 +171,11 @@ def test_depth_for_power_and_torque() -> None:
 def test_bad_drive_limits_are_refused(change: dict[str, float]) -> None:
     good = {"diameter": 0.02, "feed_per_tooth": 1e-4}
     with pytest.raises(ValueError, match=next(iter(change))):
-        deepest_for_drive(SLOT, 3000.0, **{**good, **change})
+        max_depth_for_drive(SLOT, 3000.0, **{**good, **change})
 
 
 def test_published_coefficients_in_si_with_source_and_edge() -> None:
-    known = {one.material: one for one in cutting_coefficients()[:10]}
+    known = {one.material: one for one in all_cutting_coefficients()[:10]}
     assert len(known) == 10
     first = known["Al 7075-T6 (carbide; dry; ref. 190)"]
     assert first.alloy == "Al 7075"
@@ -202,4 +204,4 @@ def test_bad_specific_forces_are_refused(force: float, angle: float) -> None:
 @pytest.mark.parametrize(("tangential", "radial"), [(0.0, 1.0), (1e9, -1.0), (math.inf, 1.0), (1e9, math.nan)])
 def test_bad_coefficients_are_refused(tangential: float, radial: float) -> None:
     with pytest.raises(ValueError, match=r"tangential=|radial="):
-        Coefficients("unobtainium", tangential, radial)
+        CuttingCoefficients("unobtainium", tangential, radial)

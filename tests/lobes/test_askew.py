@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from lobes import (
     Cut,
     Program,
-    milling_system,
+    build_milling_system,
     program_limit,
-    shown_modes,
+    project_modes,
     spectral_radius,
     stability_boundary,
-    zero_order,
+    zero_order_lobes,
 )
-from modal import Mode, synthesize
+from modal import Mode, synthesize_frf
 
 PAIR = [Mode(1500.0, 0.03, 20e6), Mode(1575.0, 0.028, 22e6)]
 SPEEDS = np.array([5000.0, 7000.0, 11000.0])
@@ -72,8 +72,8 @@ def test_stiffness_and_length_of_a_vector_count_together() -> None:
 def test_zero_order_is_exact_in_a_slot_of_four_teeth(angle: float) -> None:
     """The force is constant there."""
     exact = stability_boundary(PAIR, None, SLOT, SPEEDS, 0.02, turned_by(angle))
-    shown = shown_modes(PAIR, turned_by(angle))
-    mean = zero_order(shown.x, shown.y, SLOT, SPEEDS, shown.cross)
+    shown = project_modes(PAIR, turned_by(angle))
+    mean = zero_order_lobes(shown.x, shown.y, SLOT, SPEEDS, shown.cross)
     assert mean.depth == pytest.approx(exact.depth, rel=1e-5)
     assert mean.chatter_frequency == pytest.approx(exact.chatter_frequency, rel=1e-5)
 
@@ -81,35 +81,35 @@ def test_zero_order_is_exact_in_a_slot_of_four_teeth(angle: float) -> None:
 @pytest.mark.parametrize("angle", [20.0, 35.0, 70.0])
 def test_zero_order_of_spindle_and_feed_turned_together_is_the_same(angle: float) -> None:
     """A sign of the cross term put wrong is seen at once."""
-    straight = zero_order(PAIR[:1], PAIR[1:], replace(CUT, feed_angle=-np.radians(angle)), SPEEDS)
-    shown = shown_modes(PAIR, turned_by(angle))
-    askew = zero_order(shown.x, shown.y, CUT, SPEEDS, shown.cross)
+    straight = zero_order_lobes(PAIR[:1], PAIR[1:], replace(CUT, feed_angle=-np.radians(angle)), SPEEDS)
+    shown = project_modes(PAIR, turned_by(angle))
+    askew = zero_order_lobes(shown.x, shown.y, CUT, SPEEDS, shown.cross)
     assert askew.depth == pytest.approx(straight.depth, rel=1e-5)
     assert askew.chatter_frequency == pytest.approx(straight.chatter_frequency, rel=1e-5)
-    against = zero_order(shown.x, shown.y, CUT, SPEEDS, [mode.scaled(1.0, -1.0, "") for mode in shown.cross])
+    against = zero_order_lobes(shown.x, shown.y, CUT, SPEEDS, [mode.scaled(1.0, -1.0, "") for mode in shown.cross])
     assert np.max(np.abs(against.depth / straight.depth - 1)) > 0.1
 
 
 def test_zero_order_knows_cross_frfs_as_it_knows_their_modes() -> None:
-    shown = shown_modes(PAIR, turned_by(35))
+    shown = project_modes(PAIR, turned_by(35))
     lines = np.arange(300.0, 4000.0, 2.0)
-    x, y, cross = (synthesize(modes, lines) for modes in shown)
-    of_modes = zero_order(shown.x, shown.y, CUT, SPEEDS, shown.cross)
-    assert zero_order(x, y, CUT, SPEEDS, cross).depth == pytest.approx(of_modes.depth, rel=1e-3)
+    x, y, cross = (synthesize_frf(modes, lines) for modes in shown)
+    of_modes = zero_order_lobes(shown.x, shown.y, CUT, SPEEDS, shown.cross)
+    assert zero_order_lobes(x, y, CUT, SPEEDS, cross).depth == pytest.approx(of_modes.depth, rel=1e-3)
 
 
 def test_a_mode_askew_can_halve_what_direct_taps_alone_promise() -> None:
     """At a/D 0.1 and 35 degrees: leaving the cross term out states 3.6 times the limit at 5000 rpm."""
     low = replace(CUT, immersion=0.1, direction="up")
-    shown = shown_modes(PAIR, turned_by(35))
+    shown = project_modes(PAIR, turned_by(35))
     askew = stability_boundary(PAIR, None, low, SPEEDS[:1], 0.02, turned_by(35)).depth
     direct = stability_boundary(shown.x, shown.y, low, SPEEDS[:1], 0.02).depth
     assert direct / askew == pytest.approx([3.564], rel=1e-3)
 
 
 def test_the_system_shows_the_receptance_of_its_vectors() -> None:
-    at, shown = np.linspace(0.0, 3000.0, 31), shown_modes(PAIR, turned_by(35))
-    matrix = milling_system(PAIR, None, turned_by(35)).receptance(at)
+    at, shown = np.linspace(0.0, 3000.0, 31), project_modes(PAIR, turned_by(35))
+    matrix = build_milling_system(PAIR, None, turned_by(35)).receptance(at)
     for (a, b), modes in zip([(0, 0), (1, 1), (0, 1), (1, 0)], (*shown, shown.cross), strict=True):
         assert matrix[:, a, b] == pytest.approx(sum(mode.receptance(at) for mode in modes), rel=1e-12)
 
@@ -129,6 +129,6 @@ def test_vectors_that_fit_no_modes_are_refused(vectors: list[list[float]], probl
 
 def test_a_cross_frf_without_both_directions_is_refused() -> None:
     with pytest.raises(ValueError, match="cross is known, x or y is not"):
-        zero_order(PAIR, None, CUT, SPEEDS, PAIR)
+        zero_order_lobes(PAIR, None, CUT, SPEEDS, PAIR)
     with pytest.raises(ValueError, match="cross has no modes"):
-        zero_order(PAIR, PAIR, CUT, SPEEDS, [])
+        zero_order_lobes(PAIR, PAIR, CUT, SPEEDS, [])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from lobes import Cut, StabilityLobes, average_angle
+from lobes import Cut, StabilityLobes, average_angle_lobes
 from modal import Mode
 
 SPEEDS = np.linspace(1500.0, 24000.0, 40)
@@ -68,7 +68,7 @@ def scanned_depth(x: list[Mode], y: list[Mode], cut: Cut, speed: float) -> float
 @settings(max_examples=40, deadline=None)
 @given(x=MODES, y=MODES, cut=CUTS, speed=st.floats(500, 60000))
 def test_limit_is_the_lowest_of_all_crossings(x: list[Mode], y: list[Mode], cut: Cut, speed: float) -> None:
-    depth = average_angle(x, y, cut, speed).depth[0]
+    depth = average_angle_lobes(x, y, cut, speed).depth[0]
     scan = scanned_depth(x, y, cut, speed)
     assert depth == pytest.approx(scan, rel=1e-3)
 
@@ -77,7 +77,7 @@ def test_limit_is_the_lowest_of_all_crossings(x: list[Mode], y: list[Mode], cut:
 @given(x=MODES, y=MODES, cut=CUTS)
 def test_chatter_closes_the_loop_with_a_whole_number_of_waves(x: list[Mode], y: list[Mode], cut: Cut) -> None:
     """Ks Nt* b G_or (1 - exp(-2 pi i f/f_t)) = -1 at every limit, and on every point of every lobe."""
-    lobes = average_angle(x, y, cut, SPEEDS)
+    lobes = average_angle_lobes(x, y, cut, SPEEDS)
     points = [(lobes.speed_rpm, lobes.depth, lobes.chatter_frequency)]
     points += [(lobe.speed_rpm, lobe.depth, lobe.chatter_frequency) for lobe in lobes.lobes]
     mu_x, mu_y = cut.orientation_factors
@@ -92,44 +92,44 @@ def test_chatter_closes_the_loop_with_a_whole_number_of_waves(x: list[Mode], y: 
 @settings(max_examples=25, deadline=None)
 @given(x=MODES, cut=CUTS, factor=FACTORS)
 def test_depth_goes_with_stiffness_and_against_cutting_force(x: list[Mode], cut: Cut, factor: float) -> None:
-    base = average_angle(x, None, cut, SPEEDS)
-    assert_same(base, average_angle(scaled(x, stiffness=factor), None, cut, SPEEDS), depth=factor)
+    base = average_angle_lobes(x, None, cut, SPEEDS)
+    assert_same(base, average_angle_lobes(scaled(x, stiffness=factor), None, cut, SPEEDS), depth=factor)
     harder = Cut(cut.teeth, cut.immersion, cut.direction, factor * cut.tangential, factor * cut.radial)
-    assert_same(base, average_angle(x, None, harder, SPEEDS), depth=1 / factor)
+    assert_same(base, average_angle_lobes(x, None, harder, SPEEDS), depth=1 / factor)
 
 
 @settings(max_examples=25, deadline=None)
 @given(x=MODES, y=MODES, cut=CUTS, factor=FACTORS)
 def test_speeds_go_with_the_frequencies(x: list[Mode], y: list[Mode], cut: Cut, factor: float) -> None:
-    base = average_angle(x, y, cut, SPEEDS)
-    other = average_angle(scaled(x, factor), scaled(y, factor), cut, factor * SPEEDS)
+    base = average_angle_lobes(x, y, cut, SPEEDS)
+    other = average_angle_lobes(scaled(x, factor), scaled(y, factor), cut, factor * SPEEDS)
     assert_same(base, other, frequency=factor)
 
 
 def test_twice_the_teeth_at_half_the_speed_halve_the_depth() -> None:
-    base = average_angle(X, Y, CUT, SPEEDS)
-    twice = average_angle(X, Y, Cut(6, 0.6, "up", 600e6, 200e6), SPEEDS / 2)
+    base = average_angle_lobes(X, Y, CUT, SPEEDS)
+    twice = average_angle_lobes(X, Y, Cut(6, 0.6, "up", 600e6, 200e6), SPEEDS / 2)
     assert_same(base, twice, depth=0.5)
 
 
 def test_a_mode_may_be_split_in_two_of_twice_the_stiffness() -> None:
     halves = scaled(X, stiffness=2) * 2
-    assert_same(average_angle(X, Y, CUT, SPEEDS), average_angle(halves, Y, CUT, SPEEDS))
+    assert_same(average_angle_lobes(X, Y, CUT, SPEEDS), average_angle_lobes(halves, Y, CUT, SPEEDS))
 
 
 @pytest.mark.parametrize(("line", "error"), [(5.0, 5e-4), (1.0, 1e-6)])
 def test_frf_and_its_modes_give_the_same_lobes(line: float, error: float) -> None:
     speeds = np.linspace(1500.0, 24000.0, 2000)
-    lobes = average_angle(X, Y, CUT, speeds)
-    measured = average_angle(frf(X, line), frf(Y, line), CUT, speeds)
+    lobes = average_angle_lobes(X, Y, CUT, speeds)
+    measured = average_angle_lobes(frf(X, line), frf(Y, line), CUT, speeds)
     np.testing.assert_allclose(measured.depth, lobes.depth, rtol=error)
     np.testing.assert_allclose(measured.chatter_frequency, lobes.chatter_frequency, rtol=error)
 
 
 def test_frfs_of_different_lines_and_modes_may_be_mixed() -> None:
-    lobes = average_angle(X, Y, CUT, SPEEDS)
+    lobes = average_angle_lobes(X, Y, CUT, SPEEDS)
     for x, y in ((frf(X, 1.0), frf(Y, 0.7, 5000.0)), (frf(X, 1.0), Y), (X, frf(Y, 1.0))):
-        np.testing.assert_allclose(average_angle(x, y, CUT, SPEEDS).depth, lobes.depth, rtol=1e-4)
+        np.testing.assert_allclose(average_angle_lobes(x, y, CUT, SPEEDS).depth, lobes.depth, rtol=1e-4)
 
 
 def test_noise_outside_the_usable_band_does_not_count() -> None:
@@ -137,40 +137,40 @@ def test_noise_outside_the_usable_band_does_not_count() -> None:
     noise = np.where(clean.frequency < 50, -1e-4, 0)
     noisy = Frf(clean.frequency, clean.receptance + noise, usable_band=(100.0, 5000.0))
     np.testing.assert_allclose(
-        average_angle(noisy, None, CUT, SPEEDS).depth, average_angle(X, None, CUT, SPEEDS).depth, rtol=1e-4
+        average_angle_lobes(noisy, None, CUT, SPEEDS).depth, average_angle_lobes(X, None, CUT, SPEEDS).depth, rtol=1e-4
     )
 
 
 def test_a_symmetric_slot_feels_only_the_feed_direction() -> None:
     """At the mean angle of 90 deg mu_y = 0: exchanging x and y is another chart, changing y is the same one."""
     slot = Cut(4, 1.0, "up", 695e6, 281e6)
-    lobes = average_angle(X, Y, slot, SPEEDS)
-    assert_same(lobes, average_angle(X, scaled(Y, 0.7, 0.3), slot, SPEEDS))
-    assert_same(lobes, average_angle(X, None, slot, SPEEDS))
-    exchanged = average_angle(Y, X, slot, SPEEDS)
+    lobes = average_angle_lobes(X, Y, slot, SPEEDS)
+    assert_same(lobes, average_angle_lobes(X, scaled(Y, 0.7, 0.3), slot, SPEEDS))
+    assert_same(lobes, average_angle_lobes(X, None, slot, SPEEDS))
+    exchanged = average_angle_lobes(Y, X, slot, SPEEDS)
     assert np.all(np.abs(exchanged.depth / lobes.depth - 1) > 1e-3)
 
 
 def test_a_slot_has_no_limit_where_only_y_gives_way() -> None:
-    assert np.all(np.isinf(average_angle(None, Y, Cut(4, 1.0, "up", 695e6, 281e6), SPEEDS).depth))
+    assert np.all(np.isinf(average_angle_lobes(None, Y, Cut(4, 1.0, "up", 695e6, 281e6), SPEEDS).depth))
 
 
 def test_none_is_a_rigid_direction() -> None:
     rigid = scaled(Y, stiffness=1e12)
-    assert_same(average_angle(rigid, Y, CUT, SPEEDS), average_angle(None, Y, CUT, SPEEDS))
-    assert_same(average_angle(X, rigid, CUT, SPEEDS), average_angle(X, None, CUT, SPEEDS))
+    assert_same(average_angle_lobes(rigid, Y, CUT, SPEEDS), average_angle_lobes(None, Y, CUT, SPEEDS))
+    assert_same(average_angle_lobes(X, rigid, CUT, SPEEDS), average_angle_lobes(X, None, CUT, SPEEDS))
 
 
 def test_equal_directions_add_their_orientation_factors() -> None:
     mu_x, mu_y = CUT.orientation_factors
-    both = average_angle(X, X, CUT, SPEEDS)
-    assert_same(average_angle(scaled(X, stiffness=mu_x / (mu_x + mu_y)), None, CUT, SPEEDS), both)
+    both = average_angle_lobes(X, X, CUT, SPEEDS)
+    assert_same(average_angle_lobes(scaled(X, stiffness=mu_x / (mu_x + mu_y)), None, CUT, SPEEDS), both)
 
 
 def test_many_lobes_at_low_speed() -> None:
     """The crossings stand less than a tooth frequency apart: one of them is that near to the absolute minimum."""
     mode, speed = Mode(500.0, 0.02, 8e6), np.geomspace(0.5, 60.0, 50)
-    lobes = average_angle([mode], None, CUT, speed)
+    lobes = average_angle_lobes([mode], None, CUT, speed)
     gain = CUT.specific_force * CUT.orientation_factors[0] * CUT.teeth_in_cut
     lowest, tooth = 500 * np.sqrt(1.04), 3 * speed / 60
     bound = [-1 / (2 * gain * mode.receptance(lowest + side * tooth).real) for side in (-1, 1)]
@@ -182,7 +182,7 @@ def test_many_lobes_at_low_speed() -> None:
 def test_far_above_the_mode_its_mass_alone_is_left() -> None:
     """There chatter runs at half the tooth frequency, and b = (m (2 pi f)^2 - k) / (2 Ks mu_x Nt*)."""
     mode, speed = Mode(20.0, 0.002, 1e4), np.array([30000.0, 240000.0])
-    lobes = average_angle([mode], None, CUT, speed)
+    lobes = average_angle_lobes([mode], None, CUT, speed)
     half = 3 * speed / 120
     gain = CUT.specific_force * CUT.orientation_factors[0] * CUT.teeth_in_cut
     np.testing.assert_allclose(lobes.chatter_frequency, half, rtol=1e-3)
@@ -190,7 +190,7 @@ def test_far_above_the_mode_its_mass_alone_is_left() -> None:
 
 
 def test_lobe_curves_pass_through_the_limits_of_the_range() -> None:
-    lobes = average_angle(X, Y, CUT, SPEEDS)
+    lobes = average_angle_lobes(X, Y, CUT, SPEEDS)
     lower = np.full(SPEEDS.size, np.inf)
     for lobe in lobes.lobes:
         assert np.all((lobe.speed_rpm[1:-1] >= SPEEDS[0]) & (lobe.speed_rpm[1:-1] <= SPEEDS[-1]))
@@ -209,7 +209,7 @@ def test_lobe_curves_pass_through_the_limits_of_the_range() -> None:
 
 def test_an_frf_without_negative_real_part_has_no_limit() -> None:
     stiff = Frf(np.arange(1.0, 100.0), np.full(99, 1e-8 - 1e-9j))
-    lobes = average_angle(stiff, None, CUT, SPEEDS)
+    lobes = average_angle_lobes(stiff, None, CUT, SPEEDS)
     assert np.all(np.isinf(lobes.depth))
     assert np.all(np.isnan(lobes.chatter_frequency))
     assert set(lobes.kind) == {""}
@@ -220,32 +220,32 @@ def test_an_frf_without_negative_real_part_has_no_limit() -> None:
 def test_speeds_keep_their_order() -> None:
     order = np.random.default_rng(1).permutation(SPEEDS.size)
     np.testing.assert_array_equal(
-        average_angle(X, Y, CUT, SPEEDS[order]).depth, average_angle(X, Y, CUT, SPEEDS).depth[order]
+        average_angle_lobes(X, Y, CUT, SPEEDS[order]).depth, average_angle_lobes(X, Y, CUT, SPEEDS).depth[order]
     )
 
 
 @pytest.mark.parametrize("speed", [0.0, -100.0, np.nan, np.inf, [], [[1000.0]]])
 def test_bad_speeds_are_refused(speed: Any) -> None:
     with pytest.raises(ValueError, match="speed_rpm"):
-        average_angle(X, None, CUT, speed)
+        average_angle_lobes(X, None, CUT, speed)
 
 
 def test_two_rigid_directions_are_refused() -> None:
     with pytest.raises(ValueError, match="x and y are both None"):
-        average_angle(None, None, CUT, SPEEDS)
+        average_angle_lobes(None, None, CUT, SPEEDS)
 
 
 def test_no_modes_are_refused() -> None:
     with pytest.raises(ValueError, match="y has no modes"):
-        average_angle(X, [], CUT, SPEEDS)
+        average_angle_lobes(X, [], CUT, SPEEDS)
 
 
 def test_a_mode_of_no_driving_point_is_refused() -> None:
     with pytest.raises(ValueError, match=r"3671 Hz of x has stiffness -1e\+07 N/m.*driving point"):
-        average_angle([Mode(3671.0, 0.002, -1e7)], None, CUT, SPEEDS)
+        average_angle_lobes([Mode(3671.0, 0.002, -1e7)], None, CUT, SPEEDS)
 
 
 def test_frfs_without_a_common_band_are_refused() -> None:
     low, high = frf(X, 1.0).in_band((1, 500)), frf(Y, 1.0).in_band((600, 900))
     with pytest.raises(ValueError, match="no band in common: one ends at 500 Hz, the other begins at 600 Hz"):
-        average_angle(low, high, CUT, SPEEDS)
+        average_angle_lobes(low, high, CUT, SPEEDS)

@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobes import (
-    Cut,
-    Program,
-    program_limit,
-    spectral_radius,
-    stability_boundary,
-    zero_order,
-)
-from lobes.program import Modes
+from lobes import Cut, Program, program_limit, spectral_radius, stability_boundary, zero_order_lobes
+from lobes.cut import DirectionModes
 from modal import Mode
 
 SPINDLE = [Mode(1713.0636, 0.029120, 3.53170e7)]
@@ -29,7 +22,7 @@ LOOKS = 200
 
 class Case(NamedTuple):
     x: list[Mode]
-    y: Modes
+    y: DirectionModes
     cut: Cut
     speed_rpm: NDArray[np.float64]
     deepest: float
@@ -48,7 +41,7 @@ def cases(number: int, seed: int) -> Iterator[Case]:
         direction: Literal["up", "down"] = "up" if random.random() < 0.5 else "down"
         cut = Cut(teeth, float(np.exp(random.uniform(-3.5, -1.2))), direction, tangential, tangential * share)
         speed = 60 / teeth * 2 * frequency / (2 * k + 1) * random.uniform(0.88, 1.2, 12)
-        lowest = zero_order(x, y, cut, np.linspace(30, 120, 50) * frequency / teeth).minimum.depth
+        lowest = zero_order_lobes(x, y, cut, np.linspace(30, 120, 50) * frequency / teeth).minimum.depth
         yield Case(x, y, cut, speed, float(lowest * np.exp(random.uniform(1.6, 3.7))))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lobes.floquet.inverses import inverses
+from lobes.floquet.piece_response import invert_matrices
 
 
 @pytest.mark.parametrize("size", [1, 8, 16])
@@ -14,7 +14,7 @@ def test_they_are_those_of_lapack(size: int, shape: tuple[int, ...]) -> None:
     matrices = np.eye(size) + 0.3 / size * np.random.default_rng(size).normal(size=(*shape, size, size))
     last = np.moveaxis(matrices, (-2, -1), (0, 1))
     before = last.copy()
-    inverse = np.moveaxis(inverses(last), (0, 1), (-2, -1))
+    inverse = np.moveaxis(invert_matrices(last), (0, 1), (-2, -1))
     assert inverse == pytest.approx(np.linalg.inv(matrices), rel=1e-12, abs=1e-12)
     assert np.array_equal(last, before)
 
@@ -22,9 +22,9 @@ def test_they_are_those_of_lapack(size: int, shape: tuple[int, ...]) -> None:
 def test_they_do_not_depend_on_how_many_there_are() -> None:
     matrices = np.eye(16)[..., np.newaxis] + 0.1 * np.random.default_rng(1).normal(size=(16, 16, 50))
     matrices = matrices.astype(np.float32)
-    assert inverses(matrices).dtype == np.float32
-    assert np.array_equal(inverses(matrices)[..., 7], inverses(matrices[..., 7]))
+    assert invert_matrices(matrices).dtype == np.float32
+    assert np.array_equal(invert_matrices(matrices)[..., 7], invert_matrices(matrices[..., 7]))
 
 
 def test_a_singular_one_is_not_finite() -> None:
-    assert not np.all(np.isfinite(inverses(np.zeros((8, 8, 2)))))
+    assert not np.all(np.isfinite(invert_matrices(np.zeros((8, 8, 2)))))

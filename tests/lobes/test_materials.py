@@ -12,21 +12,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lobes import (
-    Coefficients,
+    CuttingCoefficients,
     SpecificForce,
-    cutting_coefficients,
+    all_cutting_coefficients,
     find_materials,
-    folded_name,
+    fold_material_name,
     materials_by_name,
 )
 
 PAGE = Path(__file__).parents[2] / "docs" / "materials.md"
-LISTED = [known for known in cutting_coefficients() if known.specific_forces]
-TESTS = [known for known in cutting_coefficients() if not known.specific_forces]
+LISTED = [known for known in all_cutting_coefficients() if known.specific_forces]
+TESTS = [known for known in all_cutting_coefficients() if not known.specific_forces]
 
 
-def named(name: str) -> Coefficients:
-    return materials_by_name()[folded_name(name)]
+def named(name: str) -> CuttingCoefficients:
+    return materials_by_name()[fold_material_name(name)]
 
 
 def test_more_than_thirty_materials_of_all_six_groups_each_with_sources() -> None:
@@ -40,7 +40,7 @@ def test_more_than_thirty_materials_of_all_six_groups_each_with_sources() -> Non
 
 
 def test_no_name_means_two_materials() -> None:
-    names = [folded_name(name) for known in cutting_coefficients() for name in known.names]
+    names = [fold_material_name(name) for known in all_cutting_coefficients() for name in known.names]
     assert len(names) == len(set(names))
 
 
@@ -144,7 +144,7 @@ def test_materials_are_found_by_a_part_of_a_name_or_by_their_group() -> None:
         test.material for test in TESTS if test.alloy == "Al 7075"
     }
     assert {known.iso_group for known in find_materials("s")} == {"S"}
-    assert len(find_materials("")) == len(cutting_coefficients())
+    assert len(find_materials("")) == len(all_cutting_coefficients())
     with pytest.raises(
         ValueError, match=re.escape("no material has 'Inconell 718' in a name; is 'Inconel 718' meant?")
     ):
@@ -158,7 +158,7 @@ def test_the_page_holds_what_the_tables_hold() -> None:
     assert [a[1] for a, b in pairwise(shown) if a[1] != b[1]] == list("PMKNS")
 
 
-def as_row(known: Coefficients) -> list[str]:
+def as_row(known: CuttingCoefficients) -> list[str]:
     low, high = (round(limit / 1e6) for limit in known.tangential_range or (0, 0))
     least, most = known.ratio_range or (0, 0)
     laws = ", ".join(f"{force.at_1_mm / 1e6:.0f} / {force.exponent:.2f}" for force in known.specific_forces)

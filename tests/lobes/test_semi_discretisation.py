@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from acquisition import Frf
-from lobes import Cut, radial_lobes, spectral_radius, stability_boundary, zero_order
-from lobes.program import Modes
+from lobes import Cut, radial_lobes, spectral_radius, stability_boundary, zero_order_lobes
+from lobes.cut import DirectionModes
 from lobes.tooth_force import mean_force
 from modal import Mode
 
@@ -173,7 +173,7 @@ def test_a_very_stiff_direction_is_a_rigid_one() -> None:
 def test_a_tiny_helix_is_none_and_a_whole_lag_leaves_the_mean_force() -> None:
     straight = spectral_radius(X, Y, CUT, SPEEDS, 2e-3)
     np.testing.assert_allclose(spectral_radius(X, Y, replace(CUT, helix_lag=1e-3), SPEEDS, 2e-3), straight, rtol=1e-5)
-    depth = zero_order(X, Y, CUT, SPEEDS).depth
+    depth = zero_order_lobes(X, Y, CUT, SPEEDS).depth
     for speed, limit in zip(SPEEDS, depth, strict=True):
         pitch = replace(CUT, helix_lag=2 * np.pi / (3 * limit))
         radius = spectral_radius(X, Y, pitch, speed, limit)
@@ -191,7 +191,7 @@ def test_the_island_between_two_scanned_depths_is_found() -> None:
 def test_pieces_follow_the_fastest_mode_that_can_chatter() -> None:
     slow, fast = (stability_boundary(X, Y, CUT, speed, 2e-3) for speed in (500.0, 8000.0))
     assert slow.method == "semi-discretisation"
-    assert slow.stated_method == f"semi-discretisation, {slow.detail}"
+    assert slow.method_text == f"semi-discretisation, {slow.detail}"
     cycles = 1450 * 60 / (3 * 500)
     assert int(slow.detail.split()[0]) == pytest.approx(cycles / 0.75, rel=0.01)
     assert int(fast.detail.split()[0]) == pytest.approx(cycles / 12, abs=1)
@@ -203,7 +203,7 @@ ROBOT, TOOL = Mode(18.0, 0.015, 8e5), Mode(2500.0, 0.035, 4e7)
 WALL = Mode(240.0, 0.008, 6e5)
 
 
-def limit_of_a_constant_force(x: Modes, y: Modes, cut: Cut, speed: float) -> float:
+def limit_of_a_constant_force(x: DirectionModes, y: DirectionModes, cut: Cut, speed: float) -> float:
     """Lowest b with det(I + b (1 - exp(-i w tau)) H G(w)) = 0 by a dense scan over w, H constant."""
     f = np.linspace(1.0, 6000.0, 3_000_001)
     loop = np.zeros((f.size, 2, 2), dtype=complex)
@@ -227,7 +227,7 @@ def limit_of_a_constant_force(x: Modes, y: Modes, cut: Cut, speed: float) -> flo
     ("x", "y"), [([TOOL], [ROBOT]), ([ROBOT, TOOL], None), ([TOOL, WALL], [ROBOT, TOOL]), ([WALL], [TOOL])]
 )
 def test_a_soft_slow_mode_does_not_hide_the_fast_one_that_chatters(
-    x: list[Mode], y: Modes, coefficients: tuple[float, float]
+    x: list[Mode], y: DirectionModes, coefficients: tuple[float, float]
 ) -> None:
     """Robots and thin walls: 18 and 240 Hz beside 2500 Hz. The force of four teeth in a slot is constant."""
     cut = Cut(4, 1.0, "down", *coefficients)
@@ -240,7 +240,7 @@ def test_limits_over_radial_depth() -> None:
     np.testing.assert_array_equal(found.depth[1], stability_boundary(X, Y, CUT, SPEEDS, 10e-3).depth)
     np.testing.assert_array_equal(found.speed_rpm, SPEEDS)
     assert (found.depth.shape, found.remarks) == ((2, 4), ())
-    mean = radial_lobes(lambda cut: zero_order(X, Y, cut, SPEEDS), CUT, [0.4, 0.2])
+    mean = radial_lobes(lambda cut: zero_order_lobes(X, Y, cut, SPEEDS), CUT, [0.4, 0.2])
     (remark,) = mean.remarks
     assert remark.code == "low-immersion"
     assert "immersion 0.2" in remark.text
@@ -274,4 +274,4 @@ def test_bad_deepest_depths_are_refused(depth: float) -> None:
 @pytest.mark.parametrize("immersion", [0.0, 1.1, [], [[0.5]]])
 def test_bad_immersions_are_refused(immersion: Any) -> None:
     with pytest.raises(ValueError, match="immersion"):
-        radial_lobes(lambda cut: zero_order(X, Y, cut, SPEEDS), CUT, immersion)
+        radial_lobes(lambda cut: zero_order_lobes(X, Y, cut, SPEEDS), CUT, immersion)

@@ -9,14 +9,14 @@ import pytest
 
 from lobes import (
     TOOL_MATERIALS,
-    Coefficients,
+    CuttingCoefficients,
     PublishedRange,
-    cut_kind,
-    cutting_speed,
-    fastest_of_all,
-    feed_per_tooth,
-    folded_name,
+    classify_cut,
+    fold_material_name,
     materials_by_name,
+    published_cutting_speed,
+    published_feed_per_tooth,
+    published_speed_of_any_tool,
 )
 from lobes.tool_data import published_rows
 
@@ -34,8 +34,8 @@ GROUPS = {
 DIAMETERS = (0.006, 0.012, 0.020)
 
 
-def named(name: str) -> Coefficients:
-    return materials_by_name()[folded_name(name)]
+def named(name: str) -> CuttingCoefficients:
+    return materials_by_name()[fold_material_name(name)]
 
 
 def m_min(speed: PublishedRange | None) -> tuple[float, float] | None:
@@ -55,35 +55,39 @@ def test_each_row_is_a_range_with_its_source() -> None:
 
 
 def test_the_range_lies_over_all_sources_of_the_group() -> None:
-    speed = cutting_speed(named("42CrMo4"), "coated carbide", "side")
+    speed = published_cutting_speed(named("42CrMo4"), "coated carbide", "side")
     assert m_min(speed) == pytest.approx((70, 300))
     assert speed is not None
     assert len(speed.sources) == 4
 
 
 def test_one_number_is_taken_to_be_off_by_a_quarter() -> None:
-    assert m_min(cutting_speed(named("EN-GJL-250"), "carbide", "slot")) == pytest.approx((0.75 * 57, 1.25 * 57))
+    assert m_min(published_cutting_speed(named("EN-GJL-250"), "carbide", "slot")) == pytest.approx(
+        (0.75 * 57, 1.25 * 57)
+    )
 
 
 def test_titanium_and_nickel_are_of_one_group_and_cut_at_different_speeds() -> None:
-    titanium, nickel = (m_min(cutting_speed(named(name), "coated carbide", "side")) for name in ("TiAl6V4", "2.4668"))
+    titanium, nickel = (
+        m_min(published_cutting_speed(named(name), "coated carbide", "side")) for name in ("TiAl6V4", "2.4668")
+    )
     assert titanium == pytest.approx((40, 90))
     assert nickel == pytest.approx((18, 45))
 
 
 def test_what_nobody_publishes_is_not_known() -> None:
-    assert cutting_speed(named("42CrMo4"), "PCD", "side") is None
-    assert cutting_speed(named("100Cr6 hardened"), "HSS", "slot") is None
-    assert cutting_speed(Coefficients("mine", 2e9, 5e8), "carbide", "slot") is None
-    assert feed_per_tooth(Coefficients("mine", 2e9, 5e8), "carbide", "slot", 0.01) is None
+    assert published_cutting_speed(named("42CrMo4"), "PCD", "side") is None
+    assert published_cutting_speed(named("100Cr6 hardened"), "HSS", "slot") is None
+    assert published_cutting_speed(CuttingCoefficients("mine", 2e9, 5e8), "carbide", "slot") is None
+    assert published_feed_per_tooth(CuttingCoefficients("mine", 2e9, 5e8), "carbide", "slot", 0.01) is None
 
 
 def test_no_tool_is_faster_than_the_fastest() -> None:
     for name in GROUPS.values():
         for cut in ("slot", "side"):
-            fastest = fastest_of_all(named(name), cut)
+            fastest = published_speed_of_any_tool(named(name), cut)
             assert fastest is not None
-            speeds = [cutting_speed(named(name), tool, cut) for tool in TOOL_MATERIALS]
+            speeds = [published_cutting_speed(named(name), tool, cut) for tool in TOOL_MATERIALS]
             assert max(speed.high for speed in speeds if speed) == fastest.high
             assert fastest.low == 0.0
 
@@ -92,7 +96,7 @@ def test_a_feed_lies_on_a_line_between_the_diameters_of_a_source_and_on_one_to_z
     steel = named("42CrMo4")
 
     def feed(diameter: float) -> tuple[float, float]:
-        known = feed_per_tooth(steel, "coated carbide", "slot", diameter)
+        known = published_feed_per_tooth(steel, "coated carbide", "slot", diameter)
         assert known is not None
         return known.low * 1e3, known.high * 1e3
 
@@ -105,13 +109,13 @@ def test_a_feed_lies_on_a_line_between_the_diameters_of_a_source_and_on_one_to_z
 def test_a_feed_published_as_a_share_of_the_diameter_grows_with_it() -> None:
     nickel = named("2.4668")
     for diameter in DIAMETERS:
-        feed = feed_per_tooth(nickel, "coated carbide", "side", diameter)
+        feed = published_feed_per_tooth(nickel, "coated carbide", "side", diameter)
         assert feed is not None
         assert (feed.low, feed.high) == pytest.approx((0.002 * diameter, 0.004 * diameter))
 
 
 def test_a_cut_from_two_fifths_of_the_diameter_on_is_a_slot() -> None:
-    assert [cut_kind(immersion) for immersion in (0.05, 0.39, 0.4, 1.0)] == ["side", "side", "slot", "slot"]
+    assert [classify_cut(immersion) for immersion in (0.05, 0.39, 0.4, 1.0)] == ["side", "side", "slot", "slot"]
 
 
 def test_the_page_holds_what_the_tables_hold() -> None:
@@ -132,8 +136,8 @@ def page_rows() -> list[list[str]]:
     for group, name in GROUPS.items():
         for tool in TOOL_MATERIALS:
             for cut in ("slot", "side"):
-                speed = m_min(cutting_speed(named(name), tool, cut))
-                feeds = [feed_per_tooth(named(name), tool, cut, diameter) for diameter in DIAMETERS]
+                speed = m_min(published_cutting_speed(named(name), tool, cut))
+                feeds = [published_feed_per_tooth(named(name), tool, cut, diameter) for diameter in DIAMETERS]
                 if speed:
                     shown = ["-" if feed is None else f"{feed.low * 1e3:.3f}..{feed.high * 1e3:.3f}" for feed in feeds]
                     rows.append([group, tool, cut, f"{rounded(speed[0])}..{rounded(speed[1])}", *shown])

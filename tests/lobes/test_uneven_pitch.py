@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobes import Cut, average_angle, spectral_radius, stability_boundary, zero_order
-from lobes.uneven_limits import uneven_limits
+from lobes import Cut, average_angle_lobes, spectral_radius, stability_boundary, zero_order_lobes
+from lobes.loop_limits import uneven_limits
 from modal import Mode
 
 X, Y = [Mode(1500.0, 0.03, 20e6)], [Mode(1575.0, 0.028, 22e6)]
@@ -70,9 +70,11 @@ def test_order_of_the_pitches_matters() -> None:
 def test_pitches_that_hardly_differ_are_almost_even() -> None:
     almost = with_pitch(EVEN, 89.99, 90.01, 89.99, 90.01)
     assert limits(almost) == pytest.approx(limits(EVEN), rel=2e-3)
-    assert zero_order(X, Y, almost, SPEEDS).depth == pytest.approx(zero_order(X, Y, EVEN, SPEEDS).depth, rel=2e-3)
-    assert average_angle(X, None, almost, SPEEDS).depth == pytest.approx(
-        average_angle(X, None, EVEN, SPEEDS).depth, rel=2e-3
+    assert zero_order_lobes(X, Y, almost, SPEEDS).depth == pytest.approx(
+        zero_order_lobes(X, Y, EVEN, SPEEDS).depth, rel=2e-3
+    )
+    assert average_angle_lobes(X, None, almost, SPEEDS).depth == pytest.approx(
+        average_angle_lobes(X, None, EVEN, SPEEDS).depth, rel=2e-3
     )
 
 
@@ -90,7 +92,7 @@ def test_chatter_sounds_near_a_natural_frequency() -> None:
 def test_zero_order_closes_the_loop_of_the_mean_force() -> None:
     """One direction: 1 + b H0 G (1 - exp(-i w tau)) = 0 in the mean over the teeth, at each limit."""
     cut = with_pitch(replace(EVEN, teeth=3), 100, 120, 140)
-    chart = zero_order(X, None, cut, SPEEDS)
+    chart = zero_order_lobes(X, None, cut, SPEEDS)
     force = 3 / (2 * math.pi) * 240e6 * math.pi / 2
     mode = X[0]
     ratio = chart.chatter_frequency / mode.frequency
@@ -101,7 +103,7 @@ def test_zero_order_closes_the_loop_of_the_mean_force() -> None:
 
 
 def test_zero_order_of_uneven_teeth_has_no_lobes() -> None:
-    assert zero_order(X, Y, with_pitch(EVEN, 80, 90, 95, 95), SPEEDS).lobes == ()
+    assert zero_order_lobes(X, Y, with_pitch(EVEN, 80, 90, 95, 95), SPEEDS).lobes == ()
 
 
 def test_a_loop_that_is_never_negative_has_no_limit() -> None:

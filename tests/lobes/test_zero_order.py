@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import Frf
-from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
+from lobes import Cut, StabilityLobes, average_angle_lobes, stability_boundary, zero_order_lobes
 from lobes.tooth_force import mean_force
 from modal import Mode
 
@@ -39,12 +39,12 @@ def test_directional_coefficients() -> None:
 
 @pytest.mark.parametrize(("speed", "depth_mm"), [(4000, 1.4193), (7000, 1.4614), (10000, 1.3396), (13000, 5.1905)])
 def test_limits_of_half_immersion(speed: float, depth_mm: float) -> None:
-    assert zero_order(X, Y, CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
-    assert zero_order(frf(X), frf(Y), CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
+    assert zero_order_lobes(X, Y, CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
+    assert zero_order_lobes(frf(X), frf(Y), CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
 
 
 def test_lowest_limit_of_half_immersion() -> None:
-    low = zero_order(X, Y, CUT, np.linspace(5000, 5050, 5001)).minimum
+    low = zero_order_lobes(X, Y, CUT, np.linspace(5000, 5050, 5001)).minimum
     assert low.depth * 1e3 == pytest.approx(1.08683, abs=5e-6)
     assert low.chatter_frequency == pytest.approx(632.978, abs=0.01)
     assert low.speed_rpm == pytest.approx(5022.36, abs=0.1)
@@ -57,7 +57,7 @@ def test_lowest_limit_of_half_immersion() -> None:
 def test_lowest_limit_of_the_milling_benchmark(
     immersion: float, speeds: tuple[float, float], depth_mm: float, chatter: float
 ) -> None:
-    low = zero_order(BENCHMARK, None, Cut(2, immersion, "down", 6e8, 2e8), np.linspace(*speeds, 10001)).minimum
+    low = zero_order_lobes(BENCHMARK, None, Cut(2, immersion, "down", 6e8, 2e8), np.linspace(*speeds, 10001)).minimum
     assert low.depth * 1e3 == pytest.approx(depth_mm, abs=5e-7)
     assert low.chatter_frequency == pytest.approx(chatter, abs=0.01)
 
@@ -72,7 +72,7 @@ def test_lowest_limit_of_the_milling_benchmark(
 def test_the_loop_closes_at_the_limit(immersion: float, direction: str, speed: float, radial: float) -> None:
     """det(I + b (1 - exp(-2 pi i f/f_t)) H0 G(f)) = 0."""
     cut = Cut(3, immersion, "up" if direction == "up" else "down", 6e8, radial)
-    found = zero_order(X, Y, cut, speed)
+    found = zero_order_lobes(X, Y, cut, speed)
     f = found.chatter_frequency
     receptance = np.diag([X[0].receptance(f)[0], Y[0].receptance(f)[0]])
     loop = found.depth[0] * (1 - np.exp(-120j * np.pi * f[0] / (3 * speed))) * mean_force(cut) @ receptance
@@ -119,20 +119,20 @@ def test_the_lowest_limit_is_found_where_the_modes_of_x_and_y_lie_far_apart() ->
         x, y = ([random_mode(random) for _ in range(random.integers(1, 3))] for _ in range(2))
         cut = Cut(4, 1.0, "down", 6e8, random.uniform(6e7, 4e8))
         speed = float(np.exp(random.uniform(np.log(800), np.log(20000))))
-        limit = zero_order(x, y, cut, speed).depth[0]
+        limit = zero_order_lobes(x, y, cut, speed).depth[0]
         assert limit == pytest.approx(lowest_in_a_dense_scan(x, y, cut, speed), rel=2e-3), (x, y, cut, speed)
 
 
 @pytest.mark.parametrize("measured", [False, True])
 def test_a_fast_tool_on_a_slow_column(measured: bool) -> None:
-    found = zero_order(frf(TOOL) if measured else TOOL, COLUMN, FOUR_TEETH, 3000.0)
+    found = zero_order_lobes(frf(TOOL) if measured else TOOL, COLUMN, FOUR_TEETH, 3000.0)
     exact = stability_boundary(TOOL, COLUMN, FOUR_TEETH, 3000.0, 0.05)
     assert found.depth == pytest.approx(exact.depth, rel=1e-4)
     assert found.depth[0] == pytest.approx(lowest_in_a_dense_scan(TOOL, COLUMN, FOUR_TEETH, 3000.0), rel=1e-4)
     assert found.chatter_frequency == pytest.approx(exact.chatter_frequency, rel=1e-4)
 
 
-@pytest.mark.parametrize("method", [zero_order, average_angle])
+@pytest.mark.parametrize("method", [zero_order_lobes, average_angle_lobes])
 def test_a_slow_direction_that_hardly_gives_way_changes_nothing(method: Callable[..., StabilityLobes]) -> None:
     stiff = [Mode(3.0, 0.015, 1e14)]
     alone, beside = method(TOOL, None, CUT, SPEEDS), method(TOOL, stiff, CUT, SPEEDS)
@@ -142,15 +142,17 @@ def test_a_slow_direction_that_hardly_gives_way_changes_nothing(method: Callable
 
 def test_a_slot_is_unchanged_when_x_and_y_are_exchanged() -> None:
     slot = Cut(3, 1.0, "up", 6e8, 2e8)
-    np.testing.assert_allclose(zero_order(X, Y, slot, SPEEDS).depth, zero_order(Y, X, slot, SPEEDS).depth, rtol=1e-9)
+    np.testing.assert_allclose(
+        zero_order_lobes(X, Y, slot, SPEEDS).depth, zero_order_lobes(Y, X, slot, SPEEDS).depth, rtol=1e-9
+    )
 
 
 def test_depth_goes_with_stiffness_and_speeds_with_frequency() -> None:
-    base = zero_order(X, Y, CUT, SPEEDS)
+    base = zero_order_lobes(X, Y, CUT, SPEEDS)
     x, y = ([Mode(m.frequency, m.damping_ratio, 3 * m.stiffness) for m in modes] for modes in (X, Y))
-    np.testing.assert_allclose(zero_order(x, y, CUT, SPEEDS).depth, 3 * base.depth, rtol=1e-6)
+    np.testing.assert_allclose(zero_order_lobes(x, y, CUT, SPEEDS).depth, 3 * base.depth, rtol=1e-6)
     x, y = ([Mode(1.7 * m.frequency, m.damping_ratio, m.stiffness) for m in modes] for modes in (X, Y))
-    again = zero_order(x, y, CUT, 1.7 * SPEEDS)
+    again = zero_order_lobes(x, y, CUT, 1.7 * SPEEDS)
     np.testing.assert_allclose(again.depth, base.depth, rtol=1e-6)
     np.testing.assert_allclose(again.chatter_frequency, 1.7 * base.chatter_frequency, rtol=1e-6)
 
@@ -158,7 +160,7 @@ def test_depth_goes_with_stiffness_and_speeds_with_frequency() -> None:
 def test_one_direction_of_a_slot_is_the_average_angle_with_its_mean_share() -> None:
     """H0_xx = N Kr / 4 in a slot, mu_x Ks Nt* = N Kr / 2: the mean of sin^2 is half its largest value."""
     slot = Cut(3, 1.0, "up", 6e8, 2e8)
-    one, other = zero_order(X, None, slot, SPEEDS), average_angle(X, None, slot, SPEEDS)
+    one, other = zero_order_lobes(X, None, slot, SPEEDS), average_angle_lobes(X, None, slot, SPEEDS)
     np.testing.assert_allclose(one.depth, 2 * other.depth, rtol=1e-9)
 
 
@@ -167,7 +169,7 @@ def test_many_teeth_make_it_exact() -> None:
     cut = Cut(24, 1.0, "up", 6e8, 2e8)
     speeds = np.array([500.0, 700.0, 1100.0, 1600.0])
     exact = stability_boundary(X, Y, cut, speeds, 2e-3)
-    mean = zero_order(X, Y, cut, speeds)
+    mean = zero_order_lobes(X, Y, cut, speeds)
     np.testing.assert_allclose(mean.depth, exact.depth, rtol=2e-3)
     np.testing.assert_allclose(mean.chatter_frequency, exact.chatter_frequency, rtol=1e-3)
 
@@ -178,16 +180,16 @@ def codes(found: StabilityLobes) -> list[str]:
 
 def test_low_immersion_is_warned_of() -> None:
     low = Cut(2, 0.1, "down", 6e8, 2e8)
-    for method in (zero_order, average_angle):
+    for method in (zero_order_lobes, average_angle_lobes):
         (remark,) = method(BENCHMARK, None, low, 18000).remarks
         assert (remark.code, remark.cure) == ("low-immersion", "use semi-discretisation")
-    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).remarks == ()
+    assert zero_order_lobes(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).remarks == ()
     assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).remarks == ()
 
 
 @pytest.mark.parametrize("band", [(10.0, 590.0), (700.0, 3000.0)])
 def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, float]) -> None:
-    for method in (zero_order, average_angle):
+    for method in (zero_order_lobes, average_angle_lobes):
         short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
         (remark,) = short.remarks
         assert remark.code == "chatter-band-missing"
@@ -201,12 +203,12 @@ def test_fast_teeth_are_warned_of_where_flip_lobes_make_the_limit_lower(directio
     mode, speeds = [Mode(1713.0, 0.029, 3.5e7)], np.linspace(24000.0, 64000.0, 40)
     for immersion, far_off in ((0.35, True), (0.5, True), (0.7, True), (1.0, False)):
         cut = Cut(4, immersion, direction, 1400e6, 500e6)
-        mean = zero_order(mode, None, cut, speeds)
+        mean = zero_order_lobes(mode, None, cut, speeds)
         deepest = 6 * mean.minimum.depth
         true = stability_boundary(mode, None, cut, speeds, deepest).depth
         assert bool(np.any(np.minimum(mean.depth, deepest) > 1.1 * true)) == far_off
         assert ("fast-teeth" in codes(mean), "above 1" in str(mean.remarks)) == (far_off, far_off)
-        assert "fast-teeth" not in codes(zero_order(mode, None, cut, speeds / 6))
+        assert "fast-teeth" not in codes(zero_order_lobes(mode, None, cut, speeds / 6))
 
 
 @pytest.mark.parametrize(
@@ -220,22 +222,22 @@ def test_a_force_that_cancels_in_the_one_direction_known_is_warned_of(
     x, y = (modes, None) if axis == "x" else (None, modes)
     cut = Cut(4, immersion, direction, 8e8, 2.4e8)
     speeds = np.linspace(2500.0, 7000.0, 20)
-    found = zero_order(x, y, cut, speeds)
+    found = zero_order_lobes(x, y, cut, speeds)
     true = stability_boundary(x, y, cut, speeds, 6 * found.minimum.depth)
     too_deep = np.max(np.minimum(found.depth, 6 * found.minimum.depth) / true.depth)
     assert ("force-cancels" in codes(found)) == is_warned
     assert (f"of the force in {axis}" in str(found.remarks)) == is_warned
     assert (too_deep > 1.2) == is_warned
-    assert "force-cancels" not in codes(zero_order(modes, modes, cut, speeds))
+    assert "force-cancels" not in codes(zero_order_lobes(modes, modes, cut, speeds))
 
 
 def test_a_cancelling_force_is_warned_of_at_every_speed_also_where_fast_teeth_are() -> None:
     """Zero order's limit is more than 10 times the true one far below the speeds of the flip lobes."""
     modes, cut = [Mode(1722.0, 0.029, 3.2e7)], Cut(4, 0.75, "down", 7e8, 2.1e8)
-    fast = zero_order(modes, None, cut, np.linspace(4000.0, 20000.0, 20))
+    fast = zero_order_lobes(modes, None, cut, np.linspace(4000.0, 20000.0, 20))
     assert codes(fast) == ["force-cancels", "fast-teeth"]
     assert "of the force in x" in fast.remarks[0].text
     assert "no flip lobes: above 1" in fast.remarks[1].text
-    slow = zero_order(modes, None, cut, np.linspace(4000.0, 5000.0, 5))
+    slow = zero_order_lobes(modes, None, cut, np.linspace(4000.0, 5000.0, 5))
     true = stability_boundary(modes, None, cut, slow.speed_rpm, float(np.min(slow.depth)) / 10)
     assert np.max(true.depth) < np.min(slow.depth) / 10

@@ -8,11 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import UNSAID, Circumstances, Conditions, TapDirection, TapTest, from_accelerance, new_tap_id
+from acquisition import (
+    UNKNOWN_CONDITIONS,
+    Circumstances,
+    Conditions,
+    TapDirection,
+    TapTest,
+    from_accelerance,
+    new_tap_id,
+)
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -83,14 +91,14 @@ class Shop:
         tool: str = "reference",
         stiffness: float = 3.5e7,
         damping_ratio: float = 0.029136,
-        conditions: Conditions = UNSAID,
+        conditions: Conditions = UNKNOWN_CONDITIONS,
         operator: str = "",
     ) -> str:
         """A tap test without noise, so many days after the start; its identity."""
         when = START + timedelta(days=days)
         text = (self.path / "machine.toml").read_text("utf-8")
         about = Circumstances("m", when, tool, direction, operator, text, conditions=conditions)
-        frf = synthesize([Mode(frequency, damping_ratio, stiffness)], LINES)
+        frf = synthesize_frf([Mode(frequency, damping_ratio, stiffness)], LINES)
         tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance))
         self.folder.commit(tap)
         return tap.id

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal import Mode, fit_modes, pick_peaks, synthesize
+from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
-GOOD = synthesize([Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.02, -4e7)], LINES)
+GOOD = synthesize_frf([Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.02, -4e7)], LINES)
 
 Extraction = Callable[..., list[Mode]]
 both = pytest.mark.parametrize("extract", [fit_modes, pick_peaks])
@@ -43,7 +43,7 @@ def test_band_without_lines(extract: Extraction, band: tuple[float, float]) -> N
 @both
 @pytest.mark.parametrize("modes", [[Mode(1722.0, 0.03, 3.5e7)], [Mode(700.0, 0.005, -3e7), Mode(1722.0, 0.03, 3.5e7)]])
 def test_conjugated_frf_is_refused(extract: Extraction, modes: list[Mode]) -> None:
-    frf = synthesize(modes, LINES)
+    frf = synthesize_frf(modes, LINES)
     with pytest.raises(ValueError, match=r"phase rises .* conjugate of receptance"):
         extract(Frf(LINES, frf.receptance.conj()))
     assert len(extract(Frf(LINES, frf.receptance))) == len(modes)
@@ -72,7 +72,7 @@ def test_values_that_are_none_are_refused_by_the_frf() -> None:
 @both
 def test_line_at_zero_hertz_is_left_out(extract: Extraction) -> None:
     lines = np.arange(0.0, 4000.0, 5.0)
-    static = synthesize([Mode(1722.0, 0.03, 3.5e7)], lines)
+    static = synthesize_frf([Mode(1722.0, 0.03, 3.5e7)], lines)
     (with_zero,), (without,) = extract(static), extract(Frf(lines[1:], static.receptance[1:]))
     assert with_zero.stiffness == pytest.approx(without.stiffness, rel=1e-12)
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, fit_modes, pick_peaks, synthesize
-from modal.fitting import LEAST_TERMS, fit_band, gain_of_a_pair
+from modal import Mode, fit_modes, pick_peaks, synthesize_frf
+from modal.fitting import MIN_RESIDUAL_TERMS, fit_band, mode_pair_gain
 
 LINES = np.arange(5.0, 6000.0, 5.0)
 NEIGHBOURS = [Mode(900.0, 0.03, 4e7), Mode(2900.0, 0.03, 3e7)]
@@ -20,7 +20,7 @@ def pair(ratio: float, damping: float = 0.03) -> list[Mode]:
 
 def noisy(modes: list[Mode], level: float, seed: int) -> Frf:
     """Noise of level times the largest accelerance on each line."""
-    exact = synthesize([*modes, *NEIGHBOURS], LINES).accelerance
+    exact = synthesize_frf([*modes, *NEIGHBOURS], LINES).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
     return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])
 
@@ -41,7 +41,7 @@ def values(modes: list[Mode]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("ratio", [1.02, 1.03, 1.05])
 def test_without_noise_both_are_found_to_many_digits(ratio: float, damping: float) -> None:
     true = pair(ratio, damping)
-    found = fit_modes(synthesize(true, LINES))
+    found = fit_modes(synthesize_frf(true, LINES))
     assert values(found) == pytest.approx(values(true), rel=1e-6)
 
 
@@ -92,15 +92,15 @@ def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_said() -> None
 @pytest.mark.parametrize("turn", [1.0, 1j])
 def test_the_gain_of_a_pair_is_what_a_mode_leaves_of_two_near_each_other(turn: complex) -> None:
     line, weight = np.arange(1300.0, 2200.0, 5.0), np.ones((1, 180))
-    own = turn * synthesize([Mode(1740.0, 0.03, 4e7), Mode(1756.0, 0.033, 3e7)], line).receptance[np.newaxis] * 1e9
+    own = turn * synthesize_frf([Mode(1740.0, 0.03, 4e7), Mode(1756.0, 0.033, 3e7)], line).receptance[np.newaxis] * 1e9
     fit = fit_band(line, own, weight, np.array([[1745.0], [0.03]]))
     assert fit is not None
-    assert 0.95 < gain_of_a_pair(fit, line, weight, LEAST_TERMS, 0) / fit.sum_of_squares <= 1
+    assert 0.95 < mode_pair_gain(fit, line, weight, MIN_RESIDUAL_TERMS, 0) / fit.sum_of_squares <= 1
 
 
 def test_opposite_constants_are_told_apart_too() -> None:
     true = [Mode(1722.0, 0.03, 3.5e7), Mode(1790.0, 0.03, -5e7)]
-    assert values(fit_modes(synthesize(true, LINES))) == pytest.approx(values(true), rel=1e-6)
+    assert values(fit_modes(synthesize_frf(true, LINES))) == pytest.approx(values(true), rel=1e-6)
 
 
 def test_one_mode_is_not_taken_for_two() -> None:
@@ -110,4 +110,4 @@ def test_one_mode_is_not_taken_for_two() -> None:
 
 def test_three_modes_in_one_peak() -> None:
     true = [Mode(1700.0, 0.02, 4e7), Mode(1740.0, 0.02, 5e7), Mode(1790.0, 0.02, 4e7)]
-    assert values(fit_modes(synthesize(true, LINES))) == pytest.approx(values(true), rel=1e-5)
+    assert values(fit_modes(synthesize_frf(true, LINES))) == pytest.approx(values(true), rel=1e-5)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, fit_modes, synthesize
+from modal import Mode, fit_modes, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 NOISE = 0.002
@@ -19,7 +19,7 @@ LEAST = {0: 0.92, 1: 0.90, 3: 0.90, 10: 0.92, 30: 0.92}
 
 
 def measured(modes: list[Mode], seed: int) -> Frf:
-    exact = synthesize(modes, LINES).accelerance
+    exact = synthesize_frf(modes, LINES).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2) * NOISE * np.max(np.abs(exact))
     return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])
 
@@ -35,7 +35,7 @@ def are_held(mode: Mode, truth: Mode) -> NDArray[np.bool_]:
     off = [
         getattr(mode, name) - getattr(truth, name) for name in ("frequency", "damping_ratio", "stiffness", "phase_deg")
     ]
-    return np.asarray(np.abs(off) < t.ppf(0.975, mode.freedom) * error)
+    return np.asarray(np.abs(off) < t.ppf(0.975, mode.degrees_of_freedom) * error)
 
 
 @pytest.mark.long
@@ -65,13 +65,13 @@ def test_a_complex_constant_is_found_with_its_error(phase: float) -> None:
 
 def test_without_noise_it_is_exact() -> None:
     truth = [Mode(900.0, 0.02, -4e7, phase_deg=-80.0), *structure(30.0, neighbour=True)]
-    found = fit_modes(synthesize(truth, LINES))
+    found = fit_modes(synthesize_frf(truth, LINES))
     for mode, true in zip(found, truth, strict=True):
         assert mode.frequency == pytest.approx(true.frequency, rel=1e-7)
         assert mode.damping_ratio == pytest.approx(true.damping_ratio, rel=1e-5)
         assert mode.stiffness == pytest.approx(true.stiffness, rel=1e-5)
         assert mode.phase_deg == pytest.approx(true.phase_deg, abs=1e-3)
-    assert synthesize(found, LINES).receptance == pytest.approx(synthesize(truth, LINES).receptance, rel=1e-4)
+    assert synthesize_frf(found, LINES).receptance == pytest.approx(synthesize_frf(truth, LINES).receptance, rel=1e-4)
 
 
 @pytest.mark.parametrize("phase", [90.0, -90.0])
@@ -99,12 +99,12 @@ def test_one_line_in_a_mode_makes_no_phase_up() -> None:
 def test_two_modes_a_percent_apart_with_opposite_phases() -> None:
     truth = [Mode(1500.0, 0.01, 6e7, phase_deg=40.0), Mode(1515.0, 0.01, 6e7, phase_deg=-40.0)]
     lines = np.arange(1.0, 4000.0)
-    exact = synthesize(truth, lines).accelerance
+    exact = synthesize_frf(truth, lines).accelerance
     noise = np.random.default_rng(0).normal(size=(2, lines.size)) * 1e-3 * np.max(np.abs(exact))
     found = fit_modes(from_accelerance(lines, exact + noise[0] + 1j * noise[1]))
-    both = synthesize(found, lines).receptance
+    both = synthesize_frf(found, lines).receptance
     near = np.abs(lines - 1507) < 60
-    assert np.max(np.abs(both - synthesize(truth, lines).receptance)[near]) < 0.02 * np.max(np.abs(both))
+    assert np.max(np.abs(both - synthesize_frf(truth, lines).receptance)[near]) < 0.02 * np.max(np.abs(both))
     if len(found) == 2:
         for mode, true in zip(found, truth, strict=True):
             assert abs(mode.phase_deg - true.phase_deg) < 5 * mode.phase_deg_std
@@ -125,7 +125,7 @@ def test_errors_of_all_four_values_go_together(phase: float) -> None:
 def test_standard_errors_of_a_heavily_damped_complex_mode_are_its_scatter() -> None:
     """zeta 0.2, 50 degrees: half of the slope of the turned part counts, which a lightly damped mode hardly shows."""
     lines, truth = np.arange(5.0, 6000.0, 5.0), Mode(1500.0, 0.2, 3e7, phase_deg=50.0)
-    exact = synthesize([truth], lines).accelerance
+    exact = synthesize_frf([truth], lines).accelerance
     values, errors = [], []
     for seed in range(150):
         noise = np.random.default_rng(seed).normal(size=(2, lines.size)) / np.sqrt(2) * 1e-4 * np.max(np.abs(exact))

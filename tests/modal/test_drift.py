@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf, Remark
-from modal import Mode, believed, fit_modes, predominant, synthesize
+from modal import Mode, fit_modes, predominant_mode, select_credible_modes, synthesize_frf
 
 TRUE, OTHER = Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.03, 8e7)
 
@@ -21,14 +21,14 @@ def drifting(random: np.random.Generator) -> Frf:
         drift = drift * (1j * f / (1j * f + 10 ** random.uniform(-0.5, 0.5))) ** random.integers(1, 3)
     noise = 1e-3 * np.abs(TRUE.receptance(np.array([1500.0]))) * random.standard_normal((2, f.size))
     modes = [TRUE, OTHER][: random.integers(1, 3)]
-    return Frf(f, synthesize(modes, f).receptance + drift + noise[0] + 1j * noise[1])
+    return Frf(f, synthesize_frf(modes, f).receptance + drift + noise[0] + 1j * noise[1])
 
 
 def followed(count: int, seed: int) -> tuple[int, list[Mode]]:
     """How often the true mode is the one to follow, and what is followed instead."""
     random, right, wrong = np.random.default_rng(seed), 0, list[Mode]()
     for _ in range(count):
-        mode = predominant(believed(fit_modes(drifting(random))).modes)
+        mode = predominant_mode(select_credible_modes(fit_modes(drifting(random))).modes)
         if mode is not None:
             is_true = abs(mode.frequency / 1500 - 1) < 5e-3 and abs(mode.stiffness / 3e7 - 1) < 0.05
             right, wrong = right + is_true, [*wrong, *([] if is_true else [mode])]
@@ -65,9 +65,9 @@ def test_a_drift_against_the_phase_of_a_mode_does_not_hide_it() -> None:
     ],
 )
 def test_what_is_not_believed_is_said_with_its_reason(mode: Mode, code: str, words: str) -> None:
-    found = believed([mode, TRUE, Mode(1900.0, 0.01, -3e7)])
+    found = select_credible_modes([mode, TRUE, Mode(1900.0, 0.01, -3e7)])
     assert [one.frequency for one in found.modes] == [1500.0]
-    assert [one.frequency for one in found.against] == [1900.0]
+    assert [one.frequency for one in found.opposed] == [1900.0]
     (remark,) = found.remarks
     assert (remark.code, remark.about) == (code, f"{mode.frequency:.4g} Hz")
     assert words in remark.text

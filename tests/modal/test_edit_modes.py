@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from acquisition import Frf, from_accelerance
-from modal import Extraction, Mode, ModeEdits, Trust, edit_modes, extract, modes_of, parse_edits, synthesize, trust_of
+from modal import (
+    Extraction,
+    Mode,
+    ModeEdits,
+    Trust,
+    assess_trust,
+    edit_modes,
+    extract_modes,
+    modes_from_extraction,
+    parse_mode_edits,
+    synthesize_frf,
+)
 
 LINES = np.arange(10.0, 3200.0, 2.0)
 STRONG = Mode(1500.0, 0.03, 3e7)
@@ -16,13 +27,13 @@ OTHER = Mode(298.0, 0.01, 2e8)
 
 def measured(modes: list[Mode], noise: float = 0.002, seed: int = 0) -> Extraction:
     """The extraction of these modes, the noise a share of the largest accelerance."""
-    exact = synthesize(modes, LINES).accelerance
+    exact = synthesize_frf(modes, LINES).accelerance
     random = np.random.default_rng(seed).normal(size=(2, LINES.size)) * noise * np.max(np.abs(exact)) / np.sqrt(2)
-    return extract([from_accelerance(LINES, exact + random[0] + 1j * random[1])])
+    return extract_modes([from_accelerance(LINES, exact + random[0] + 1j * random[1])])
 
 
 def edited(state: Extraction, **said: tuple[str, ...]) -> list[Mode]:
-    return modes_of(edit_modes(state, parse_edits(**said)))
+    return modes_from_extraction(edit_modes(state, parse_mode_edits(**said)))
 
 
 def frequencies(modes: list[Mode]) -> list[float]:
@@ -43,14 +54,14 @@ def test_a_mode_that_is_left_out_is_gone_and_the_others_stay() -> None:
 
 def test_of_modes_fitted_together_one_is_left_out_and_the_other_takes_its_place() -> None:
     state = measured([STRONG, Mode(1800.0, 0.03, 4e7)])
-    assert frequencies(modes_of(state)) == [1500, 1800]
+    assert frequencies(modes_from_extraction(state)) == [1500, 1800]
     (left,) = edited(state, drop=("1800",))
     assert abs(left.frequency / 1500 - 1) < 0.02
 
 
 def test_a_mode_on_a_flank_is_added_and_within_its_errors() -> None:
     state = measured([STRONG, WEAK])
-    assert len(modes_of(state)) == 1
+    assert len(modes_from_extraction(state)) == 1
     strong, weak = edited(state, add=("1600",))
     for mode, true in ((strong, STRONG), (weak, WEAK)):
         low, high = mode.interval(0.999).T
@@ -62,7 +73,7 @@ def test_a_mode_on_a_flank_is_added_and_within_its_errors() -> None:
 
 def test_a_mode_that_stands_alone_below_the_noise_of_peaks_is_added() -> None:
     state = measured([STRONG, OTHER], noise=0.004)
-    assert frequencies(modes_of(state)) == [1500]
+    assert frequencies(modes_from_extraction(state)) == [1500]
     added, _ = edited(state, add=("297",))
     assert added.interval()[0, 0] < OTHER.frequency < added.interval()[0, 1]
 
@@ -72,10 +83,10 @@ def test_a_held_mode_has_its_frequency_and_damping_without_error_and_k_with_one(
     _, held = edited(state, fix=("1500:0.03",))
     assert (held.frequency, held.damping_ratio) == pytest.approx((1500.0, 0.03))
     assert held.standard_error[:2] == pytest.approx([0, 0])
-    assert 0 < held.standard_error[2] < modes_of(state)[1].standard_error[2]
+    assert 0 < held.standard_error[2] < modes_from_extraction(state)[1].standard_error[2]
     assert held.interval()[2, 0] < STRONG.stiffness < held.interval()[2, 1]
     assert held.correlation == pytest.approx(np.eye(3))
-    assert trust_of(held) is Trust.TRUSTED
+    assert assess_trust(held) is Trust.TRUSTED
     assert "by-hand" in codes(held)
 
 
@@ -122,15 +133,15 @@ def test_what_cannot_be_done_is_refused_with_what_is_there(said: dict[str, tuple
 )
 def test_what_makes_no_sense_is_refused(said: dict[str, tuple[str, ...]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        parse_edits(**said)
+        parse_mode_edits(**said)
 
 
 def test_edits_read_as_they_were_said() -> None:
-    assert str(parse_edits(("298",), ("412.5",), ("1500:0.03",))) == "add 298, drop 412.5, fix 1500:0.03"
+    assert str(parse_mode_edits(("298",), ("412.5",), ("1500:0.03",))) == "add 298, drop 412.5, fix 1500:0.03"
 
 
 def test_several_frfs_share_what_is_held() -> None:
-    first = synthesize([STRONG], LINES)
+    first = synthesize_frf([STRONG], LINES)
     second = Frf(LINES, -0.5 * first.receptance)
-    (mode,) = modes_of(edit_modes(extract([first, second]), parse_edits(fix=("1500:0.03",))))
+    (mode,) = modes_from_extraction(edit_modes(extract_modes([first, second]), parse_mode_edits(fix=("1500:0.03",))))
     assert mode.shape == pytest.approx([1, -0.5])

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from acquisition.frf import Quantity
-from modal import Mode, fit_modes, predominant, synthesize
+from acquisition.frf import FrfQuantity
+from modal import Mode, fit_modes, predominant_mode, synthesize_frf
 
 SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
 STATIC_RESIDUAL = 1 / 3e8
@@ -17,7 +17,7 @@ LINES = np.arange(5.0, 6000.0, 5.0)
 
 def accelerance(modes: list[Mode], frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Of these modes and a static residual flexibility."""
-    flexibility = synthesize(modes, frequency).receptance + STATIC_RESIDUAL
+    flexibility = synthesize_frf(modes, frequency).receptance + STATIC_RESIDUAL
     return np.asarray(-((2 * np.pi * frequency) ** 2) * flexibility)
 
 
@@ -51,7 +51,7 @@ def significant_digits(error: NDArray[np.float64]) -> float:
 def test_one_mode_without_noise(n_lines: int, damping: float) -> None:
     mode = Mode(1722.0, damping, 3.5e7)
     frequency = np.linspace(0.0, 5000.0, n_lines + 1)
-    error = errors(fit_modes(synthesize([mode], frequency)), [mode])
+    error = errors(fit_modes(synthesize_frf([mode], frequency)), [mode])
     assert significant_digits(error[:, 0]) > 12
     assert significant_digits(error[:, 1:]) > 10
 
@@ -172,9 +172,9 @@ def test_lines_of_low_coherence_count_less() -> None:
 
 
 @pytest.mark.parametrize(("measured_as", "power"), [("receptance", 0), ("mobility", 1), ("accelerance", 2)])
-def test_without_coherence_the_noise_is_equal_in_what_was_measured(measured_as: Quantity, power: int) -> None:
+def test_without_coherence_the_noise_is_equal_in_what_was_measured(measured_as: FrfQuantity, power: int) -> None:
     noise = np.random.default_rng(0).normal(size=(2, LINES.size)) * 1e-3
-    exact = synthesize([Mode(1722.0, 0.1, 3.5e7)], LINES).receptance * LINES**power
+    exact = synthesize_frf([Mode(1722.0, 0.1, 3.5e7)], LINES).receptance * LINES**power
     receptance = (exact + (noise[0] + 1j * noise[1]) * np.max(np.abs(exact))) / LINES**power
     signal = np.abs(receptance) * LINES**power / np.max(np.abs(exact))
     coherence = 1 / (1 + 10 * 2e-6 / signal**2)
@@ -233,9 +233,9 @@ def test_method_names_band_and_company() -> None:
 
 def test_predominant_is_the_largest_peak_of_a_driving_point() -> None:
     soft, damped, opposite = Mode(900.0, 0.03, 3e7), Mode(1722.0, 0.01, 6e7), Mode(2900.0, 0.001, -1e7)
-    assert predominant([soft, damped, opposite]) is damped
-    assert predominant([soft, damped, opposite], (500.0, 1000.0)) is soft
-    assert predominant([soft, damped, opposite], (2000.0, 3000.0)) is None
-    assert predominant([]) is None
+    assert predominant_mode([soft, damped, opposite]) is damped
+    assert predominant_mode([soft, damped, opposite], (500.0, 1000.0)) is soft
+    assert predominant_mode([soft, damped, opposite], (2000.0, 3000.0)) is None
+    assert predominant_mode([]) is None
     with pytest.raises(ValueError, match="lower frequency first"):
-        predominant([soft], (1000.0, 500.0))
+        predominant_mode([soft], (1000.0, 500.0))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import Hit, estimate_frf
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE
+from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
 from modal import Mode, fit_modes
 from tests.modal.test_uncertainty import PRE_TRIGGER, RECORD, STRUCTURE, tap
 
@@ -20,13 +20,15 @@ def softening(seed: int, per_100_newton: float, hits: int = 10, spread: float = 
     for _ in range(hits):
         peak, width = 250 + spread * random.uniform(-0.5, 0.5), random.uniform(0.55e-3, 0.75e-3)
         share = 1 + per_100_newton * (peak - 250) / 100
-        time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / SAMPLE_RATE
+        time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / EMULATED_SAMPLE_RATE
         after = time >= 0
         force = np.where(after & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         response = np.zeros(RECORD)
         response[after] = replace(STRUCTURE, frequency=STRUCTURE.frequency * share).response(time[after], width)
         noise = random.normal(size=(2, RECORD))
-        made.append(Hit(peak * force + 0.1 * noise[0], peak * response + 2 * noise[1], SAMPLE_RATE, PRE_TRIGGER))
+        made.append(
+            Hit(peak * force + 0.1 * noise[0], peak * response + 2 * noise[1], EMULATED_SAMPLE_RATE, PRE_TRIGGER)
+        )
     return made
 
 

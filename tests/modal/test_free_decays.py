@@ -7,13 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Structure
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE
-from modal import Mode, believed, fit_decays, follow, predominant
+from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
+from modal import Mode, fit_decays, follow_mode, predominant_mode, select_credible_modes
 from tests.modal.test_uncertainty import PRE_TRIGGER, TRUTH, first_mode, tap
 
 RATE, SIZE = 6400.0, 1024
 TIME = np.arange(SIZE) / RATE
-AFTER = PRE_TRIGGER + round(1.5e-3 * SAMPLE_RATE)
+AFTER = PRE_TRIGGER + round(1.5e-3 * EMULATED_SAMPLE_RATE)
 """First sample at which no force is left."""
 
 
@@ -61,8 +61,8 @@ def test_decays_tell_no_stiffness_and_no_sign_of_it() -> None:
 def test_the_loudest_mode_is_the_predominant_one() -> None:
     modes = fit_decays(noisy_decays(2), RATE)
     assert [mode.relative_peak == 1.0 for mode in modes] == [True, False]
-    assert predominant(modes) is modes[0]
-    assert believed(modes).modes == tuple(modes)
+    assert predominant_mode(modes) is modes[0]
+    assert select_credible_modes(modes).modes == tuple(modes)
 
 
 def test_size_offset_and_order_of_the_decays_do_not_matter() -> None:
@@ -77,13 +77,13 @@ def test_size_offset_and_order_of_the_decays_do_not_matter() -> None:
 def test_modes_are_those_of_the_same_hits_with_their_force() -> None:
     hits = tap(4, hits=5)
     with_force = first_mode(hits)
-    mode = near(fit_decays([hit.acceleration[AFTER:] for hit in hits], SAMPLE_RATE), TRUTH[0])
+    mode = near(fit_decays([hit.acceleration[AFTER:] for hit in hits], EMULATED_SAMPLE_RATE), TRUTH[0])
     low, high = mode.interval()[0]
     assert low < TRUTH[0] < high
     assert mode.frequency == pytest.approx(with_force.frequency, rel=1e-4)
     assert mode.damping_ratio == pytest.approx(with_force.damping_ratio, rel=1e-2)
-    assert follow(with_force, [mode]).mode is mode
-    assert follow(mode, [with_force]).mode is with_force
+    assert follow_mode(with_force, [mode]).mode is mode
+    assert follow_mode(mode, [with_force]).mode is with_force
 
 
 @pytest.mark.parametrize("width", [1e-3, 3e-3])
@@ -113,7 +113,7 @@ def test_95_percent_intervals_of_tap_tests_without_force_hold_the_truth(hits: in
     held = []
     for seed in range(tests):
         decays = [hit.acceleration[AFTER:] for hit in tap(seed, hits)]
-        mode = near(fit_decays(decays, SAMPLE_RATE), TRUTH[0])
+        mode = near(fit_decays(decays, EMULATED_SAMPLE_RATE), TRUTH[0])
         held.append([low < true < high for (low, high), true in zip(mode.interval(), TRUTH[:2], strict=False)])
     print(f"{hits} decays: f, zeta {np.mean(held, axis=0)}")  # noqa: T201
     assert np.all(np.mean(held, axis=0) >= 0.91)

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from acquisition.frf import Quantity
-from modal import Mode, Trust, cut_edges, fit_modes, synthesize, trust_of
+from acquisition.frf import FrfQuantity
+from modal import Mode, Trust, assess_trust, find_truncated_peaks, fit_modes, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
@@ -28,7 +28,7 @@ def measured(
     extra: NDArray[np.complex128] | NDArray[np.float64] | float = 0.0,
 ) -> Frf:
     """Mean of hits with noise of 0.002 times the largest accelerance, and extra (hits, n) times that accelerance."""
-    exact = synthesize(modes, lines).accelerance
+    exact = synthesize_frf(modes, lines).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, hits, lines.size)) / np.sqrt(2)
     each = exact + np.max(np.abs(exact)) * (0.002 * (noise[0] + 1j * noise[1]) + extra)
     mean = each.mean(axis=0)
@@ -141,25 +141,28 @@ def test_a_peak_on_the_edge_or_just_beyond_is_said(ends: tuple[float, float]) ->
     frf = measured([Mode(1500.0, 0.03, 3e7), Mode(700.0, 0.02, 3e8), Mode(2900.0, 0.02, 3e8)], lines, 1)
     found = fit_modes(frf)
     assert len(found) == 1
-    assert cut_edges(frf, found) == [lines[0] if ends[0] > 1000 else lines[-1]]
+    assert find_truncated_peaks(frf, found) == [lines[0] if ends[0] > 1000 else lines[-1]]
 
 
 def test_an_edge_on_a_flank_or_on_a_fitted_peak_is_no_cut() -> None:
     frf = measured(SPINDLE, LINES, 1)
     for band in ((1200.0, 2400.0), (5.0, 2500.0), (1500.0, 3995.0), (500.0, 1750.0)):
-        assert cut_edges(frf, fit_modes(frf, band), band) == []
-    assert cut_edges(frf, [], (500.0, 1730.0)) == [1730.0]
+        assert find_truncated_peaks(frf, fit_modes(frf, band), band) == []
+    assert find_truncated_peaks(frf, [], (500.0, 1730.0)) == [1730.0]
 
 
 @pytest.mark.parametrize("low", [975.0, 1000.0, 2025.0])
 def test_a_fall_to_an_antiresonance_is_no_cut(low: float) -> None:
     """Several half-widths above a mode the others turn its mobility real for some lines."""
-    assert cut_edges(measured(SPINDLE, LINES, 10), [], (low, 3995.0)) == []
+    assert find_truncated_peaks(measured(SPINDLE, LINES, 10), [], (low, 3995.0)) == []
 
 
 def test_the_line_of_a_mass_is_no_peak() -> None:
     w = 2 * np.pi * LINES
-    assert cut_edges(from_accelerance(LINES, synthesize(SPINDLE, LINES).accelerance + 0.5 + 0j * w), []) == []
+    assert (
+        find_truncated_peaks(from_accelerance(LINES, synthesize_frf(SPINDLE, LINES).accelerance + 0.5 + 0j * w), [])
+        == []
+    )
 
 
 def test_a_strong_mode_beside_the_band_does_not_bend_a_weak_one_in_it_unsaid() -> None:
@@ -178,14 +181,14 @@ def test_a_mode_beyond_the_last_line_makes_that_before_it_doubtful(inside: float
     for seed in range(8):
         with_it = [Mode(1500.0, 0.03, 3e7), Mode(inside, 0.03, 6e7), Mode(4300.0, 0.03, 6e7)]
         *_, last = fit_modes(measured(with_it, LINES, seed=seed))
-        assert trust_of(last) is not Trust.TRUSTED
+        assert assess_trust(last) is not Trust.TRUSTED
         *_, last = fit_modes(measured(with_it[:2], LINES, seed=seed))
-        assert trust_of(last) is Trust.TRUSTED
+        assert assess_trust(last) is Trust.TRUSTED
 
 
 def test_accelerance_mobility_and_receptance_of_one_structure_have_the_same_modes() -> None:
-    receptance = synthesize(SPINDLE, LINES).receptance
-    for kind in get_args(Quantity):
+    receptance = synthesize_frf(SPINDLE, LINES).receptance
+    for kind in get_args(FrfQuantity):
         for a, b in zip(fit_modes(Frf(LINES, receptance, measured_as=kind)), SPINDLE, strict=True):
             assert a.frequency == pytest.approx(b.frequency, rel=1e-9)
             assert a.damping_ratio == pytest.approx(b.damping_ratio, rel=1e-7)
@@ -194,7 +197,7 @@ def test_accelerance_mobility_and_receptance_of_one_structure_have_the_same_mode
 
 def test_residual_terms_of_accelerance_are_a_constant_and_a_parabola() -> None:
     w = 2 * np.pi * LINES
-    accelerance = synthesize([SPINDLE[1]], LINES).accelerance + 4.0 - 2j + (3e-9 + 1e-9j) * w**2
+    accelerance = synthesize_frf([SPINDLE[1]], LINES).accelerance + 4.0 - 2j + (3e-9 + 1e-9j) * w**2
     inside = (LINES > 1200) & (LINES < 2400)
     (found,) = fit_modes(from_accelerance(LINES[inside], accelerance[inside]))
     assert found.stiffness == pytest.approx(3.5e7, rel=1e-9)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import Frf
-from modal import Mode, fit_modes, pick_peaks, synthesize
+from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
 DAMPING = st.floats(0.002, 0.03)
 SEPARATED = st.builds(
@@ -31,7 +31,7 @@ LINES = np.arange(2.0, 8000.0, 2.0)
 @settings(max_examples=40, deadline=None)
 @given(MODES)
 def test_round_trip(modes: list[Mode]) -> None:
-    found = fit_modes(synthesize(modes, LINES))
+    found = fit_modes(synthesize_frf(modes, LINES))
     assert len(found) == len(modes)
     for a, b in zip(found, modes, strict=True):
         assert a.frequency == pytest.approx(b.frequency, rel=1e-6)
@@ -41,7 +41,7 @@ def test_round_trip(modes: list[Mode]) -> None:
 
 
 def noisy(seed: int) -> Frf:
-    exact = synthesize([Mode(700.0, 0.02, 5e7), Mode(1722.0, 0.03, -3.5e7)], LINES)
+    exact = synthesize_frf([Mode(700.0, 0.02, 5e7), Mode(1722.0, 0.03, -3.5e7)], LINES)
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) * 1e-9
     return Frf(LINES, exact.receptance + noise[0] + 1j * noise[1])
 
@@ -67,7 +67,7 @@ def test_what_modes_far_away_leave_does_not_matter(real: float, imaginary: float
     modes = [Mode(700.0, 0.02, 5e7), Mode(1722.0, 0.03, 3.5e7)]
     extra = real + 1j * imaginary + far_below / LINES**2
     near = (LINES > 450) & (LINES < 4000)
-    frf = Frf(LINES[near], (synthesize(modes, LINES).receptance + extra)[near])
+    frf = Frf(LINES[near], (synthesize_frf(modes, LINES).receptance + extra)[near])
     found = {round(mode.frequency): mode for mode in fit_modes(frf)}
     for mode in modes:
         assert found[round(mode.frequency)].stiffness == pytest.approx(mode.stiffness, rel=1e-4)
@@ -84,7 +84,7 @@ def test_sign_of_the_receptance_is_the_sign_of_the_stiffness(seed: int) -> None:
 
 def test_synthesis_adds_the_modes() -> None:
     modes = [Mode(700.0, 0.02, 5e7), Mode(1722.0, 0.03, -3.5e7)]
-    frf = synthesize(modes, [0.0, 700.0, 1722.0])
+    frf = synthesize_frf(modes, [0.0, 700.0, 1722.0])
     assert frf.receptance[0] == pytest.approx(1 / 5e7 - 1 / 3.5e7)
     assert frf.receptance[1] == pytest.approx(1 / (2j * 0.02 * 5e7) + modes[1].receptance(np.array([700.0]))[0])
-    assert synthesize([], LINES).receptance == pytest.approx(np.zeros(LINES.size))
+    assert synthesize_frf([], LINES).receptance == pytest.approx(np.zeros(LINES.size))

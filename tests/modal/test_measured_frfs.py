@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, Trust, fit_modes, synthesize, trust_of, trust_rules
+from modal import Mode, Trust, assess_trust, fit_modes, synthesize_frf, trust_rules
 
 LINES = np.arange(1.0, 1601.0) / 8
 """8 s of record."""
 WING = [Mode(18.85, 0.008, 3e5), Mode(40.16, 0.006, 1.5e6), Mode(97.1, 0.005, 7e6), Mode(143.4, 0.01, 9e6)]
-EXACT = synthesize(WING, LINES).accelerance
+EXACT = synthesize_frf(WING, LINES).accelerance
 
 
 def averaged(hits: NDArray[np.complex128]) -> Frf:
@@ -48,7 +48,7 @@ def test_what_differs_from_hit_to_hit_but_not_from_line_to_line_makes_no_modes()
 def test_a_small_peak_on_the_flank_of_a_far_stronger_one_is_doubtful(weaker: float, verdict: Trust) -> None:
     """A second blow, a drift of the joint or a time window make such peaks about a sharp one."""
     modes = [Mode(40.16, 0.002, 1.5e6), Mode(41.26, 0.002, 1.5e6 * weaker)]
-    exact, noise = synthesize(modes, LINES).accelerance, np.random.default_rng(1).normal(size=(2, LINES.size))
+    exact, noise = synthesize_frf(modes, LINES).accelerance, np.random.default_rng(1).normal(size=(2, LINES.size))
     found = fit_modes(from_accelerance(LINES, exact + 1e-4 * np.max(np.abs(exact)) * (noise[0] + 1j * noise[1])))
     assert "bent-by-neighbour" not in dict(trust_rules(found[0]))
     assert ("bent-by-neighbour" in dict(trust_rules(found[1]))) == (verdict is Trust.DOUBTFUL)
@@ -58,7 +58,7 @@ def with_echo(noise: float) -> Mode:
     """A mode with a ripple from an echo of 2 %: alike over many lines, it may hide a shift, however many lines there
     are."""
     echo = 1 + 0.02 * np.exp(-2j * np.pi * 0.35 * LINES)
-    exact, random = synthesize([Mode(97.1, 0.02, 7e6)], LINES).accelerance * echo, np.random.default_rng(1)
+    exact, random = synthesize_frf([Mode(97.1, 0.02, 7e6)], LINES).accelerance * echo, np.random.default_rng(1)
     off = random.normal(size=(2, LINES.size)) * noise * np.max(np.abs(exact))
     (mode,) = fit_modes(from_accelerance(LINES, exact + off[0] + 1j * off[1]))
     return mode
@@ -76,7 +76,7 @@ def test_what_is_left_about_a_mode_is_in_its_errors() -> None:
     assert mode.misfit is not None
     assert mode.misfit > 4
     assert np.all(over_left(mode) > 4 * np.sqrt(1 - (2 / mode.misfit) ** 2))
-    assert trust_of(mode) is Trust.TRUSTED
+    assert assess_trust(mode) is Trust.TRUSTED
 
 
 def test_it_comes_into_them_without_a_step() -> None:

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, Trust, fit_modes, fit_points, synthesize, trust_of
+from modal import Mode, Trust, assess_trust, fit_common_modes, fit_modes, synthesize_frf
 
 LINES = np.arange(200.0, 4000.0, 4.0)
 STRUCTURES = {
@@ -25,7 +25,7 @@ FEW_FRFS, LEAST_OF_FEW = 100, 0.87
 
 def measured(truth: list[Mode], seed: int, floor: float = 0.0) -> Frf:
     """floor: rms of white noise over the largest accelerance."""
-    exact = synthesize(truth, LINES).accelerance
+    exact = synthesize_frf(truth, LINES).accelerance
     random = np.random.default_rng(seed)
     noise, white = random.normal(size=(2, 2, LINES.size)) / np.sqrt(2)
     off = LEVEL * np.abs(exact) * (noise[0] + 1j * noise[1]) + floor * np.max(np.abs(exact)) * (
@@ -44,7 +44,7 @@ def are_held(mode: Mode, truth: Mode) -> NDArray[np.bool_]:
 def held(truth: list[Mode], frfs: int, floor: float) -> NDArray[np.float64]:
     found = [fit_modes(measured(truth, seed, floor)) for seed in range(frfs)]
     assert all(len(modes) == len(truth) for modes in found)
-    assert np.mean([trust_of(modes[0]) is Trust.TRUSTED for modes in found]) > 0.95
+    assert np.mean([assess_trust(modes[0]) is Trust.TRUSTED for modes in found]) > 0.95
     share = np.mean([are_held(modes[0], truth[0]) for modes in found], axis=0)
     print(f"{len(truth)} modes, floor {floor}: f, zeta, K {share}")  # noqa: T201
     return np.asarray(share)
@@ -65,13 +65,13 @@ def test_95_percent_intervals_hold_the_truth_where_noise_grows_with_the_frf(name
 
 def test_an_frf_with_far_more_noise_than_the_others_does_not_spoil_them() -> None:
     truth = STRUCTURES["alone"]
-    exact = synthesize(truth, LINES).accelerance
+    exact = synthesize_frf(truth, LINES).accelerance
     for seed in range(5):
         noise = np.random.default_rng(seed).normal(size=(2, 2, LINES.size)) * np.max(np.abs(exact))
         still, loud = (
             exact + level * (part[0] + 1j * part[1]) for level, part in zip((1e-4, 1e-2), noise, strict=True)
         )
         (alone,) = fit_modes(from_accelerance(LINES, still))
-        (mode,) = fit_points([from_accelerance(LINES, still), from_accelerance(LINES, loud)])
+        (mode,) = fit_common_modes([from_accelerance(LINES, still), from_accelerance(LINES, loud)])
         assert mode.standard_error == pytest.approx(alone.standard_error, rel=0.3)
         assert np.all(np.abs(mode.frequency - truth[0].frequency) < 4.5 * mode.standard_error[0])

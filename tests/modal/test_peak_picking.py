@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf
-from modal import Mode, fit_modes, pick_peaks, synthesize
+from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
 PAPER = Mode(1722.0, 0.029136, 3.2289e7)
 
@@ -31,7 +31,7 @@ def picked_exactly(mode: Mode) -> tuple[float, float, float]:
 def test_peak_picking_has_its_closed_form_bias(damping: float, stiffness: float) -> None:
     mode = Mode(1722.0, damping, stiffness)
     lines = 1722.0 * (1 + damping * np.arange(-4.0, 6.0, 0.002))
-    (found,) = pick_peaks(synthesize([mode], lines))
+    (found,) = pick_peaks(synthesize_frf([mode], lines))
     frequency, zeta, k = picked_exactly(mode)
     assert found.frequency == pytest.approx(frequency, rel=1e-7)
     assert found.damping_ratio == pytest.approx(zeta, rel=3e-6)
@@ -40,7 +40,7 @@ def test_peak_picking_has_its_closed_form_bias(damping: float, stiffness: float)
 
 
 def test_bias_of_the_paper_mode_is_zeta_squared() -> None:
-    (found,) = pick_peaks(synthesize([PAPER], np.arange(800.0, 3000.0, 0.05)))
+    (found,) = pick_peaks(synthesize_frf([PAPER], np.arange(800.0, 3000.0, 0.05)))
     square = PAPER.damping_ratio**2
     assert found.frequency / PAPER.frequency - 1 == pytest.approx(-square / 2, rel=0.01)
     assert found.damping_ratio / PAPER.damping_ratio - 1 == pytest.approx(square, rel=0.03)
@@ -50,14 +50,14 @@ def test_bias_of_the_paper_mode_is_zeta_squared() -> None:
 def test_extremes_are_found_between_lines() -> None:
     frequency, zeta, k = picked_exactly(PAPER)
     for shift in (0.0, 1.3, 2.5, 3.7):
-        (found,) = pick_peaks(synthesize([PAPER], np.arange(800.0, 3000.0, 5.0) + shift))
+        (found,) = pick_peaks(synthesize_frf([PAPER], np.arange(800.0, 3000.0, 5.0) + shift))
         assert found.frequency == pytest.approx(frequency, abs=0.02)
         assert found.damping_ratio == pytest.approx(zeta, rel=5e-3)
         assert found.stiffness == pytest.approx(k, rel=5e-3)
 
 
 def test_least_squares_has_no_such_bias() -> None:
-    (found,) = fit_modes(synthesize([PAPER], np.arange(800.0, 3000.0, 5.0)))
+    (found,) = fit_modes(synthesize_frf([PAPER], np.arange(800.0, 3000.0, 5.0)))
     assert found.frequency == pytest.approx(PAPER.frequency, rel=1e-12)
     assert found.damping_ratio == pytest.approx(PAPER.damping_ratio, rel=1e-10)
     assert found.stiffness == pytest.approx(PAPER.stiffness, rel=1e-10)
@@ -65,12 +65,12 @@ def test_least_squares_has_no_such_bias() -> None:
 
 def test_every_mode_of_several_is_picked() -> None:
     modes = [Mode(900.0, 0.01, 4e7), Mode(1722.0, 0.01, -3.5e7), Mode(2900.0, 0.01, 3e7)]
-    found = pick_peaks(synthesize(modes, np.arange(5.0, 5000.0, 1.0)))
+    found = pick_peaks(synthesize_frf(modes, np.arange(5.0, 5000.0, 1.0)))
     assert [m.frequency for m in found] == pytest.approx([m.frequency for m in modes], rel=1e-3)
     assert [m.stiffness for m in found] == pytest.approx([m.stiffness for m in modes], rel=0.1)
     assert all(m.covariance is None and m.method == "peak picking" for m in found)
 
 
 def test_peak_that_is_cut_off_is_not_picked() -> None:
-    frf: Frf = synthesize([PAPER], np.arange(1690.0, 3000.0, 5.0))
+    frf: Frf = synthesize_frf([PAPER], np.arange(1690.0, 3000.0, 5.0))
     assert pick_peaks(frf) == []

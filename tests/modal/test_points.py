@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal import Mode, fit_modes, fit_points, follow, mac, mode_indicator, synthesize
+from modal import Mode, fit_common_modes, fit_modes, follow_mode, mac, mode_indicator, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SHAPES = np.array([[1.0, 0.5, -0.7], [1.0, -0.8, 0.3], [0.6, 1.0, 0.9]])
@@ -27,7 +27,7 @@ def points(
 
 
 def test_poles_are_common_and_shapes_those_of_the_structure() -> None:
-    found = fit_points(points())
+    found = fit_common_modes(points())
     assert len(found) == 3
     for mode, true, shape in zip(found, MODES, SHAPES, strict=True):
         assert mode.frequency == pytest.approx(true.frequency, rel=1e-6)
@@ -39,7 +39,7 @@ def test_poles_are_common_and_shapes_those_of_the_structure() -> None:
 
 
 def test_errors_in_noise_are_those_that_are_stated() -> None:
-    fits = [fit_points(points(1e-3, seed)) for seed in range(20)]
+    fits = [fit_common_modes(points(1e-3, seed)) for seed in range(20)]
     for i, (true, shape) in enumerate(zip(MODES, SHAPES, strict=True)):
         error = np.array([fit[i].stiffness for fit in fits]) - true.stiffness / shape[0] ** 2
         stated = np.sqrt(np.mean([fit[i].standard_error[2] ** 2 for fit in fits]))
@@ -48,7 +48,7 @@ def test_errors_in_noise_are_those_that_are_stated() -> None:
 
 def test_the_first_point_of_a_shape_is_positive_whatever_the_sign_of_the_response() -> None:
     turned = [Frf(LINES, -frf.receptance) for frf in points()]
-    for mode, shape in zip(fit_points(turned), SHAPES, strict=True):
+    for mode, shape in zip(fit_common_modes(turned), SHAPES, strict=True):
         assert not mode.is_driving_point
         assert mode.shape is not None
         assert mode.shape == pytest.approx(shape, abs=1e-3)
@@ -56,17 +56,17 @@ def test_the_first_point_of_a_shape_is_positive_whatever_the_sign_of_the_respons
 
 def test_one_frf_is_allowed_and_different_lines_and_none_are_not() -> None:
     (one, *_) = points()
-    assert [round(mode.frequency) for mode in fit_points([one])] == [900, 1722, 1790]
+    assert [round(mode.frequency) for mode in fit_common_modes([one])] == [900, 1722, 1790]
     with pytest.raises(ValueError, match="no FRF"):
-        fit_points([])
+        fit_common_modes([])
     with pytest.raises(ValueError, match="differ in their frequency lines"):
-        fit_points([one, Frf(LINES[1:], one.receptance[1:])])
+        fit_common_modes([one, Frf(LINES[1:], one.receptance[1:])])
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_of_one_frf_it_is_the_same_as_fit_modes(noise: float) -> None:
     (one, *_) = points(noise)
-    found, wanted = fit_points([one]), fit_modes(one)
+    found, wanted = fit_common_modes([one]), fit_modes(one)
     assert len(wanted) == 3
     for mode, other in zip(found, wanted, strict=True):
         for name, value in vars(other).items():
@@ -77,7 +77,7 @@ def test_a_mode_without_a_peak_of_its_own_is_found() -> None:
     """All points move alike, a third of a half-power width apart: no FRF shows two peaks."""
     pair = [Mode(1722.0, 0.03, 3.5e7), Mode(1757.0, 0.03, 5e7)]
     for seed in range(5):
-        found = fit_points(points(4e-4, seed, np.ones((2, 3)), pair))
+        found = fit_common_modes(points(4e-4, seed, np.ones((2, 3)), pair))
         assert len(found) == 2
         for mode, true in zip(found, pair, strict=True):
             assert abs(mode.frequency - true.frequency) < 4 * mode.standard_error[0]
@@ -89,7 +89,7 @@ def test_a_mode_without_a_peak_of_its_own_is_found() -> None:
 def test_a_weak_mode_on_the_flank_of_a_strong_one_is_found() -> None:
     pair = [Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)]
     for seed in range(5):
-        found = fit_points(points(1e-3, seed, SHAPES[:2], pair))
+        found = fit_common_modes(points(1e-3, seed, SHAPES[:2], pair))
         assert [mode.frequency for mode in found] == pytest.approx([1500.0, 1900.0], rel=5e-3)
 
 
@@ -97,24 +97,24 @@ def test_a_stray_line_in_one_of_the_frfs_is_left_out() -> None:
     clean = points(1e-3, 0, SHAPES[:1], MODES[:1])
     hum = np.where(LINES == 905.0, 0.2 * np.max(np.abs(clean[0].receptance)), 0.0)
     with_hum = [clean[0], replace(clean[1], receptance=clean[1].receptance + hum), clean[2]]
-    (found,), (without,) = fit_points(with_hum), fit_points(clean)
+    (found,), (without,) = fit_common_modes(with_hum), fit_common_modes(clean)
     assert found.standard_error == pytest.approx(without.standard_error, rel=0.3)
     assert abs(found.frequency - without.frequency) < without.standard_error[0]
 
 
 def test_what_speaks_against_a_mode_is_said() -> None:
     clean = points(1e-3, 0, SHAPES[:1], MODES[:1])
-    (mode,) = fit_points(clean)
+    (mode,) = fit_common_modes(clean)
     assert mode.remarks == ()
     assert mode.misfit == pytest.approx(1.0, abs=0.25)
-    (cut,) = fit_points(clean, (300.0, 915.0))
+    (cut,) = fit_common_modes(clean, (300.0, 915.0))
     assert [(remark.code, remark.about) for remark in cut.remarks] == [("cut-by-edge", f"{cut.frequency:.0f} Hz")]
 
 
 def test_a_driving_point_near_a_node_is_said() -> None:
     still = np.array([SHAPES[0], [0.004, 1.0, -1.0]])
     modes = [MODES[0], Mode(2600.0, 0.03, 2e5)]
-    sure, unsure = fit_points(points(5e-3, 0, still, modes))
+    sure, unsure = fit_common_modes(points(5e-3, 0, still, modes))
     assert sure.remarks == ()
     assert [remark.code for remark in unsure.remarks] == ["near-node"]
     assert unsure.frequency == pytest.approx(2600.0, rel=1e-3)
@@ -123,7 +123,7 @@ def test_a_driving_point_near_a_node_is_said() -> None:
 def test_usable_band_is_the_narrowest() -> None:
     frfs = points()
     frfs[1] = replace(frfs[1], usable_band=(5.0, 1300.0))
-    assert [round(mode.frequency) for mode in fit_points(frfs)] == [900]
+    assert [round(mode.frequency) for mode in fit_common_modes(frfs)] == [900]
 
 
 def test_mac_of_textbook_shapes() -> None:
@@ -139,7 +139,7 @@ def test_mac_of_textbook_shapes() -> None:
 
 def test_mode_indicator_is_one_at_a_real_mode_alone_and_what_it_is_elsewhere() -> None:
     mode = Mode(1000.0, 0.02, 3e7)
-    frf = synthesize([mode], [500.0, 1000.0, 1010.0, 2000.0])
+    frf = synthesize_frf([mode], [500.0, 1000.0, 1010.0, 2000.0])
     phase = np.angle(frf.receptance)
     assert mode_indicator([frf]) == pytest.approx(1 - np.abs(np.cos(phase)))
     assert mode_indicator([frf, frf])[1] == pytest.approx(1.0)
@@ -161,19 +161,19 @@ NEIGHBOUR = Mode(1850.0, 0.03, 3.3e7)
 def test_a_slow_change_is_followed_past_a_stronger_neighbour() -> None:
     for month in range(24):
         aged = Mode(1700.0 * 0.996 ** (month + 1), 0.03, 3.5e7)
-        found = follow(Mode(1700.0 * 0.996**month, 0.03, 3.5e7), [aged, NEIGHBOUR])
+        found = follow_mode(Mode(1700.0 * 0.996**month, 0.03, 3.5e7), [aged, NEIGHBOUR])
         assert found.mode is aged
         assert not found.remarks
 
 
 def test_the_neighbour_in_place_of_a_mode_that_was_not_found_is_said() -> None:
-    found = follow(LAST, [NEIGHBOUR])
+    found = follow_mode(LAST, [NEIGHBOUR])
     assert found.mode is NEIGHBOUR
     assert [(remark.code, remark.about) for remark in found.remarks] == [("large-change", "1850 Hz")]
 
 
 def test_two_that_are_equally_like_it_are_said() -> None:
-    found = follow(LAST, [Mode(1660.0, 0.03, 3.5e7), Mode(1745.0, 0.03, 3.5e7)])
+    found = follow_mode(LAST, [Mode(1660.0, 0.03, 3.5e7), Mode(1745.0, 0.03, 3.5e7)])
     (remark,) = found.remarks
     assert found.mode is not None
     assert (remark.code, remark.about) == ("rival-mode", f"{found.mode.frequency:.0f} Hz")
@@ -184,14 +184,14 @@ def test_the_shape_decides_between_two() -> None:
     first, second = (
         replace(LAST, frequency=f, shape=np.array(shape)) for f, shape in ((1690, [1, 0.9]), (1712, [1, -0.9]))
     )
-    found = follow(replace(LAST, shape=np.array([1.0, -1.0])), [first, second])
+    found = follow_mode(replace(LAST, shape=np.array([1.0, -1.0])), [first, second])
     assert found.mode is second
 
 
 def test_nothing_near_is_no_mode() -> None:
-    assert follow(LAST, []).mode is None
-    far = follow(LAST, [Mode(2600.0, 0.03, 3.5e7)])
+    assert follow_mode(LAST, []).mode is None
+    far = follow_mode(LAST, [Mode(2600.0, 0.03, 3.5e7)])
     assert far.mode is None
     assert [(remark.code, remark.about) for remark in far.remarks] == [("no-mode-to-follow", "1700 Hz")]
     assert "2600.0 Hz" in far.remarks[0].text
-    assert follow(LAST, [replace(LAST, stiffness=-3.5e7)]).mode is None
+    assert follow_mode(LAST, [replace(LAST, stiffness=-3.5e7)]).mode is None

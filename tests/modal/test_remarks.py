@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from acquisition import Frf, Remark, from_accelerance
-from modal import Mode, fit_modes, synthesize
+from modal import Mode, fit_modes, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 MODE = Mode(1722.0, 0.03, 3.5e7)
 
 
 def noisy(modes: list[Mode], level: float = 1e-3, hits: int = 10, seed: int = 0) -> Frf:
-    exact = synthesize(modes, LINES).accelerance
+    exact = synthesize_frf(modes, LINES).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, hits, LINES.size)) / np.sqrt(2)
     each = exact + level * np.max(np.abs(exact)) * (noise[0] + 1j * noise[1])
     mean = each.mean(axis=0)
@@ -52,7 +52,7 @@ def test_a_negative_stiffness_says_so(swapped: int) -> None:
 
 @pytest.mark.parametrize("degrees", [-40.0, 40.0])
 def test_a_complex_constant_is_measured_and_said(degrees: float) -> None:
-    turned = synthesize([MODE], LINES).receptance * np.exp(1j * np.radians(degrees))
+    turned = synthesize_frf([MODE], LINES).receptance * np.exp(1j * np.radians(degrees))
     (mode,) = fit_modes(Frf(LINES, turned))
     assert mode.phase_deg == pytest.approx(degrees, abs=0.1)
     assert f"{degrees:+.0f} ±" in remarks(mode)["complex-mode"].text
@@ -71,14 +71,14 @@ def test_an_edge_through_the_peak_is_said() -> None:
 
 
 def test_a_record_too_short_for_the_decay_is_said() -> None:
-    (mode,) = fit_modes(synthesize([Mode(1722.0, 0.001, 3.5e7)], LINES))
+    (mode,) = fit_modes(synthesize_frf([Mode(1722.0, 0.001, 3.5e7)], LINES))
     left = 100 * np.exp(-2 * np.pi * 0.001 * 1722.0 / 5.0)
     assert f"{left:.0f} %" in remarks(mode)["still-ringing"].text
 
 
 def test_what_the_fit_leaves_is_said() -> None:
     clearly = 1 - 0.1 * np.sin(LINES / 12.0)
-    (mode, *_) = fit_modes(Frf(LINES, synthesize([MODE], LINES).receptance * clearly))
+    (mode, *_) = fit_modes(Frf(LINES, synthesize_frf([MODE], LINES).receptance * clearly))
     assert mode.misfit is not None
     assert mode.misfit > 2
     assert f"{mode.misfit:.1f} times" in remarks(mode)["misfit"].text

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf, estimate_frf, from_accelerance, is_smoothed
-from modal import Mode, Trust, fit_modes, synthesize, trust_of
+from modal import Mode, Trust, assess_trust, fit_modes, synthesize_frf
 from tests.modal.test_uncertainty import tap
 
 F = np.arange(2.0, 3200.0, 2.0)
@@ -15,7 +15,7 @@ KERNELS = {"three": np.ones(3) / 3, "five": np.ones(5) / 5, "hann": np.array([0.
 
 def frf(damping_ratio: float, kernel: str = "", seed: int = 0, noise: float = 0.005) -> Frf:
     """Two modes in noise of this share of the largest accelerance, smoothed over neighbouring lines."""
-    exact = synthesize([Mode(800.0, damping_ratio, 5e7), Mode(1500.0, damping_ratio, 3e7)], F).accelerance
+    exact = synthesize_frf([Mode(800.0, damping_ratio, 5e7), Mode(1500.0, damping_ratio, 3e7)], F).accelerance
     random = np.random.default_rng(seed).normal(size=(2, F.size)) * noise * np.max(np.abs(exact)) / np.sqrt(2)
     lines = exact + random[0] + 1j * random[1]
     return from_accelerance(F, np.convolve(lines, KERNELS[kernel], "same") if kernel else lines)
@@ -35,16 +35,18 @@ def test_smoothed_lines_are_seen_whatever_the_noise(kernel: str, noise: float) -
 def test_a_narrow_mode_of_smoothed_lines_is_doubtful_and_a_wide_one_is_not() -> None:
     narrow = at_1500(frf(0.005, "five"))
     assert narrow.damping_ratio / 0.005 > 1.1
-    assert trust_of(narrow) is Trust.DOUBTFUL
+    assert assess_trust(narrow) is Trust.DOUBTFUL
     assert "smoothed-lines" in [remark.code for remark in narrow.remarks]
     for fine in (at_1500(frf(0.03, "five")), at_1500(frf(0.005))):
-        assert trust_of(fine) is Trust.TRUSTED
+        assert assess_trust(fine) is Trust.TRUSTED
         assert "smoothed-lines" not in [remark.code for remark in fine.remarks]
 
 
 def test_without_noise_nothing_is_said_and_an_axis_may_be_uneven() -> None:
     assert not is_smoothed(frf(0.01, "three", noise=0.0))
-    assert not is_smoothed(Frf(np.geomspace(10, 3000, 800), synthesize([Mode(800.0, 0.01, 5e7)], F).receptance[:800]))
+    assert not is_smoothed(
+        Frf(np.geomspace(10, 3000, 800), synthesize_frf([Mode(800.0, 0.01, 5e7)], F).receptance[:800])
+    )
     conjugate = Frf(F, frf(0.003).receptance.conj(), measured_as="accelerance")
     assert not is_smoothed(conjugate)
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, Trust, fit_modes, trust_of
-from modal.quality.ringing_doubt import with_ringing_doubt
+from modal import Mode, Trust, assess_trust, fit_modes
+from modal.quality.assess_mode import with_truncation_error
 
 DAMPING, STIFFNESS, RATE = 0.02, 3.5e7, 25600.0
 
@@ -66,7 +66,7 @@ def test_the_intervals_hold_it_and_the_mode_is_trusted(case: tuple[float, ...]) 
         reach = mode.quantile() * mode.standard_error / np.array([DAMPING * frequency, DAMPING, STIFFNESS])
         assert np.all(np.abs(off(mode, frequency)) < reach)
         assert abs(mode.phase_deg) < mode.quantile() * mode.phase_deg_std
-        assert trust_of(mode) is Trust.TRUSTED
+        assert assess_trust(mode) is Trust.TRUSTED
 
 
 def test_what_is_left_is_said_where_it_makes_the_error_of_stiffness() -> None:
@@ -77,16 +77,16 @@ def test_what_is_left_is_said_where_it_makes_the_error_of_stiffness() -> None:
 
 
 def test_more_than_the_errors_stand_for_is_doubtful() -> None:
-    assert trust_of(fitted(1500.0, 0.07, 0.0, 0)) is Trust.DOUBTFUL
+    assert assess_trust(fitted(1500.0, 0.07, 0.0, 0)) is Trust.DOUBTFUL
 
 
 def test_errors_stand_for_no_more() -> None:
-    mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.1, 1e-5, 1e4]) ** 2, left_ringing=0.051)
-    assert with_ringing_doubt(mode) is mode
+    mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.1, 1e-5, 1e4]) ** 2, remaining_decay=0.051)
+    assert with_truncation_error(mode) is mode
 
 
 def test_values_that_are_held_stay_without_error() -> None:
-    mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.0, 0.0, 1e4]) ** 2, left_ringing=0.04)
-    widened = with_ringing_doubt(mode).standard_error
+    mode = Mode(1500.0, DAMPING, STIFFNESS, np.diag([0.0, 0.0, 1e4]) ** 2, remaining_decay=0.04)
+    widened = with_truncation_error(mode).standard_error
     assert widened[:2].tolist() == [0.0, 0.0]
     assert widened[2] == pytest.approx(0.04 * STIFFNESS / np.sqrt(2), rel=1e-3)

@@ -7,15 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, Trust, extract, fit_modes, synthesize, trust_of
-from modal.bands.systematic import systematic
+from modal import Mode, Trust, assess_trust, extract_modes, fit_modes, synthesize_frf
+from modal.bands.residual_analysis import systematic_error
 
 MODE = Mode(1722.0, 0.03, 3.5e7)
 
 
 def noisy(modes: list[Mode], level: float, seed: int, step: float = 5.0) -> Frf:
     lines = np.arange(step, 4000.0, step)
-    exact = synthesize(modes, lines).accelerance
+    exact = synthesize_frf(modes, lines).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, lines.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
     return from_accelerance(lines, exact + noise[0] + 1j * noise[1])
 
@@ -26,21 +26,21 @@ def values(mode: Mode) -> NDArray[np.float64]:
 
 def test_white_noise_changes_nothing() -> None:
     for seed in range(10):
-        state = extract([noisy([MODE], 2e-3, seed)])
+        state = extract_modes([noisy([MODE], 2e-3, seed)])
         (band,) = state.bands
-        beyond = systematic(band)
+        beyond = systematic_error(band)
         assert beyond.factor == 1.0
-        assert beyond.freedom == band.fit.freedom
+        assert beyond.degrees_of_freedom == band.fit.degrees_of_freedom
         assert not np.any(beyond.covariance)
 
 
 def test_what_the_model_lacks_widens_the_errors_until_they_hold_the_truth() -> None:
     frf = noisy([MODE], 1e-4, 0)
     rippled = Frf(frf.frequency, frf.receptance * (1 + 0.03 * np.sin(frf.frequency / 30)), measured_as="accelerance")
-    (band, *_) = extract([rippled]).bands
-    beyond = systematic(band)
+    (band, *_) = extract_modes([rippled]).bands
+    beyond = systematic_error(band)
     assert beyond.factor > 3
-    assert beyond.freedom < band.fit.freedom / 3
+    assert beyond.degrees_of_freedom < band.fit.degrees_of_freedom / 3
     mode = min(fit_modes(rippled), key=lambda mode: abs(mode.frequency - 1722))
     reach = mode.quantile() * mode.standard_error
     assert np.all(np.abs(values(mode) - values(MODE)) < reach)
@@ -61,8 +61,8 @@ def test_parts_of_the_lines_that_cut_the_peak_of_a_mode_say_nothing_of_it() -> N
 
 
 def test_an_frf_without_noise_is_not_taken_for_coloured() -> None:
-    (band,) = extract([synthesize([MODE], np.arange(5.0, 4000.0, 5.0))]).bands
-    assert systematic(band).factor == 1.0
+    (band,) = extract_modes([synthesize_frf([MODE], np.arange(5.0, 4000.0, 5.0))]).bands
+    assert systematic_error(band).factor == 1.0
 
 
 def dense(seed: int) -> tuple[list[Mode], Frf]:
@@ -91,7 +91,7 @@ def test_95_percent_intervals_hold_the_truth_among_modes_that_are_not_fitted() -
             true = min(modes, key=lambda other: abs(other.frequency - mode.frequency))
             if stands_alone(true, modes):
                 limits = mode.interval()
-                held[trust_of(mode)].append((limits[:, 0] < values(true)) & (values(true) < limits[:, 1]))
+                held[assess_trust(mode)].append((limits[:, 0] < values(true)) & (values(true) < limits[:, 1]))
     shares = {trust: np.mean(each, axis=0) for trust, each in held.items()}
     print({str(trust): (len(held[trust]), share) for trust, share in shares.items()})  # noqa: T201
     assert np.all(shares[Trust.TRUSTED] > 0.75)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import Remark
-from modal import Mode, Trust, fit_modes, found_again, synthesize, trust_of, trust_rules
+from modal import Mode, Trust, assess_trust, fit_modes, match_modes, synthesize_frf, trust_rules
 
 GOOD = Mode(
     1722.0,
@@ -20,16 +20,16 @@ GOOD = Mode(
     misfit=1.1,
     misfit_share=0.4,
     edge_distance=30.0,
-    left_ringing=1e-9,
+    remaining_decay=1e-9,
     half_power_damping=0.031,
 )
 UNCERTAIN = np.diag([0.2, 1e-4, 1.05e7]) ** 2
 
 
 def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures() -> None:
-    assert trust_of(GOOD) is Trust.TRUSTED
-    assert trust_of(Mode(1722.0, 0.03, 3.5e7)) is Trust.TRUSTED
-    assert trust_of(replace(GOOD, stiffness=-3.5e7, remarks=(Remark("misfit", "", "a text"),))) is Trust.TRUSTED
+    assert assess_trust(GOOD) is Trust.TRUSTED
+    assert assess_trust(Mode(1722.0, 0.03, 3.5e7)) is Trust.TRUSTED
+    assert assess_trust(replace(GOOD, stiffness=-3.5e7, remarks=(Remark("misfit", "", "a text"),))) is Trust.TRUSTED
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures
 def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> None:
     mode = replace(GOOD, **change)
     assert list(trust_rules(mode)) == [(code, verdict)]
-    assert trust_of(mode) is verdict
+    assert assess_trust(mode) is verdict
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> N
     ],
 )
 def test_less_than_a_limit_is_no_reason(change: dict[str, Any]) -> None:
-    assert trust_of(replace(GOOD, **change)) is Trust.TRUSTED
+    assert assess_trust(replace(GOOD, **change)) is Trust.TRUSTED
 
 
 @pytest.mark.parametrize(
@@ -88,10 +88,12 @@ def test_less_than_a_limit_is_no_reason(change: dict[str, Any]) -> None:
 )
 def test_what_three_quarters_of_two_or_more_others_have_is_trusted_all_the_same(change: dict[str, Any]) -> None:
     mode = replace(GOOD, **change)
-    verdicts = {found: trust_of(replace(mode, found_again=found)) for found in [(2, 2), (3, 4), (1, 1), (1, 2), (2, 3)]}
+    verdicts = {
+        found: assess_trust(replace(mode, match_count=found)) for found in [(2, 2), (3, 4), (1, 1), (1, 2), (2, 3)]
+    }
     trusted = [found for found, verdict in verdicts.items() if verdict is Trust.TRUSTED]
     assert trusted == [(2, 2), (3, 4)]
-    assert verdicts[2, 3] is trust_of(mode)
+    assert verdicts[2, 3] is assess_trust(mode)
 
 
 @pytest.mark.parametrize(
@@ -109,25 +111,25 @@ def test_what_three_quarters_of_two_or_more_others_have_is_trusted_all_the_same(
 def test_what_is_wrong_in_all_measurements_alike_or_hardly_known_stays_in_doubt(
     change: dict[str, Any], code: str
 ) -> None:
-    assert [rule for rule, _ in trust_rules(replace(GOOD, found_again=(4, 4), **change))] == [code]
+    assert [rule for rule, _ in trust_rules(replace(GOOD, match_count=(4, 4), **change))] == [code]
 
 
 def test_a_mode_is_found_again_within_half_a_percent() -> None:
     others = [[Mode(GOOD.frequency * factor, 0.01, 1e6)] for factor in (1.0049, 0.9951, 1.0051)]
-    assert [mode.found_again for mode in found_again([GOOD, Mode(400.0, 0.02, 2e7)], [*others, []])] == [(2, 4), (0, 4)]
+    assert [mode.match_count for mode in match_modes([GOOD, Mode(400.0, 0.02, 2e7)], [*others, []])] == [(2, 4), (0, 4)]
 
 
 def test_the_worst_rule_decides() -> None:
     both = replace(GOOD, coherence=0.4, damping_ratio=0.5)
     assert dict(trust_rules(both)) == {"low-coherence": Trust.DOUBTFUL, "heavy-damping": Trust.REJECTED}
-    assert trust_of(both) is Trust.REJECTED
+    assert assess_trust(both) is Trust.REJECTED
 
 
 def test_a_fitted_mode_carries_the_figures() -> None:
     lines = np.arange(5.0, 2000.0, 5.0)
-    (mode,) = fit_modes(synthesize([Mode(1722.0, 0.01, 3.5e7)], lines))
+    (mode,) = fit_modes(synthesize_frf([Mode(1722.0, 0.01, 3.5e7)], lines))
     assert mode.edge_distance == pytest.approx((1995 - 1722) / 17.22, rel=1e-3)
-    assert mode.left_ringing == pytest.approx(np.exp(-2 * np.pi * 17.22 / 5), rel=1e-3)
+    assert mode.remaining_decay == pytest.approx(np.exp(-2 * np.pi * 17.22 / 5), rel=1e-3)
     assert mode.misfit_share is not None
     assert mode.misfit_share < 1e-6
-    assert trust_of(mode) is Trust.TRUSTED
+    assert assess_trust(mode) is Trust.TRUSTED

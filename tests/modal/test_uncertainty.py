@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import norm, t
 
 from acquisition import Frf, Hit, Structure, estimate_frf, from_accelerance
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_structure
-from modal import Mode, extract, fit_modes, fit_points, synthesize
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE, build_structure
+from modal import Mode, extract_modes, fit_common_modes, fit_modes, synthesize_frf
 
 STRONG, WEAK = Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)
 RECORD, PRE_TRIGGER = 6400, 512
@@ -20,9 +20,11 @@ RECORD, PRE_TRIGGER = 6400, 512
 
 
 def demo_structure() -> Structure:
-    table = parse_machine(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")).spindle
+    table = parse_machine_file(
+        resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
+    ).spindle
     assert table is not None
-    return emulated_structure(table.build(), table.damping_ratio)
+    return build_structure(table.build(), table.damping_ratio)
 
 
 STRUCTURE = demo_structure()
@@ -35,14 +37,14 @@ def tap(seed: int, hits: int = 10, hammer_noise: float = 0.1, sensor_noise: floa
     made = []
     for _ in range(hits):
         peak, width = random.uniform(150, 350), random.uniform(0.55e-3, 0.75e-3)
-        time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / SAMPLE_RATE
+        time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / EMULATED_SAMPLE_RATE
         after = time >= 0
         force = np.where(after & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         response = np.zeros(RECORD)
         response[after] = STRUCTURE.response(time[after], width)
         force = peak * force + random.normal(scale=hammer_noise, size=RECORD)
         response = peak * response + random.normal(scale=sensor_noise, size=RECORD)
-        made.append(Hit(force, response, SAMPLE_RATE, PRE_TRIGGER))
+        made.append(Hit(force, response, EMULATED_SAMPLE_RATE, PRE_TRIGGER))
     return made
 
 
@@ -52,7 +54,7 @@ def first_mode(hits: list[Hit]) -> Mode:
 
 def one_average(modes: list[Mode], lines: NDArray[np.float64], level: float, seed: int) -> Frf:
     """FRF without hits; white noise of level times the largest accelerance on it."""
-    exact = synthesize(modes, lines).accelerance
+    exact = synthesize_frf(modes, lines).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, lines.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
     return from_accelerance(lines, exact + noise[0] + 1j * noise[1])
 
@@ -74,11 +76,11 @@ def test_both_errors_are_in_the_result_and_the_hits_decide() -> None:
 def test_jackknife_of_several_frfs_leaves_out_one_hit_of_one_at_a_time() -> None:
     sets = [tap(1), tap(2, hits=6)]
     frfs = [estimate_frf(hits) for hits in sets]
-    (mode, *_), (bare, *_) = fit_points(frfs, hits=sets), fit_points(frfs)
+    (mode, *_), (bare, *_) = fit_common_modes(frfs, hits=sets), fit_common_modes(frfs)
     variance = np.zeros(3)
     for i, hits in enumerate(sets):
         without = [estimate_frf(hits[:k] + hits[k + 1 :]) for k in range(len(hits))]
-        left = np.array([values(fit_points([*frfs[:i], one, *frfs[i + 1 :]])[0]) for one in without])
+        left = np.array([values(fit_common_modes([*frfs[:i], one, *frfs[i + 1 :]])[0]) for one in without])
         variance += (1 - 1 / len(hits)) * np.sum((left - left.mean(axis=0)) ** 2, axis=0)
     assert mode.n_hits == 6
     assert mode.standard_error[1:] == pytest.approx(np.sqrt(variance[1:]), rel=0.15)
@@ -88,18 +90,18 @@ def test_jackknife_of_several_frfs_leaves_out_one_hit_of_one_at_a_time() -> None
 
 def test_two_frfs_with_hits_are_known_better_than_one() -> None:
     sets = [tap(1), tap(2)]
-    one, two = first_mode(sets[0]), fit_points([estimate_frf(hits) for hits in sets], hits=sets)[0]
+    one, two = first_mode(sets[0]), fit_common_modes([estimate_frf(hits) for hits in sets], hits=sets)[0]
     assert two.fit_error[0] == pytest.approx(one.fit_error[0] / np.sqrt(2), rel=0.2)
 
 
 def test_hits_of_a_single_frf_of_several_count_without_a_jackknife() -> None:
     sets = [tap(1), tap(2)]
     frfs = [estimate_frf(hits) for hits in sets]
-    some, none = fit_points(frfs, hits=[sets[0], []])[0], fit_points(frfs)[0]
+    some, none = fit_common_modes(frfs, hits=[sets[0], []])[0], fit_common_modes(frfs)[0]
     assert some.jackknife is None
     assert some.fit_error[0] > none.fit_error[0]
     with pytest.raises(ValueError, match="hits of 1 FRFs for 2"):
-        fit_points(frfs, hits=sets[:1])
+        fit_common_modes(frfs, hits=sets[:1])
 
 
 def test_jackknife_is_that_of_refitted_frfs() -> None:
@@ -124,7 +126,7 @@ def test_two_hits_have_no_jackknife(n_hits: int) -> None:
 @pytest.mark.parametrize("n_hits", [1, 3])
 def test_hits_of_another_record_are_refused(n_hits: int) -> None:
     hits = tap(0, n_hits)
-    short = [Hit(hit.force[:4096], hit.acceleration[:4096], SAMPLE_RATE, PRE_TRIGGER) for hit in hits]
+    short = [Hit(hit.force[:4096], hit.acceleration[:4096], EMULATED_SAMPLE_RATE, PRE_TRIGGER) for hit in hits]
     with pytest.raises(ValueError, match="differ in their frequency lines"):
         fit_modes(estimate_frf(hits), hits=short)
 
@@ -149,7 +151,7 @@ def test_hits_see_the_noise_of_the_hammer() -> None:
 def test_interval_is_students_over_hits_and_with_the_freedom_of_the_fit_without() -> None:
     cov = np.diag([4.0, 1e-8, 9e8])
     alone = Mode(1722.0, 0.03, 3.5e7, cov)
-    of_few_lines = Mode(1722.0, 0.03, 3.5e7, cov, freedom=13)
+    of_few_lines = Mode(1722.0, 0.03, 3.5e7, cov, degrees_of_freedom=13)
     over_hits = Mode(1722.0, 0.03, 3.5e7, cov, jackknife=4 * cov, n_hits=10)
     assert alone.interval()[0] == pytest.approx(1722 + norm.ppf([0.025, 0.975]) * 2)
     assert of_few_lines.interval()[0] == pytest.approx(1722 + t.ppf([0.025, 0.975], 13) * 2)
@@ -162,12 +164,12 @@ def test_interval_is_students_over_hits_and_with_the_freedom_of_the_fit_without(
 def test_freedom_of_a_fit_is_twice_its_lines_less_unknowns() -> None:
     """One mode has three, four complex residual terms eight."""
     (mode,) = fit_modes(one_average([STRONG], np.linspace(1300.0, 1700.0, 12), 0.001, 0))
-    assert mode.freedom == 2 * 12 - 3 - 8
+    assert mode.degrees_of_freedom == 2 * 12 - 3 - 8
 
 
 def test_freedom_is_positive() -> None:
     with pytest.raises(ValueError, match="freedom=0 is not"):
-        Mode(1722.0, 0.03, 3.5e7, freedom=0)
+        Mode(1722.0, 0.03, 3.5e7, degrees_of_freedom=0)
 
 
 def test_correlation_of_damping_and_stiffness_of_a_driving_point_is_negative() -> None:
@@ -199,7 +201,7 @@ def share_held(modes: list[Mode], reach: NDArray[np.float64]) -> NDArray[np.floa
 def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_noise: float) -> None:
     """That of the fit for any number of hits, that over hits for ten."""
     modes = [first_mode(tap(1000 + seed, n_hits, hammer_noise)) for seed in range(TESTS)]
-    of_fit = share_held(modes, np.array([t.ppf(0.975, mode.freedom) * mode.fit_error for mode in modes]))
+    of_fit = share_held(modes, np.array([t.ppf(0.975, mode.degrees_of_freedom) * mode.fit_error for mode in modes]))
     shown = share_held(modes, np.array([mode.quantile() * mode.standard_error for mode in modes]))
     print(f"{n_hits} hits, hammer noise {hammer_noise} N: of the fit {of_fit}, shown {shown}")  # noqa: T201
     for share in (of_fit, shown):
@@ -208,7 +210,7 @@ def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_no
 
 def correlation_of_neighbouring_lines(hits: list[Hit]) -> float:
     """Of what the fit of the first mode leaves, weighted."""
-    left = extract([estimate_frf(hits)]).bands[0].fit.complex_residual[0]
+    left = extract_modes([estimate_frf(hits)]).bands[0].fit.complex_residual[0]
     return float(np.real(np.vdot(left[:-1], left[1:])) / np.linalg.norm(left) ** 2)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf
-from modal import Mode, fit_modes, remove_window, synthesize, with_windowed_noise
+from modal import Mode, fit_modes, remove_window, synthesize_frf, widen_for_window
 
 MODE = Mode(1722.0, 0.03, 3.5e7)
 LINES = np.arange(1000.0, 2600.0, 2.0)
@@ -21,7 +21,7 @@ def windowed(mode: Mode, tau: float) -> Frf:
 
 
 def test_an_endless_window_changes_nothing() -> None:
-    assert windowed(MODE, 1e12).receptance == pytest.approx(synthesize([MODE], LINES).receptance, rel=1e-9)
+    assert windowed(MODE, 1e12).receptance == pytest.approx(synthesize_frf([MODE], LINES).receptance, rel=1e-9)
 
 
 @pytest.mark.parametrize("tau", [0.02, 0.1, 1.0])
@@ -93,9 +93,9 @@ def test_a_window_cannot_begin_after_the_hit(delay: float) -> None:
 
 
 def test_noise_under_a_window_widens_the_errors_as_its_lines_are_alike() -> None:
-    base = Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2, freedom=100, phase_deg_std=0.3)
-    none, short = with_windowed_noise(base, 1e6, 0.25), with_windowed_noise(base, 0.01, 0.25)
+    base = Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2, degrees_of_freedom=100, phase_deg_std=0.3)
+    none, short = widen_for_window(base, 1e6, 0.25), widen_for_window(base, 0.01, 0.25)
     assert none.standard_error == pytest.approx(base.standard_error, rel=1e-6)
     assert short.standard_error == pytest.approx(5 * base.standard_error, rel=1e-6)
     assert short.phase_deg_std == pytest.approx(5 * 0.3, rel=1e-6)
-    assert short.freedom == pytest.approx(4)
+    assert short.degrees_of_freedom == pytest.approx(4)

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from verdict_study import MACHINE
 
 from acquisition import Frf
-from lobes import shown_modes
+from lobes import project_modes
 from lobewatch.machine import FEED_ANGLES, ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.draws import as_program, worst_limit
-from lobewatch.verdicts.verdict import Verdict, Word, judge
-from lobewatch.verdicts.ways import ways
-from modal import Mode, believed, fit_modes, synthesize
+from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of, find_worst_limit
+from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
+from modal import Mode, fit_modes, select_credible_modes, synthesize_frf
 
 LINES = np.arange(100.0, 5000.0, 2.0)
 NOISE = 0.001
@@ -53,9 +52,9 @@ class AskewSpindle:
 
     def assembly(self, rng: np.random.Generator, across: bool) -> Assembly:
         """The tool as tap tests show it."""
-        x, y, cross = (_fitted(modes, rng) for modes in shown_modes(self.modes, self.vectors))
+        x, y, cross = (_fitted(modes, rng) for modes in project_modes(self.modes, self.vectors))
         time, sides = datetime(2026, 1, 1, tzinfo=UTC), ("x", "y")
-        x, y = (list(believed(modes).modes) for modes in (x, y))
+        x, y = (list(select_credible_modes(modes).modes) for modes in (x, y))
         return Assembly("reference", time, "drawn", x, y, sides, None, {}, False, (), cross=cross if across else None)
 
     def truths(self, depth_mm: float) -> Iterator[DelayedCase]:
@@ -78,7 +77,7 @@ class AskewSpindle:
 
 
 def _fitted(modes: list[Mode], rng: np.random.Generator) -> list[Mode]:
-    receptance = synthesize(modes, LINES).receptance
+    receptance = synthesize_frf(modes, LINES).receptance
     noise = NOISE * np.max(np.abs(receptance)) / math.sqrt(2)
     return fit_modes(Frf(LINES, receptance + noise * (rng.normal(size=LINES.size) + 1j * rng.normal(size=LINES.size))))
 
@@ -121,10 +120,12 @@ def sayings(count: int, seed: int, across: bool = False) -> list[Saying]:
     for rng in np.random.default_rng(seed).spawn(4 * count):
         spindle = random_spindle(rng)
         tool = spindle.assembly(rng, across)
-        limit, _, _ = worst_limit(as_program(spindle.cut, MACHINE), tool, ways(spindle.cut, MACHINE, tool))
+        limit, _, _ = find_worst_limit(
+            build_program(spindle.cut, MACHINE), tool, cutting_conditions_of(spindle.cut, MACHINE, tool)
+        )
         if 1e3 * limit.limit < DEEPEST_MM and len(made) < count:
-            verdict = judge(_at(spindle.cut, 1e3 * limit.limit / 2), tool, MACHINE)
-            made += [Saying(spindle, verdict)] if verdict.word is not Word.UNKNOWN else []
+            verdict = evaluate_program(_at(spindle.cut, 1e3 * limit.limit / 2), tool, MACHINE)
+            made += [Saying(spindle, verdict)] if verdict.stability is not Stability.UNKNOWN else []
     return made
 
 

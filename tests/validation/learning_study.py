@@ -19,13 +19,13 @@ from shown_power import FEED, ShownPower
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
-from lobes import Cut, milling_system, rows_of
-from lobewatch.cuts.learning.contradicting import contradictions
+from lobes import Cut, build_milling_system, rows_at_speeds
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, speeds_between
-from lobewatch.cuts.learning.posterior import Posterior, prior
-from lobewatch.cuts.learning.suggest import suggest
-from lobewatch.verdicts.doubt import Doubt, Span
+from lobewatch.cuts.learning.expected_gain import CutGrid, list_speeds
+from lobewatch.cuts.learning.label_check import find_inconsistent_cuts
+from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import suggest_cut
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ class ForeignTruth:
         self.tangential = TANGENTIAL * (0.72 if draw.uniform() < 0.5 else 1.35)
         self.radial = self.tangential * draw.uniform(0.1, 0.9)
         self.runout = tuple(draw.uniform(0, 2e-5, TEETH).tolist())
-        self.speeds = speeds_between(LOW, HIGH)
+        self.speeds = list_speeds(LOW, HIGH)
         limits = slot_limits(self.x, self.y, self.tangential, self.radial, self.speeds)
         self.limits = np.minimum(limits, DEEPEST)
         depths = np.floor(self.limits / STEP + 1e-6) * STEP
@@ -90,8 +90,10 @@ class ForeignTruth:
         x, y = ([Mode(*mode) for mode in modes] for modes in self.tapped)
         count = len(x) + len(y)
         exact = {"tap": np.zeros((count, 4))}
-        doubt = Doubt(exact, np.tile(np.eye(4), (count, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
-        return prior(rows_of(milling_system(x, y), CUT, np.ones(1)), doubt)
+        doubt = Uncertainty(
+            exact, np.tile(np.eye(4), (count, 1, 1)), 0.01, FactorRange(0.8, 1.2), FactorRange(0.8, 1.2)
+        )
+        return build_prior(rows_at_speeds(build_milling_system(x, y), CUT, np.ones(1)), doubt)
 
     @staticmethod
     def _tapped(draw: np.random.Generator, count: int) -> Modes:
@@ -101,9 +103,9 @@ class ForeignTruth:
 
     def suggested(self) -> tuple[float, float] | None:
         """Speed (rpm) and depth (m) of the next test cut."""
-        grid = Grid(CUT, (0.0,), self.speeds, np.full(self.speeds.shape, DEEPEST), np.ones(self.speeds.shape))
-        doubted = [contradicting.cut for contradicting in contradictions(self.learnt)] if self.cuts else []
-        suggestion = suggest(self.learnt, grid, self.cuts, CUTS - len(self.cuts), doubted)
+        grid = CutGrid(CUT, (0.0,), self.speeds, np.full(self.speeds.shape, DEEPEST), np.ones(self.speeds.shape))
+        doubted = [contradicting.cut for contradicting in find_inconsistent_cuts(self.learnt)] if self.cuts else []
+        suggestion = suggest_cut(self.learnt, grid, self.cuts, CUTS - len(self.cuts), doubted)
         return None if suggestion is None else (suggestion.speed_rpm, suggestion.depth)
 
     def milling(self, speed_rpm: float, depth: float) -> MillingCut:
@@ -139,7 +141,7 @@ class ForeignTruth:
         heard = [
             cut.speed_rpm * cut.depth
             for cut, truly in zip(self.cuts, self.truly_stable, strict=True)
-            if truly and not cut.chatters
+            if truly and not cut.has_chatter
         ]
         return min(max(heard, default=0.0) / (self.optimum[0] * self.optimum[1]), 1.0)
 
@@ -157,7 +159,7 @@ def heard(cuts: Sequence[MillingCut]) -> list[float]:
     """Chatter frequency (Hz) of cuts from their motion alone; NaN of those that repeat from turn to turn."""
     sounds = [math.nan] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
-        if motion.wander < CHATTERS:
+        if motion.nonperiodic_share < CHATTERS:
             continue
         turn = round(motion.sample_rate * cuts[number].tooth_period * TEETH)
         steady = motion.acceleration[:, int(motion.sample_rate * 0.4) : int(motion.sample_rate * 0.82)]

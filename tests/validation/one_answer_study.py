@@ -16,18 +16,16 @@ import numpy as np
 from random_milling import RandomMilling, random_case
 from verdict_study import MACHINE, assembly, limit_mm, program
 
-from lobes import growth, milling_system, piece_numbers, rows_of
+from lobes import build_milling_system, count_pieces, growth_rate, rows_at_speeds
 from lobewatch.machine import ProgramTable
-from lobewatch.machine.settings.cut_range import MM
+from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.advice import advise, robust_pockets
-from lobewatch.verdicts.draws import as_program, draw, worst_limit
-from lobewatch.verdicts.recommendation import recommend
-from lobewatch.verdicts.room import DEEPER, at_ends
-from lobewatch.verdicts.setting import Setting
-from lobewatch.verdicts.setting_search import SPARE, SettingSearch
-from lobewatch.verdicts.spindle_at_speed import AT_REST
-from lobewatch.verdicts.verdict import Word, judge
+from lobewatch.verdicts.program_samples import build_program, draw_samples, find_worst_limit
+from lobewatch.verdicts.recommendation import advise, find_stable_pockets, recommend
+from lobewatch.verdicts.setting_robustness import ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
+from lobewatch.verdicts.setting_search import MIN_DEPTH_MARGIN, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.verdict import Stability, evaluate_program
 
 STEP = 0.01
 """Relative step of the speeds of the dense grid."""
@@ -62,7 +60,7 @@ def answers(numbers: range, seed: int, most_modes: int = 12, dense: bool = True)
         limit = limit_mm(milling) if len(milling.x + milling.y) <= most_modes else math.inf
         if not math.isfinite(limit):
             continue
-        table, tool = program(milling, max(MM, limit * rng.uniform(0.3, 2.5))), assembly(milling)
+        table, tool = program(milling, max(DEPTH_STEP_MM, limit * rng.uniform(0.3, 2.5))), assembly(milling)
         ask_everywhere(counts, f"{seed}.{number}", table, tool)
         if dense and len(counts.shares) < counts.cuts:
             counts.shares.append(share_of_best(SettingSearch(table, tool, MACHINE)))
@@ -75,27 +73,29 @@ def answers(numbers: range, seed: int, most_modes: int = 12, dense: bool = True)
 
 def ask_everywhere(counts: Answers, name: str, table: ProgramTable, tool: Assembly) -> None:
     """Ask `check`, `lobes` and `recommend` of one cut."""
-    verdict = judge(table, tool, MACHINE)
-    if verdict.word is Word.UNKNOWN:
+    verdict = evaluate_program(table, tool, MACHINE)
+    if verdict.stability is Stability.UNKNOWN:
         return  # its depth is not plausible: `check` asks about it first
-    advice, pockets = advise(verdict, MACHINE), robust_pockets(table, tool, MACHINE)
+    advice, pockets = advise(verdict, MACHINE), find_stable_pockets(table, tool, MACHINE)
     begin = time.process_time()
-    free = recommend(table, tool, MACHINE, AT_REST).setting
+    free = recommend(table, tool, MACHINE, NO_TEST_CUTS).setting
     counts.seconds.append(time.process_time() - begin)
-    at_depth = recommend(table, tool, MACHINE, AT_REST, depth_mm=table.depth_mm).setting
+    at_depth = recommend(table, tool, MACHINE, NO_TEST_CUTS, depth_mm=table.depth_mm).setting
     counts.cuts += 1
     for what, is_so in {
         "pockets and recommendation": bool(pockets) == (free is not None),
         "first pocket and recommendation": not pockets or pockets[0] == free,
-        "advice and recommendation": verdict.word is Word.STABLE or (advice.best is None) == (free is None),
-        "advice and recommendation at its depth": verdict.word is Word.STABLE
+        "advice and recommendation": verdict.stability is Stability.STABLE or (advice.best is None) == (free is None),
+        "advice and recommendation at its depth": verdict.stability is Stability.STABLE
         or _has_depth(advice.best, table) == (at_depth is not None),
     }.items():
         counts.contradictions += [] if is_so else [f"{name}: {what}"]
-    named = {(s.speed_rpm, s.depth_mm) for s in (free, at_depth, advice.best, advice.here, *pockets) if s is not None}
+    named = {
+        (s.speed_rpm, s.depth_mm) for s in (free, at_depth, advice.best, advice.deepest_here, *pockets) if s is not None
+    }
     counts.settings += len(named)
     for speed, depth in sorted(named):
-        if judge(_at(table, speed, depth), tool, MACHINE).word is not Word.STABLE:
+        if evaluate_program(_at(table, speed, depth), tool, MACHINE).stability is not Stability.STABLE:
             counts.refused.append(f"{name}: {speed:g} rpm, {depth:g} mm")
 
 
@@ -108,28 +108,28 @@ def share_of_best(search: SettingSearch) -> float:
 
 def _deeper(search: SettingSearch, chips: float) -> Iterator[float]:
     """Chips of settings of the grid with ever more of them than so many (rpm mm)."""
-    speeds, most = search.reach.speeds(STEP)[::-1], chips
+    speeds, most = search.cut_range.speeds(STEP)[::-1], chips
     thinkable = _middle_is_calm(search, speeds, chips)
     for speed in speeds[thinkable].tolist():
-        deepest = float(search.reach.depths(np.array([speed]))[0])
-        depth = (math.floor(most / speed / MM) + 1) * MM
+        deepest = float(search.cut_range.depth_limits(np.array([speed]))[0])
+        depth = (math.floor(most / speed / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM
         while depth <= deepest and _may_pass(search, speed, depth):
-            if not isinstance(search.verified(speed, round(depth, 6)), Setting):
+            if not isinstance(search.verify(speed, round(depth, 6)), Setting):
                 break
             most = speed * depth
             yield most
-            depth += max(MM, math.floor(DEEPER_STEP * depth / MM) * MM)
+            depth += max(DEPTH_STEP_MM, math.floor(DEEPER_STEP * depth / DEPTH_STEP_MM) * DEPTH_STEP_MM)
 
 
 def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> np.ndarray:
     """Whether the middle is stable at speeds (rpm) at the depth that so many chips ask for, with all to spare."""
-    depths = (np.floor(chips / speeds / MM) + 1) * MM * (1 + SPARE) / 1e3
+    depths = (np.floor(chips / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM * (1 + MIN_DEPTH_MARGIN) / 1e3
     calm = np.ones(speeds.size, dtype=bool)
-    for vectors in search.spindle.axes.patterns:
-        system = milling_system(search.spindle.x, search.spindle.y, vectors)
+    for vectors in search.spindle.principal_directions.sign_patterns:
+        system = build_milling_system(search.spindle.x, search.spindle.y, vectors)
         for cut in search.cuts:
-            rows = rows_of(system, cut, speeds[calm])
-            grown = growth(rows, depths[calm, np.newaxis], piece_numbers(rows, float(np.max(depths))))[:, 0]
+            rows = rows_at_speeds(system, cut, speeds[calm])
+            grown = growth_rate(rows, depths[calm, np.newaxis], count_pieces(rows, float(np.max(depths))))[:, 0]
             calm[calm] = grown < 0
             if not np.any(calm):
                 return calm
@@ -138,14 +138,16 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
     """Whether the middle and the hardest draws let a setting pass."""
-    at = as_program(_at(search.table, speed, depth_mm), MACHINE)
-    limit, axes, _ = worst_limit(at, search.spindle, search.cuts)
-    if limit.limit < (1 + SPARE) * at.depth:
+    at = build_program(_at(search.table, speed, depth_mm), MACHINE)
+    limit, axes, _ = find_worst_limit(at, search.spindle, search.cuts)
+    if limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
         return False
-    drawn = draw(at, limit, search.cuts, search.spindle, search.doubt, axes).fed(np.inf, 2)
+    drawn = draw_samples(at, limit, search.cuts, search.spindle, search.uncertainty, axes).with_lowest_cuts(np.inf, 2)
     force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
     hardest = drawn[np.argsort(-np.max(force, axis=1))[:HARDEST]]
-    return not np.any(at_ends(hardest, search.fall, search.stiffness_at).growth(DEEPER * at.depth) >= 0)
+    return not np.any(
+        sweep_extremes(hardest, search.needed_drop, search.stiffness_at).growth(ROBUST_DEPTH_FACTOR * at.depth) >= 0
+    )
 
 
 def _at(table: ProgramTable, speed: float, depth_mm: float) -> ProgramTable:

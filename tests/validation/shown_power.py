@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from lobes import Cut
-from lobewatch.cuts.learning.force_by_power import ForceByPower, force_by_power
-from lobewatch.machine.settings.cut_power import PowerReading
+from lobewatch.cuts.learning.cut_evidence import PowerEvidence, estimate_force_by_power
+from lobewatch.machine.settings.drive_power import PowerReading
 
 DIAMETER, FEED, EDGE_LENGTH = 0.016, 1e-4, 2.5e-5
 """Diameter of the tool, feed per tooth and Kte over Kt (m) as machine.toml has them."""
@@ -30,7 +30,7 @@ class ShownPower:
         harder = (tangential / cut.tangential) ** random.uniform()
         self.edge = EDGE_LENGTH * cut.tangential * harder * random.uniform(*DULL)
 
-    def says(self, speed_rpm: float, depth: float, truly_stable: bool, chatters: bool) -> ForceByPower:
+    def says(self, speed_rpm: float, depth: float, truly_stable: bool, chatters: bool) -> PowerEvidence:
         """What a slot says that is stable or not, and is called so or not.
 
         Kt times the chips removed in a second, and the edges on half of a turn.
@@ -40,4 +40,4 @@ class ShownPower:
         watts *= self.shown * (1 + READ * self.random.standard_normal())
         watts *= 1.0 if truly_stable else self.random.uniform(*CHATTERING)
         reading = PowerReading(watts, self.cut, depth, DIAMETER, FEED, EDGE_LENGTH * self.cut.tangential)
-        return force_by_power(reading.at(speed_rpm), self.cut, chatters)
+        return estimate_force_by_power(reading.at(speed_rpm), self.cut, chatters)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from askew_study import hold, sayings
 
-from lobewatch.verdicts.verdict import Word
+from lobewatch.verdicts.verdict import Stability
 
 
 def say(text: str) -> None:
@@ -23,7 +23,7 @@ def say(text: str) -> None:
 def test_limits_of_askew_spindles_are_not_below_what_is_said(count: int, across: bool) -> None:
     said = sayings(count, seed=1, across=across)
     holds = hold(said, 0.95)
-    stable = np.mean([saying.verdict.word is Word.STABLE for saying in said])
+    stable = np.mean([saying.verdict.stability is Stability.STABLE for saying in said])
     say(f"{np.mean(holds):.1%} hold 0.95 of the low end; at half the limit {stable:.1%} are called stable")
     assert np.mean(holds) >= 0.95
     assert stable >= (0.85 if count > 20 else 0.5)

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from dsm import Bearing, Segment, Spindle, modal_stiffness, modes_at, natural_frequencies, receptance, static_stiffness
-from dsm.matrix.assemble import Held
+from dsm.matrix.assemble import HeldDof
 from dsm.modes.find_modes import find_modes
 
 SECTION = Segment(1.0, 1.0)
-PINNED: list[Held] = [(0.0, 0)]
-CLAMPED: list[Held] = [(0.0, 0), (0.0, 1)]
-FAR_PINNED: list[Held] = [(1.0, 0)]
-FAR_CLAMPED: list[Held] = [(1.0, 0), (1.0, 1)]
+PINNED: list[HeldDof] = [(0.0, 0)]
+CLAMPED: list[HeldDof] = [(0.0, 0), (0.0, 1)]
+FAR_PINNED: list[HeldDof] = [(1.0, 0)]
+FAR_CLAMPED: list[HeldDof] = [(1.0, 0), (1.0, 1)]
 FIXED_ROOTS = [22.373285448061, 61.67282286792, 120.90339172712, 199.8594481272]
 
 
@@ -42,7 +42,7 @@ def unit_beam(*bearings: Bearing, pieces: int = 1) -> Spindle:
     ],
     ids=["clamped-free", "clamped-clamped", "pinned-pinned", "clamped-pinned", "free-free", "guided-guided"],
 )
-def test_classical_ends(held: list[Held], expected: list[float], pieces: int) -> None:
+def test_classical_ends(held: list[HeldDof], expected: list[float], pieces: int) -> None:
     modes = find_modes(unit_beam(pieces=pieces), len(expected), held=held)
     assert 2 * math.pi * modes.frequency == pytest.approx(expected, rel=2e-11, abs=0)
 

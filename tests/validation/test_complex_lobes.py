@@ -18,14 +18,14 @@ from lobes import (
     Cut,
     Program,
     StabilityLobes,
-    average_angle,
-    milling_system,
+    average_angle_lobes,
+    build_milling_system,
     program_limit,
     spectral_radius,
     stability_boundary,
-    zero_order,
+    zero_order_lobes,
 )
-from modal import Mode, fit_modes, synthesize
+from modal import Mode, fit_modes, synthesize_frf
 
 Phased = tuple[tuple[float, float, float, float], ...]
 Method = Callable[[Frf | Sequence[Mode] | None, Frf | Sequence[Mode] | None, Cut, ArrayLike], StabilityLobes]
@@ -135,7 +135,7 @@ def test_in_a_slot_with_four_teeth_limits_and_frequencies_are_those_of_zero_orde
     """The force is constant there, so zero order is exact and knows the modes by their receptance alone."""
     x, y = map(modes_of, two_and_two())
     speeds = np.linspace(4000.0, 12000.0, 12)
-    exact = zero_order(x, y, cut_of(4, 1.0), speeds)
+    exact = zero_order_lobes(x, y, cut_of(4, 1.0), speeds)
     found = stability_boundary(x, y, cut_of(4, 1.0), speeds, 0.02)
     assert found.depth == pytest.approx(exact.depth, rel=1e-4)
     assert found.chatter_frequency == pytest.approx(exact.chatter_frequency, rel=1e-4)
@@ -144,7 +144,7 @@ def test_in_a_slot_with_four_teeth_limits_and_frequencies_are_those_of_zero_orde
 def test_the_system_shows_the_receptance_of_its_modes() -> None:
     x, y = map(modes_of, two_and_two())
     at = np.linspace(0.0, 5000.0, 101)
-    receptance = milling_system(x, y).receptance(at)
+    receptance = build_milling_system(x, y).receptance(at)
     for axis, modes in enumerate((x, y)):
         assert receptance[:, axis, axis] == pytest.approx(sum(mode.receptance(at) for mode in modes), rel=1e-12)
     assert not np.any(receptance[:, 0, 1])
@@ -161,19 +161,19 @@ def test_damping_beyond_the_critical_is_taken_of_real_modes() -> None:
     assert np.all(np.isfinite(spectral_radius([real, turned], None, cut_of(2, 0.5), 6000.0, [1e-3, 1e-2])))
 
 
-@pytest.mark.parametrize("method", [zero_order, average_angle])
+@pytest.mark.parametrize("method", [zero_order_lobes, average_angle_lobes])
 @pytest.mark.parametrize("phase", [1.0, -1.0])
 def test_limits_from_modes_are_those_from_their_frf(method: Method, phase: float) -> None:
     x, y = map(modes_of, two_and_two([phase * given for given in TURNED]))
     from_modes = method(x, y, cut_of(3, 1.0), SPEEDS).depth
-    from_frf = method(synthesize(x, LINES), synthesize(y, LINES), cut_of(3, 1.0), SPEEDS).depth
+    from_frf = method(synthesize_frf(x, LINES), synthesize_frf(y, LINES), cut_of(3, 1.0), SPEEDS).depth
     assert from_frf == pytest.approx(from_modes, rel=2e-3)
 
 
 def measured(tip: Phased, noise: float, seed: int) -> Frf:
     """FRF of a tip with noise of this share of its largest accelerance at each line."""
     lines, rng = np.arange(100.0, 4000.0, 1.0), np.random.default_rng(seed)
-    true = synthesize(modes_of(tip), lines)
+    true = synthesize_frf(modes_of(tip), lines)
     normal = rng.normal(size=(2, lines.size)) / math.sqrt(2)
     error = noise * np.max(np.abs(true.accelerance)) * (normal[0] + 1j * normal[1])
     return Frf(lines, true.receptance - error / (2 * np.pi * lines) ** 2, measured_as="accelerance")
@@ -182,7 +182,7 @@ def measured(tip: Phased, noise: float, seed: int) -> Frf:
 def far_apart(modes: Sequence[Mode], frf: Frf) -> tuple[float, float]:
     """How far limits from modes are from those of the FRF, relative: the lowest, and over speeds."""
     cut = cut_of(4, 1.0)
-    one, other = (zero_order(tip, tip, cut, SPEEDS) for tip in (modes, frf))
+    one, other = (zero_order_lobes(tip, tip, cut, SPEEDS) for tip in (modes, frf))
     return abs(one.minimum.depth / other.minimum.depth - 1), float(np.max(np.abs(one.depth / other.depth - 1)))
 
 

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from dsm import Bearing, LumpedMass, Segment, Spindle, natural_frequencies
-from dsm.modes.critical_speed import critical_speed
 from dsm.modes.find_modes import find_modes
-from dsm.modes.whirl_map import whirl_map
+from dsm.modes.whirl_map import critical_speed, whirl_map
 
 DENSITY = 7810.0
 

@@ -51,7 +51,9 @@ def test_the_power_of_a_truth_says_its_kt_within_the_error_that_is_reckoned_with
         one.write_down(9000.0, 1e-4, math.nan)
         power = one.cuts[0].power
         assert power is not None
-        off.append(math.log(power.force * TANGENTIAL / one.tangential) / math.hypot(power.common, power.own))
+        off.append(
+            math.log(power.force * TANGENTIAL / one.tangential) / math.hypot(power.common_error, power.own_error)
+        )
     assert abs(np.mean(off)) < 0.4
     assert 0.6 < np.std(off) < 1.3
 
@@ -61,7 +63,7 @@ def test_a_few_spindles_reach_most_of_their_optimum_with_and_without_a_word_that
     right, wrong = [ForeignTruth(number) for number in range(4)], [ForeignTruth(2, mislabelled=2)]
     make_cuts([*right, *wrong])
     assert reached(right)[0] >= 0.8
-    assert wrong[0].cuts[1].chatters == wrong[0].truly_stable[1]
+    assert wrong[0].cuts[1].has_chatter == wrong[0].truly_stable[1]
     assert wrong[0].reached >= 0.5
 
 

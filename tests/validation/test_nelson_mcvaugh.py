@@ -11,7 +11,7 @@ from itertools import pairwise
 import pytest
 
 from dsm import Bearing, LumpedMass, Segment, Spindle, natural_frequencies
-from dsm.modes.critical_speed import critical_speed
+from dsm.modes.whirl_map import critical_speed
 
 NODE_CM = "0 1.27 5.08 7.62 8.89 10.16 10.67 11.43 12.70 13.46 16.51 19.05 22.86 26.67 28.70 30.48 31.50 34.54 35.81"
 OUTER_RADIUS_CM = "0.51 1.02 0.76 2.03 2.03 3.30 3.30 2.54 2.54 1.27 1.27 1.52 1.52 1.27 1.27 3.81 2.03 2.03"

@@ -11,8 +11,8 @@ from random_milling import random_case
 from verdict_study import MACHINE, assembly, program
 
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.verdicts.advice import robust_pockets
-from lobewatch.verdicts.setting import Setting
+from lobewatch.verdicts.recommendation import find_stable_pockets
+from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
 
 
@@ -63,29 +63,29 @@ def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_
     """Few depths are looked at on the way, and step over such islands."""
     search = search_of(number, depth_mm)
     assert search.best is not None
-    nearest = search.nearest(search.table.depth_mm, search.table.speed_rpm)
+    nearest = search.nearest_window(search.table.depth_mm, search.table.speed_rpm)
     assert nearest is None or search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
 
 
 def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
     search = search_of(234)
-    less = search.verified(24000.0, 1.45)
+    less = search.verify(24000.0, 1.45)
     assert isinstance(less, float)
     assert less < 1.3
-    assert isinstance(search.verified(24000.0, search.reach.floored(less)), Setting)
+    assert isinstance(search.verify(24000.0, search.cut_range.round_down_depth(less)), Setting)
 
 
 def test_one_look_at_a_depth_at_which_draws_chatter_in_a_cut_passed_over_says_how_deep_is_safe() -> None:
     """Of the directions of feed those are looked at first in which the middle is near its limit."""
     search = search_of(71, 0.4388)
-    less = search.verified(15600.0, 1.25)
+    less = search.verify(15600.0, 1.25)
     assert isinstance(less, float)
     assert 0.95 < less < 1.05
-    assert isinstance(search.verified(15600.0, search.reach.floored(less)), Setting)
+    assert isinstance(search.verify(15600.0, search.cut_range.round_down_depth(less)), Setting)
 
 
 def test_no_depth_is_named_that_is_so_small_that_it_would_be_asked_about() -> None:
     table, tool = search_of(934).table, search_of(934).assembly
-    named = robust_pockets(table, tool, MACHINE)
+    named = find_stable_pockets(table, tool, MACHINE)
     assert named
     assert min(setting.depth_mm for setting in named) >= 0.002 * table.tool_diameter_mm > 0.05

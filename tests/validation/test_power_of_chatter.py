@@ -11,7 +11,7 @@ from milling_steps import Case
 from plain_milling import PlainCut, plain_cut
 
 from lobes import Cut
-from lobewatch.machine.settings.cut_power import PowerReading
+from lobewatch.machine.settings.drive_power import PowerReading
 
 X, Y = ((1500.0, 0.03, 2e7),), ((1400.0, 0.035, 2.2e7),)
 KT, KR, FEED, DIAMETER, EDGE = 8e8, 2.4e8, 1e-4, 0.016, 2e4

@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from lobes import Cut, StabilityLobes, average_angle
+from lobes import Cut, StabilityLobes, average_angle_lobes
 from modal import Mode
 
 
@@ -46,7 +46,7 @@ def test_example_4_3_orientation_and_teeth_in_cut() -> None:
 
 
 def test_example_4_3_limits_at_five_speeds() -> None:
-    lobes = average_angle([MODE], None, slot(), [3000, 4500, 6000, 7400, 9000])
+    lobes = average_angle_lobes([MODE], None, slot(), [3000, 4500, 6000, 7400, 9000])
     assert lobes.depth * 1e3 == pytest.approx([0.8489, 0.6032, 3.5954, 8.8163, 0.6884], abs=5e-5)
     assert list(lobes.kind) == ["hopf"] * 5
     assert lobes.method == "average angle"
@@ -55,7 +55,7 @@ def test_example_4_3_limits_at_five_speeds() -> None:
 @pytest.mark.parametrize("lobe", [0, 1, 2, 3, 20])
 def test_example_4_3_minimum_of_each_lobe(lobe: int) -> None:
     speed = best_speed(500 * math.sqrt(1.04), MODE, 4, lobe)
-    lobes = average_angle([MODE], None, slot(), speed)
+    lobes = average_angle_lobes([MODE], None, slot(), speed)
     assert lobes.depth[0] * 1e3 == pytest.approx(0.58088, abs=5e-6)
     assert lobes.chatter_frequency[0] == pytest.approx(509.902, abs=5e-4)
 
@@ -65,7 +65,7 @@ def test_example_4_3_minimum_of_each_lobe(lobe: int) -> None:
 def test_closed_form_of_one_mode(mode: Mode, teeth: int) -> None:
     zeta, cut = mode.damping_ratio, slot(teeth)
     chatter = mode.frequency * math.sqrt(1 + 2 * zeta)
-    lobes = average_angle([mode], None, cut, best_speed(chatter, mode, teeth, 2))
+    lobes = average_angle_lobes([mode], None, cut, best_speed(chatter, mode, teeth, 2))
     expected = 2 * mode.stiffness * zeta * (1 + zeta) / loop_gain(cut)
     assert lobes.depth[0] == pytest.approx(expected, rel=1e-12)
     assert lobes.chatter_frequency[0] == pytest.approx(chatter, rel=1e-7)
@@ -76,7 +76,7 @@ def test_closed_form_where_the_orientation_is_negative() -> None:
     cut = Cut(3, 0.1, "down", 600e6, 200e6)
     mode, zeta = Mode(800.0, 0.04, 2e7), 0.04
     assert cut.orientation_factors[0] < 0
-    lobes = average_angle([mode], None, cut, np.linspace(5000, 15000, 20001))
+    lobes = average_angle_lobes([mode], None, cut, np.linspace(5000, 15000, 20001))
     assert lobes.minimum.depth == pytest.approx(2 * 2e7 * zeta * (1 - zeta) / -loop_gain(cut), rel=1e-6)
     assert lobes.minimum.chatter_frequency == pytest.approx(800 * math.sqrt(1 - 2 * zeta), rel=1e-4)
 
@@ -87,7 +87,7 @@ def test_paper_stiffness_ratio_of_the_aged_spindle() -> None:
     for frequency, stiffness in ((1722.0, 3.2289e7), (1550.0, 2.90601e7)):
         mode = Mode(frequency, 0.029136, stiffness)
         speed = best_speed(frequency * math.sqrt(1 + 2 * 0.029136), mode, 4, 3)
-        products.append(average_angle([mode], None, slot(), speed).depth[0] * loop_gain(slot()))
+        products.append(average_angle_lobes([mode], None, slot(), speed).depth[0] * loop_gain(slot()))
     assert products == pytest.approx([1936365.29, 1742728.76], abs=0.005)
     assert products[1] / products[0] == pytest.approx(0.90000, abs=5e-6)
 
@@ -102,7 +102,7 @@ def test_altintas_shaping_with_two_oblique_modes(depth_mm: float, chatter: float
     cut = slot(1)
 
     def lobes_at(waves: float) -> StabilityLobes:
-        return average_angle(modes, None, cut, 60 * chatter / waves)
+        return average_angle_lobes(modes, None, cut, 60 * chatter / waves)
 
     found = minimize_scalar(lambda w: lobes_at(w).depth[0], bounds=(waves - 0.1, waves + 0.1), options={"xatol": 1e-9})
     lobes = lobes_at(found.x)
@@ -140,7 +140,7 @@ def marching_multiplier(mode: Mode, gain: float, delay: float, steps: int = 200)
     ],
 )
 def test_the_averaged_equation_grows_above_the_limit_and_decays_below(cut: Cut, speed: float) -> None:
-    lobes = average_angle([MODE], None, cut, speed)
+    lobes = average_angle_lobes([MODE], None, cut, speed)
     delay = 60 / (cut.teeth * speed)
     above, chatter = marching_multiplier(MODE, 1.03 * lobes.depth[0] * loop_gain(cut), delay)
     below, _ = marching_multiplier(MODE, 0.97 * lobes.depth[0] * loop_gain(cut), delay)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from dsm import Bearing, Segment, Spindle, natural_frequencies
-from dsm.matrix.assemble import Held
+from dsm.matrix.assemble import HeldDof
 from dsm.modes.find_modes import find_modes
 
-CLAMPED: list[Held] = [(0.0, 0), (0.0, 1)]
-PINS: list[Held] = [(0.0, 0), (1.0, 0)]
+CLAMPED: list[HeldDof] = [(0.0, 0), (0.0, 1)]
+PINS: list[HeldDof] = [(0.0, 0), (1.0, 0)]
 
 
 def stepped(ratio: float) -> Spindle:
@@ -33,7 +33,7 @@ def stepped(ratio: float) -> Spindle:
         (2.0, [*CLAMPED, (1.0, 0), (1.0, 1)], [29.339330750263, 88.951923283997]),
     ],
 )
-def test_stepped_beam(ratio: float, held: list[Held], expected: list[float]) -> None:
+def test_stepped_beam(ratio: float, held: list[HeldDof], expected: list[float]) -> None:
     modes = find_modes(stepped(ratio), len(expected), held=held)
     assert 2 * math.pi * modes.frequency == pytest.approx(expected, rel=2e-11)
 
@@ -46,7 +46,7 @@ def test_modes_that_all_but_coincide_are_both_found(pins: int) -> None:
     length = 2 * overhang + gap * (pins - 1)
     whole = Spindle([Segment(length, 0.05)], [Bearing(z, 1e8) for z in places])
     half = Spindle([Segment(length / 2, 0.05)], [])
-    held: list[Held] = [(z, 0) for z in places if z < length / 2]
+    held: list[HeldDof] = [(z, 0) for z in places if z < length / 2]
     symmetric = find_modes(half, 2, held=[*held, (length / 2, 1)]).frequency
     antisymmetric = find_modes(half, 2, held=[*held, (length / 2, 0)]).frequency
     found = natural_frequencies(whole, 4, rigid_bearings=True)

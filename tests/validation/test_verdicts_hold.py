@@ -11,14 +11,13 @@ import pytest
 from random_milling import random_case
 from verdict_study import MACHINE, assembly, chattering, limit_mm, program, study, upper_limit
 
-from lobes import growth, piece_numbers
-from lobewatch.machine import Wear
-from lobewatch.verdicts.doubt import WEAR, doubt_of
-from lobewatch.verdicts.draws import as_program, middle_row
-from lobewatch.verdicts.judgement import weigh
-from lobewatch.verdicts.spindle_at_speed import AT_REST
-from lobewatch.verdicts.verdict import Word, judge, word_of
-from lobewatch.verdicts.ways import ways
+from lobes import count_pieces, growth_rate
+from lobewatch.machine import ToolWear
+from lobewatch.verdicts.monte_carlo import run_monte_carlo
+from lobewatch.verdicts.program_samples import build_median_row, build_program, cutting_conditions_of
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.uncertainty import WEAR_FACTORS, uncertainty_of
+from lobewatch.verdicts.verdict import Stability, classify_stability, evaluate_program
 
 
 def say(text: str) -> None:
@@ -58,9 +57,9 @@ def test_a_machine_tapped_in_one_direction_is_never_called_stable(count: int) ->
         milling = random_case(rng)
         limit = limit_mm(milling)
         depth = 0.1 * limit if np.isfinite(limit) else 1.0
-        words.append(judge(program(milling, depth), assembly(milling, ("x",)), MACHINE).word)
-    assert Word.STABLE not in words
-    assert Word.DOUBTFUL in words
+        words.append(evaluate_program(program(milling, depth), assembly(milling, ("x",)), MACHINE).stability)
+    assert Stability.STABLE not in words
+    assert Stability.DOUBTFUL in words
 
 
 @pytest.mark.long
@@ -74,12 +73,12 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
         if not np.isfinite(limit):
             continue
         table = program(milling, limit * rng.uniform(0.4, 0.85))
-        tool, cut = assembly(milling), as_program(table, MACHINE)
-        truths = doubt_of(tool, table, MACHINE).draw(middle_row(cut, tool), 2000, seed=99)
+        tool, cut = assembly(milling), build_program(table, MACHINE)
+        truths = uncertainty_of(tool, table, MACHINE).sample(build_median_row(cut, tool), 2000, seed=99)
         depths = np.full((2000, 1), 1.05 * cut.depth)
-        turned = [truths.making(way) for way in ways(table, MACHINE, tool)]
-        if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
-            called.append(judge(table, tool, MACHINE).word is Word.STABLE)
+        turned = [truths.with_cut(way) for way in cutting_conditions_of(table, MACHINE, tool)]
+        if all(np.all(growth_rate(rows, depths, count_pieces(rows, 1.05 * cut.depth)) < 0) for rows in turned):
+            called.append(evaluate_program(table, tool, MACHINE).stability is Stability.STABLE)
     say(f"{share(sum(called), len(called))} called stable")
     assert len(called) >= 30
     assert np.mean(called) >= 0.95
@@ -89,20 +88,26 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
 @pytest.mark.timeout(7200)
 def test_shares_that_are_called_stable_by_wear() -> None:
     """Of random programs of machines of at most six modes, at 50 and 70 % of their limit with new edges."""
-    words: dict[tuple[Wear, float], list[Word]] = {(wear, part): [] for wear in WEAR for part in (0.5, 0.7)}
+    words: dict[tuple[ToolWear, float], list[Stability]] = {
+        (wear, part): [] for wear in WEAR_FACTORS for part in (0.5, 0.7)
+    }
     for rng in np.random.default_rng(5).spawn(120):
         milling = random_case(rng)
         limit = limit_mm(milling) if len(milling.x + milling.y) <= 6 else math.inf
         for (wear, part), said in words.items() if math.isfinite(limit) else ():
             worn = msgspec.structs.replace(program(milling, part * limit), wear=wear)
-            said.append(word_of(worn, weigh(worn, assembly(milling), MACHINE, AT_REST), assembly(milling)))
-    shares = {key: float(np.mean([word is Word.STABLE for word in said])) for key, said in words.items()}
+            said.append(
+                classify_stability(
+                    worn, run_monte_carlo(worn, assembly(milling), MACHINE, NO_TEST_CUTS), assembly(milling)
+                )
+            )
+    shares = {key: float(np.mean([word is Stability.STABLE for word in said])) for key, said in words.items()}
     say(
         f"{len(words['new', 0.5])} programs: "
         + ", ".join(f"{wear} {part}: {shares[wear, part]:.0%}" for wear, part in shares)
     )
     assert len(words["new", 0.5]) >= 40
-    assert all(word is not Word.NOT_STABLE for said in words.values() for word in said)
+    assert all(word is not Stability.NOT_STABLE for said in words.values() for word in said)
     assert shares["new", 0.5] >= 0.8
     for part in (0.5, 0.7):
         assert shares["new", part] >= shares["used", part] >= shares["worn", part]

@@ -19,15 +19,14 @@ from scipy.stats import beta
 
 from lobes import program_limit
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.advice import advise
-from lobewatch.verdicts.draws import as_program
-from lobewatch.verdicts.verdict import Word, judge
-from lobewatch.verdicts.ways import ways
+from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of
+from lobewatch.verdicts.recommendation import advise
+from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode
 
-MACHINE: Machine = parse_machine('[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
+MACHINE: Machine = parse_machine_file('[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
 
 
 @dataclass
@@ -56,20 +55,20 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
         if not math.isfinite(limit):
             continue
         below, above = (program(milling, limit * rng.uniform(*share)) for share in ((0.3, 0.8), (1.05, 3.0)))
-        if judge(below, assembly(milling), MACHINE).word is Word.STABLE:
+        if evaluate_program(below, assembly(milling), MACHINE).stability is Stability.STABLE:
             counts.stable_programs += 1
             counts.stable += drawn_truths(milling, below, truths, rng)
         for setting in settings(milling, above):
             counts.settings += 1
-            counts.refused += judge(setting, assembly(milling), MACHINE).word is not Word.STABLE
+            counts.refused += evaluate_program(setting, assembly(milling), MACHINE).stability is not Stability.STABLE
             counts.recommended += drawn_truths(milling, setting, truths, rng)
     return counts
 
 
 def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTable]:
     """The programs that are recommended in place of one."""
-    advice = advise(judge(table, assembly(milling), MACHINE), MACHINE)
-    for setting in dict.fromkeys(filter(None, (advice.best, advice.here))):
+    advice = advise(evaluate_program(table, assembly(milling), MACHINE), MACHINE)
+    for setting in dict.fromkeys(filter(None, (advice.best, advice.deepest_here))):
         yield program(milling, setting.depth_mm, setting.speed_rpm)
 
 
@@ -113,8 +112,8 @@ def upper_limit(number: int, of: int) -> float:
 def limit_mm(milling: RandomMilling) -> float:
     """Deepest stable depth (mm) without any doubt."""
     table = program(milling, 2.0)
-    cuts = ways(table, MACHINE, assembly(milling))
-    return 1e3 * program_limit(as_program(table, MACHINE), *_modes(milling), cuts).limit
+    cuts = cutting_conditions_of(table, MACHINE, assembly(milling))
+    return 1e3 * program_limit(build_program(table, MACHINE), *_modes(milling), cuts).limit
 
 
 def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = None) -> ProgramTable:

@@ -16,8 +16,8 @@ import pytest
 from acquisition import HammeredStructure, Structure, Trigger, capture_hits
 from acquisition.emulation import SimulatedSource
 from lobewatch.commands import COMMANDS
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.emulated_spindle import CHANNELS
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -78,7 +78,9 @@ def test_the_driver_taps(environment: dict[str, str], tmp_path: Path) -> None:
 
 def test_the_format_is_read(environment: dict[str, str], structure: Structure, tmp_path: Path) -> None:
     tapper = HammeredStructure(structure, 25600.0, np.random.default_rng(1))
-    hit = next(iter(capture_hits(SimulatedSource(tapper, CHANNELS, 25600.0, 60_000), Trigger(20.0, 6400, 512))))
+    hit = next(
+        iter(capture_hits(SimulatedSource(tapper, EMULATED_CHANNELS, 25600.0, 60_000), Trigger(20.0, 6400, 512)))
+    )
     file = tmp_path / "hit.txt"
     rows = [f"{force:.9g} {acceleration:.9g}" for force, acceleration in zip(hit.force, hit.acceleration, strict=True)]
     file.write_text("\n".join(["ACME TAP", "25600", *rows]), "utf-8")
@@ -93,6 +95,6 @@ def test_the_format_is_read(environment: dict[str, str], structure: Structure, t
 def test_every_file_and_command_that_is_named_is_there() -> None:
     text = re.sub(r"^```.*?^```", "", PAGE, flags=re.MULTILINE | re.DOTALL)
     files = {place for place in re.findall(r"`([\w.*/-]*/[\w.*/-]*)`", text) if "NAME" not in place} - ROOMS
-    assert {"acquisition/devices/driver.py", ".ci/lock", "lobewatch/show/report/sections.py"} <= files
+    assert {"acquisition/devices/drivers.py", ".ci/lock", "lobewatch/show/report/sections.py"} <= files
     assert {place for place in files if not list(ROOT.glob(place.rstrip("/")))} == set()
     assert set(re.findall(r"^\$ lobewatch ([a-z]+)", PAGE, re.MULTILINE)) <= COMMANDS.keys()

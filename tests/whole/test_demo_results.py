@@ -28,8 +28,8 @@ from acquisition.devices import find_driver
 from acquisition.emulation import Passage
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.settings.cut_setting import cut_setting
-from lobewatch.show.figures.style import save_figure, svg
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.show.figures.drawing import render_svg, save_figure
 from lobewatch.show.report import section
 from lobewatch.tap.emulated_cut import emulate_cut
 
@@ -101,7 +101,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
             module = importlib.import_module(name)
             if getattr(module, "datetime", None) is datetime:
                 patch.setattr(module, "datetime", December)
-        patch.setattr(section, "svg", svg_and_png)
+        patch.setattr(section, "render_svg", svg_and_png)
         patch.setenv("TZ", "UTC")
         time.tzset()
         patch.chdir(tmp_path_factory.mktemp("demo"))
@@ -116,7 +116,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
 def svg_and_png(figure: Figure) -> str:
     """A picture of the report, the newest kept as a file too, by its ordinate."""
     save_figure(figure, Path(f"report {figure.axes[0].get_ylabel().partition(' (')[0]}.png"))
-    return svg(figure)
+    return render_svg(figure)
 
 
 def answer(command: str) -> str:
@@ -132,7 +132,7 @@ def answer(command: str) -> str:
 def port_of_a_cut() -> Iterator[str]:
     """A is cut again and again, too deep."""
     folder, passage = MachineFolder("lobewatch-demo"), Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
-    setting = cut_setting(folder.machine, MEANT["A"], None, 6.0)
+    setting = find_cut_setting(folder.machine, MEANT["A"], None, 6.0)
     with emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage).device as device:
         yield device.port
 

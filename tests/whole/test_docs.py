@@ -21,7 +21,7 @@ import dsm
 import lobes
 import modal
 from lobewatch.cli import app, main
-from lobewatch.tap.stories import demo as stories
+from lobewatch.tap import demo as stories
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -67,7 +67,7 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
         ("import dsm", NUMERICAL - {"scipy.linalg"}),
         ("import acquisition.ports, acquisition.atomic, acquisition.errors, acquisition.remark", HEAVY),
         ("import lobewatch, lobewatch.machine.new_folder", HEAVY),
-        ("import lobewatch.logbook.logbook", {"asyncio", "multiprocessing", "acquisition.emulation.thread"}),
+        ("import lobewatch.logbook.logbook", {"asyncio", "multiprocessing", "acquisition.emulation.emulated_device"}),
     ],
 )
 def test_imports_leave_out_what_they_do_not_need(code: str, left_out: set[str], tmp_path: Path) -> None:

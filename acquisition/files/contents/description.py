@@ -1,14 +1,15 @@
-"""What a person says of a recording."""
+"""Description that a user gives of a recording, and the report of its import."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
-from acquisition.tap import UNSAID, Conditions
+from acquisition.tap_test import UNKNOWN_CONDITIONS, Conditions
 
-_LABELS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
+_LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,66 @@ class Description:
     """Name of the tool in the spindle."""
     direction: str = ""
     """Direction at the tool tip, x or y."""
-    conditions: Conditions = UNSAID
+    conditions: Conditions = UNKNOWN_CONDITIONS
     """Conditions it was taken under."""
 
-    def of_signals(self) -> list[str]:
+    def list_signal_options(self) -> list[str]:
         """The options that were given and that say something of the signals in the file."""
-        names = [option.name for option in fields(self) if option.name not in _LABELS]
+        names = [option.name for option in fields(self) if option.name not in _LABEL_FIELDS]
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) not in ("", (), None)]
+
+
+Origin = Literal["file", "option", "default"]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Something known of a recording."""
+
+    name: str
+    """Name of the fact: "sample rate", "unit", ..."""
+    value: str
+    """Value, as text for people."""
+    origin: Origin
+    """Origin: the file, an option, or nobody ("default")."""
+
+
+@dataclass
+class ImportReport:
+    """Filled while a file is understood."""
+
+    facts: list[Fact] = field(default_factory=list)
+    """Facts that are known."""
+    missing: list[str] = field(default_factory=list)
+    """Facts that the file does not say, each with the option that says it."""
+    faults: list[str] = field(default_factory=list)
+    """Faults that stand in the way."""
+
+    def add_fact(self, name: str, value: str, origin: Origin = "file") -> None:
+        """A fact."""
+        self.facts.append(Fact(name, value, origin))
+
+    def merge(self, other: ImportReport) -> None:
+        """All that another one holds."""
+        self.facts += other.facts
+        self.missing += other.missing
+        self.faults += other.faults
+
+    def add_missing(self, fact: str, option: str) -> None:
+        """Something is missing."""
+        self.missing.append(f"{fact} ({option})")
+
+    def add_contradiction(self, option: str, given: object, in_file: object) -> None:
+        """An option says other than the file."""
+        self.faults.append(f"{option} {given}: the file says {in_file}; leave the option out")
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing is missing or wrong."""
+        return not self.missing and not self.faults
+
+    def format_problems(self) -> str:
+        """All that is missing and wrong; empty where nothing is."""
+        sentences = ["; ".join(self.faults)] if self.faults else []
+        sentences += [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
+        return "; ".join(sentences)

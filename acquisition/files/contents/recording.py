@@ -8,19 +8,17 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Signal
-from acquisition.files.contents.description import Description
-from acquisition.files.contents.exponential import time_constant_of
-from acquisition.files.contents.ledger import Fact, Ledger
-from acquisition.files.contents.named_columns import named_columns, names_of
-from acquisition.files.contents.settle_frf import COLUMNS_FRF, candidates, settle_frf
-from acquisition.files.contents.settle_hits import COLUMNS_HIT, settle_hits
+from acquisition.files.contents.column_headings import assign_columns, format_signal_names
+from acquisition.files.contents.contents import Contents, Signal, parse_time_constant
+from acquisition.files.contents.description import Description, Fact, ImportReport
+from acquisition.files.contents.resolve_frf import FRF_COLUMNS_EXAMPLE, find_frf_candidates, resolve_frf
+from acquisition.files.contents.resolve_hits import HIT_COLUMNS_EXAMPLE, resolve_hits
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.tap import Conditions
+from acquisition.tap_test import Conditions
 
-COLUMNS_ANY = (
-    f"{COLUMNS_HIT}, those of --force FILE where the force stands in another file behind them; or {COLUMNS_FRF}, "
+ANY_COLUMNS_EXAMPLE = (
+    f"{HIT_COLUMNS_EXAMPLE}, those of --force FILE where the force stands in another file behind them; or {FRF_COLUMNS_EXAMPLE}, "
     "without time where --rate says it, without frequency where --spacing does"
 )
 """How any of both is named."""
@@ -40,7 +38,7 @@ class Recording:
     """The FRF that it holds; None where there is none, or where something is missing or wrong."""
     facts: tuple[Fact, ...] = ()
     """Facts that are known, each from the file, by option or by default."""
-    complaint: str = ""
+    problems: str = ""
     """Text on what is missing, with the options that say it, and what is wrong; empty where nothing is."""
     created: datetime | None = None
     """Time of recording, where the file says so (timezone-aware)."""
@@ -58,55 +56,60 @@ class Recording:
     """Time constant (s) of the exponential window over the response that the file names; NaN where it does not say how
     its window falls, None where there is none."""
 
-    def checked(self) -> Recording:
+    def require_valid(self) -> Recording:
         """Itself; DataError with all that is missing or wrong."""
-        if self.complaint:
-            raise DataError(f"{self.path}: {self.complaint}")
+        if self.problems:
+            raise DataError(f"{self.path}: {self.problems}")
         return self
 
 
-def understood(path: Path, title: str, contents: Contents, description: Description) -> Recording:
+def resolve_recording(path: Path, title: str, contents: Contents, description: Description) -> Recording:
     """Hits where signals over time are all there is, else the FRF."""
-    ledger = Ledger()
-    signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    ledger = ImportReport()
+    signals = assign_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
     contents = replace(contents, signals=signals)
-    frf, hits = (None, []) if ledger.faults else _frf_or_hits(contents, description, ledger)
+    frf, hits = (None, []) if ledger.faults else _resolve_frf_or_hits(contents, description, ledger)
     if len(contents.machines) > 1:
         ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
-        ledger.know("window", window)
+        ledger.add_fact("window", window)
     for note in contents.notes:
-        ledger.know("note", note)
+        ledger.add_fact("note", note)
     return Recording(
         path,
         title,
         tuple(hits),
         frf,
         tuple(ledger.facts),
-        ledger.complaint(),
+        ledger.format_problems(),
         contents.created,
         contents.tool,
         contents.direction,
-        window=time_constant_of(window),
+        window=parse_time_constant(window),
     )
 
 
-def _frf_or_hits(contents: Contents, description: Description, ledger: Ledger) -> tuple[Frf | None, list[Hit]]:
+def _resolve_frf_or_hits(
+    contents: Contents, description: Description, ledger: ImportReport
+) -> tuple[Frf | None, list[Hit]]:
     """Neither where something is missing or wrong, which the ledger then says."""
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
-    if candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _useless(description, ("rate", "full_scale", "force"), "an FRF", ledger)
-        return settle_frf(contents, description, ledger), []
+    if find_frf_candidates(signals) and (over_frequency or not _is_over_time(signals)):
+        _report_useless_options(description, ("rate", "full_scale", "force"), "an FRF", ledger)
+        return resolve_frf(contents, description, ledger), []
     if not signals:
         ledger.faults.append("it holds no columns of numbers")
     elif over_frequency or not _is_over_time(signals):
-        ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF if over_frequency else COLUMNS_ANY)
+        ledger.add_missing(
+            f"what its columns are ({format_signal_names(signals)})",
+            FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE,
+        )
     else:
-        _useless(description, ("averages",), "hits, and they are counted", ledger)
-        _useless(description, ("spacing", "start"), "signals over time", ledger)
-        return None, settle_hits(contents, description, ledger)
+        _report_useless_options(description, ("averages",), "hits, and they are counted", ledger)
+        _report_useless_options(description, ("spacing", "start"), "signals over time", ledger)
+        return None, resolve_hits(contents, description, ledger)
     return None, []
 
 
@@ -115,7 +118,7 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
     return over_time or any(signal.per_full_scale for signal in signals)
 
 
-def _useless(description: Description, names: Sequence[str], content: str, ledger: Ledger) -> None:
+def _report_useless_options(description: Description, names: Sequence[str], content: str, ledger: ImportReport) -> None:
     """Options that say nothing of what the file holds."""
     for name in names:
         if getattr(description, name) not in ((), None):

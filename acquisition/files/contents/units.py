@@ -9,7 +9,7 @@ from typing import Literal
 
 Dimension = tuple[int, int, int]
 """Exponents of length, time and force."""
-Measured = Literal[
+MeasuredQuantity = Literal[
     "time",
     "frequency",
     "force",
@@ -27,10 +27,10 @@ STANDARD_GRAVITY = 9.80665
 POUND_FORCE = 4.4482216152605
 """N per lbf."""
 
-VOLTS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
+VOLTAGE_UNITS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
 """V per unit of a voltage as it is written in lower case: no sensor's quantity, and no part of other units."""
 
-QUANTITIES: dict[Dimension, Measured] = {
+QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
     (0, 1, 0): "time",
     (0, -1, 0): "frequency",
     (0, 0, 1): "force",
@@ -41,8 +41,8 @@ QUANTITIES: dict[Dimension, Measured] = {
     (1, -1, -1): "mobility",
     (1, -2, -1): "accelerance",
 }
-_LENGTH, _TIME, _FORCE, _NONE = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
-_NAMES: dict[str, tuple[float, Dimension]] = {
+_LENGTH, _TIME, _FORCE, _DIMENSIONLESS = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
+_UNITS_BY_NAME: dict[str, tuple[float, Dimension]] = {
     "m": (1.0, _LENGTH),
     "cm": (1e-2, _LENGTH),
     "mm": (1e-3, _LENGTH),
@@ -63,7 +63,7 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
     "kHz": (1e3, (0, -1, 0)),
     "rpm": (1 / 60, (0, -1, 0)),
     "cpm": (1 / 60, (0, -1, 0)),
-    "rad": (1 / (2 * math.pi), _NONE),
+    "rad": (1 / (2 * math.pi), _DIMENSIONLESS),
     "N": (1.0, _FORCE),
     "newton": (1.0, _FORCE),
     "newtons": (1.0, _FORCE),
@@ -78,27 +78,27 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
     "gal": (1e-2, (1, -2, 0)),
     "gn": (STANDARD_GRAVITY, (1, -2, 0)),
 }
-_LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
+_UNITS_BY_LOWER_NAME = {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}
 """Mega and milli differ in case only: MN is not known, and mN only as it is written."""
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
-_TURNS = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
+_TURNS_PER_MINUTE = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
 """Turns a minute as they are written: minutes are no unit otherwise ("x_min" is the least)."""
-_MS = re.compile(r"\bms\^?-([12])\b")
+_METERS_PER_SECOND = re.compile(r"\bms\^?-([12])\b")
 """Metres a second, or a second squared, without a sign between: no unit of a tap test is a power of a millisecond."""
-_PLAIN = str.maketrans({"µ": "u", "μ": "u", "¹": "^1", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
+_ASCII_EQUIVALENTS = str.maketrans({"µ": "u", "μ": "u", "¹": "^1", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
 @dataclass(frozen=True)
 class Unit:
     """A unit that is known."""
 
-    quantity: Measured
+    quantity: MeasuredQuantity
     """Quantity that is measured in it; empty where that is nothing a tap test has."""
     factor: float
     """SI value of one such unit."""
 
 
-def unit_of(text: str) -> Unit | None:
+def parse_unit(text: str) -> Unit | None:
     """The unit in a text such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where it is not known.
 
     Hz, rad/s and rpm are frequency, in Hz; g is standard gravity.
@@ -106,28 +106,28 @@ def unit_of(text: str) -> Unit | None:
     plain = (
         re.sub(r"_?\bper\b_?|_per_", "/", text.strip())
         .replace("⁻", "-")
-        .translate(_PLAIN)
+        .translate(_ASCII_EQUIVALENTS)
         .replace("-^", "^-")
         .replace("**", "^")
     )
-    plain = _MS.sub(r"m/s^\1", plain)
-    plain = "rpm" if _TURNS.fullmatch(plain) else plain
+    plain = _METERS_PER_SECOND.sub(r"m/s^\1", plain)
+    plain = "rpm" if _TURNS_PER_MINUTE.fullmatch(plain) else plain
     try:
-        tokens = _tokens(plain)
-        value, dimension = _product(tokens)
+        tokens = _tokenize(plain)
+        value, dimension = _parse_product(tokens)
     except (ValueError, IndexError, OverflowError, ZeroDivisionError):
         return None
     named = any(token[0] for token in _TOKEN.findall(plain))
-    return Unit(QUANTITIES.get(dimension, ""), value) if named and not tokens and value > 0 else None
+    return Unit(QUANTITY_BY_DIMENSION.get(dimension, ""), value) if named and not tokens and value > 0 else None
 
 
-def motion_of(quantity: str) -> str:
+def get_motion(quantity: str) -> str:
     """Of the response that an FRF was made from; that itself otherwise."""
     motions = {"receptance": "displacement", "mobility": "velocity", "accelerance": "acceleration"}
     return motions.get(quantity, quantity)
 
 
-def _tokens(text: str) -> list[tuple[str, str, str, str, str]]:
+def _tokenize(text: str) -> list[tuple[str, str, str, str, str]]:
     """In reverse order: the next one is the last."""
     tokens, at = list[tuple[str, str, str, str, str]](), 0
     while text[at:].strip():
@@ -139,27 +139,27 @@ def _tokens(text: str) -> list[tuple[str, str, str, str, str]]:
     return tokens[::-1]
 
 
-def _product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
+def _parse_product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
     """Factors up to the end or a closing bracket, which is left; "a/b/c" and "a/b*c" go from left to right."""
-    value, dimension = _factor(tokens)
+    value, dimension = _parse_factor(tokens)
     while tokens and tokens[-1][3] != ")":
         sign = -1 if tokens[-1][3] == "/" else 1
         if tokens[-1][3] in ("*", "/"):
             tokens.pop()
-        factor, exponents = _factor(tokens)
+        factor, exponents = _parse_factor(tokens)
         value *= factor**sign
         dimension = tuple(a + sign * b for a, b in zip(dimension, exponents, strict=True))  # type: ignore[assignment]
     return value, dimension
 
 
-def _factor(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
+def _parse_factor(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
     name, power, number, sign, _ = tokens.pop()
     if number:
-        return float(number), _NONE
+        return float(number), _DIMENSIONLESS
     if sign == "(":
-        (value, dimension), power = _product(tokens), tokens.pop()[4]
-    elif name in _NAMES or name.lower() in _LOWER:
-        value, dimension = _NAMES.get(name) or _LOWER[name.lower()]
+        (value, dimension), power = _parse_product(tokens), tokens.pop()[4]
+    elif name in _UNITS_BY_NAME or name.lower() in _UNITS_BY_LOWER_NAME:
+        value, dimension = _UNITS_BY_NAME.get(name) or _UNITS_BY_LOWER_NAME[name.lower()]
     else:
         raise ValueError(name or sign)
     exponent = int(power or 1)

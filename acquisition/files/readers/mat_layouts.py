@@ -1,4 +1,4 @@
-"""Layouts of MATLAB files that are known: which variables are frequency, FRF, coherence, time, force and response.
+"""Recognize known layouts of variables in MATLAB files.
 
 Seen in public files: vectors by name (`Freq_domain`, `Hf_chan_2`, `Hf_coh_chan_2`, `Time_chan_1`), matrices of a logger
 (`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), structs of Test.Lab
@@ -17,29 +17,105 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.files.contents.contents import Contents, Role, Signal
-from acquisition.files.contents.heading import name_and_unit, role_of
-from acquisition.files.readers.array_columns import columns_of
-from acquisition.files.readers.mat_window import window_of
-from acquisition.files.readers.siglab import siglab
+from acquisition.files.contents.column_headings import infer_role, split_heading
+from acquisition.files.contents.contents import Contents, Role, Signal, list_array_signals
 
-_FREQUENCY = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
-_COHERENCE = re.compile(r".*(coh|gamma)", re.IGNORECASE)
-_NO_FRF = re.compile(r".*(cross|auto|psd|spec)", re.IGNORECASE)
-_RATE = re.compile(r"(fs|samp\w*rate|.*sample_?rate|sampling_?(rate|frequency))", re.IGNORECASE)
-_TIME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
+_WINDOW_NAME = re.compile(r"(response_?)?window(_?type)?", re.IGNORECASE)
+_WINDOW_LOUD_SHARE = 0.02
+"""Share of the largest value above which a sample tells the window ..."""
+_WINDOW_FIT_TOLERANCE = 0.02
+"""... which is exponential where the logarithms lie so close to a straight line (rms)."""
 
 
-def recognised(variables: Mapping[str, Any]) -> Contents | None:
+def find_window(variables: Mapping[str, Any]) -> str:
+    """As `Contents.window`."""
+    named = next(
+        (value for name, value in variables.items() if _WINDOW_NAME.fullmatch(name) and isinstance(value, str)), ""
+    )
+    responses = (name[1:] for name in variables if re.fullmatch(r"W([2-9]|\d\d)", name))
+    windows = [_infer_window(variables.get(f"X{number}"), variables[f"W{number}"]) for number in responses]
+    return named or next(filter(None, windows), "")
+
+
+def _infer_window(before: Any, behind: Any) -> str:
+    """The window between two signals (n, 2) of time and value; empty where they are the same, or none."""
+    if not all(isinstance(pairs, np.ndarray) and pairs.ndim == 2 and pairs.shape[1] == 2 for pairs in (before, behind)):
+        return ""
+    if before.shape != behind.shape or not np.any(before[:, 1]) or np.array_equal(before[:, 1], behind[:, 1]):
+        return ""
+    time, raw, windowed = np.real(before[:, 0]), np.real(before[:, 1]), np.real(behind[:, 1])
+    loud = np.abs(raw) > _WINDOW_LOUD_SHARE * np.max(np.abs(raw))
+    ratio = windowed[loud] / raw[loud]
+    if ratio.size < 3 or np.any(ratio <= 0):
+        return "of unknown form"
+    return _fit_exponential(time[loud], np.log(ratio))
+
+
+def _fit_exponential(time: NDArray[np.float64], level: NDArray[np.float64]) -> str:
+    """level: logarithm of the window."""
+    slope, start = np.polyfit(time, level, 1)
+    if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:
+        return "of unknown form"
+    return "" if -slope * np.ptp(time) < _WINDOW_FIT_TOLERANCE else f"exponential {-1 / slope:.4g} s"
+
+
+def read_siglab(v: Mapping[str, Any]) -> Contents | None:
+    """Its FRFs in the units of their channels; None where it is of another program.
+
+    `SLm` holds the frequencies (fdxvec), a cell for each reference and response (xcmeas) and the channels (scmeas) with
+    units for each volt (euscale_fac). That these are not yet in its transfer functions (xfer) is from public files: an
+    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md).
+    """
+    measured = v.get("SLm")
+    if not isinstance(measured, Mapping) or not {"fdxvec", "xcmeas", "scmeas"} <= measured.keys():
+        return None
+    signals = tuple(_make_siglab_signals(measured))
+    return Contents(signals, averages=int(measured.get("navg", 0)) or None) if len(signals) > 1 else None
+
+
+def _make_siglab_signals(measured: Mapping[str, Any]) -> Iterator[Signal]:
+    frequency = measured["fdxvec"]
+    yield Signal("frequency", frequency, "frequency", "Hz")
+    for reference, row in zip(measured["scmeas"], measured["xcmeas"], strict=False):
+        for response, cell in zip(measured["scmeas"], row, strict=False):
+            if np.shape(cell["xfer"]) == frequency.shape:
+                (volts, below), (over, above) = _get_siglab_scale(reference), _get_siglab_scale(response)
+                label = f"{response['label']} over {reference['label']}"
+                yield Signal(label, cell["xfer"] * (over / volts), "frf", f"{above}/{below}")
+            if np.shape(cell["coh"]) == frequency.shape:
+                yield Signal("coherence", cell["coh"], "coherence")
+
+
+def _get_siglab_scale(channel: Mapping[str, Any]) -> tuple[float, str]:
+    """Units a volt, and the unit, of a channel."""
+    return (float(channel["euscale_fac"]), f"({channel['eu_string']})") if channel["eu_on_off"] else (1.0, "V")
+
+
+_FREQUENCY_NAME = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
+_COHERENCE_NAME = re.compile(r".*(coh|gamma)", re.IGNORECASE)
+_SPECTRUM_NAME = re.compile(r".*(cross|auto|psd|spec)", re.IGNORECASE)
+_RATE_NAME = re.compile(r"(fs|samp\w*rate|.*sample_?rate|sampling_?(rate|frequency))", re.IGNORECASE)
+_TIME_NAME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
+
+
+def recognize_layout(variables: Mapping[str, Any]) -> Contents | None:
     """What the variables of a file mean where they are of a known layout; None where they are of none."""
-    for layout in (_ours, _signal_calc, siglab, _test_lab, _logger, _vectors, _over_time):
+    for layout in (
+        _read_lobewatch,
+        _read_signal_calc,
+        read_siglab,
+        _read_test_lab,
+        _read_logger,
+        _read_vectors,
+        _read_time_vectors,
+    ):
         contents = layout(variables)
         if contents is not None:
-            return replace(contents, window=window_of(variables))
+            return replace(contents, window=find_window(variables))
     return None
 
 
-def _ours(v: Mapping[str, Any]) -> Contents | None:
+def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
     """As `lobewatch convert` writes them."""
     if not isinstance(v.get("written_by"), str) or not v["written_by"].startswith("lobewatch"):
         return None
@@ -61,30 +137,36 @@ def _ours(v: Mapping[str, Any]) -> Contents | None:
     return replace(labelled, signals=tuple(signals))
 
 
-def _signal_calc(v: Mapping[str, Any]) -> Contents | None:
+def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     """SignalCalc: the abscissa stands in the first column, channel 1 is the hammer.
 
     Beside its FRFs stand the signals of the last hit, before the window, for `--columns`; alone they are that hit.
     """
-    units, names = _texts(v.get("Unit")), _texts(v.get("ChanName"))
+    units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
     hit = [(name, match[1]) for name in v if (match := re.fullmatch(r"X(\d+)", name)) and _is_pairs(v[name])]
-    over_time = list(_recorded(v, hit, units, alone=not frfs))
+    over_time = list(_make_signal_calc_hit(v, hit, units, alone=not frfs))
     if not frfs:
         return Contents(tuple(over_time)) if len(hit) > 1 else None
     signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
     for name, channel in frfs:
-        label = f"{name} {_at(names, channel)}".strip()
-        unit = f"({_at(units, channel)})/({_at(units, '1')})" if _at(units, channel) and _at(units, "1") else ""
+        label = f"{name} {_get_channel_text(names, channel)}".strip()
+        unit = (
+            f"({_get_channel_text(units, channel)})/({_get_channel_text(units, '1')})"
+            if _get_channel_text(units, channel) and _get_channel_text(units, "1")
+            else ""
+        )
         signals.append(Signal(label, v[name][:, 1], "frf", unit))
         coherence = v.get(f"C1_{channel}")
         if coherence is not None and _is_pairs(coherence):
             signals.append(Signal(f"C1_{channel}", np.real(coherence[:, 1]), "coherence"))
-    averages = re.search(r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", " ".join(_texts(v.get("DP_Info"))), re.IGNORECASE)
+    averages = re.search(
+        r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", " ".join(_list_texts(v.get("DP_Info"))), re.IGNORECASE
+    )
     return Contents((*signals, *over_time), averages=int(averages[1]) if averages else None)
 
 
-def _recorded(
+def _make_signal_calc_hit(
     v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, alone: bool
 ) -> Iterator[Signal]:
     """Time and channels of a hit; alone: they are what the file is about, so they have their roles."""
@@ -95,7 +177,7 @@ def _recorded(
             time = np.real(v[name][:, 0])
             yield Signal(f"{name}:1", time, "time" if alone else "", "s", record=record, is_before_window=True)
         values = np.real(v[name][:, 1])
-        unit = _at(units, channel)
+        unit = _get_channel_text(units, channel)
         yield Signal(f"{name}:2", values, role if alone else "", unit, record=record, is_before_window=True)
 
 
@@ -103,27 +185,27 @@ def _is_pairs(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] == 2
 
 
-def _texts(value: Any) -> list[str]:
+def _list_texts(value: Any) -> list[str]:
     if isinstance(value, str):
         return [value.strip()]
     return [str(text).strip() for text in value] if isinstance(value, (list, tuple, np.ndarray)) else []
 
 
-def _at(texts: Sequence[str], channel: str) -> str:
+def _get_channel_text(texts: Sequence[str], channel: str) -> str:
     return texts[int(channel) - 1] if int(channel) <= len(texts) else ""
 
 
-def _test_lab(v: Mapping[str, Any]) -> Contents | None:
+def _read_test_lab(v: Mapping[str, Any]) -> Contents | None:
     """Structs with `x_values` (start_value, increment) and `y_values` (values, quantity with a label)."""
     signals = list[Signal]()
     for name, value in v.items():
         for struct in value if isinstance(value, list) else [value]:
             if isinstance(struct, Mapping) and {"x_values", "y_values"} <= struct.keys():
-                signals += _of_struct(name, struct["x_values"], struct["y_values"], len(signals))
+                signals += _split_struct(name, struct["x_values"], struct["y_values"], len(signals))
     return Contents(tuple(signals)) if signals else None
 
 
-def _of_struct(name: str, x: Mapping[str, Any], y: Mapping[str, Any], record: int) -> Iterator[Signal]:
+def _split_struct(name: str, x: Mapping[str, Any], y: Mapping[str, Any], record: int) -> Iterator[Signal]:
     values = np.asarray(y["values"])
     columns = values.reshape(values.shape[0], -1).T
     unit = str((y.get("quantity") or {}).get("label", ""))
@@ -136,10 +218,10 @@ def _of_struct(name: str, x: Mapping[str, Any], y: Mapping[str, Any], record: in
         if is_frf:
             yield Signal(label, column, "frf", unit, record=record)
         else:
-            yield Signal(label, column, role_of(name, unit), unit, rate=1 / step)
+            yield Signal(label, column, infer_role(name, unit), unit, rate=1 / step)
 
 
-def _logger(v: Mapping[str, Any]) -> Contents | None:
+def _read_logger(v: Mapping[str, Any]) -> Contents | None:
     """`freq` is the sample rate, `npts` the length of the record that `yspec` was made from."""
     if "freq" not in v or np.ndim(v["freq"]) or not ({"yspec", "indata"} & v.keys()):
         return None
@@ -156,31 +238,31 @@ def _logger(v: Mapping[str, Any]) -> Contents | None:
     return Contents(tuple(Signal(f"indata:{i}", column, rate=rate) for i, column in enumerate(columns, 1)))
 
 
-def _vectors(v: Mapping[str, Any]) -> Contents | None:
+def _read_vectors(v: Mapping[str, Any]) -> Contents | None:
     """Vectors and matrices of the length of a frequency, complex ones but for coherence; the time signals beside them
     keep their names and no role, so that `--columns` can have them. Only signals over time: those of its length."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
     for name, axis in arrays.items():
-        if _FREQUENCY.fullmatch(name) and _rises(axis):
+        if _FREQUENCY_NAME.fullmatch(name) and _is_rising(axis):
             frfs = [
                 entry
-                for entry in _of_length(arrays, axis.size)
-                if np.iscomplexobj(entry[1]) and not _NO_FRF.match(entry[0])
+                for entry in _list_vectors_of_length(arrays, axis.size)
+                if np.iscomplexobj(entry[1]) and not _SPECTRUM_NAME.match(entry[0])
             ]
             if frfs:
-                return Contents(tuple(_frf_signals(arrays, name, frfs)))
+                return Contents(tuple(_make_vector_signals(arrays, name, frfs)))
     return None
 
 
-def _frf_signals(
+def _make_vector_signals(
     arrays: Mapping[str, NDArray[Any]], frequency: str, frfs: Sequence[tuple[str, NDArray[Any]]]
 ) -> Iterator[Signal]:
-    yield Signal(frequency, arrays[frequency], "frequency", name_and_unit(frequency)[1])
+    yield Signal(frequency, arrays[frequency], "frequency", split_heading(frequency)[1])
     yield from (Signal(name, values, "frf") for name, values in frfs)
     n = arrays[frequency].size
     taken = {frequency, *(name for name, _ in frfs)}
-    for name, values in _of_length(arrays, n):
-        if _COHERENCE.match(name) and not np.iscomplexobj(values):
+    for name, values in _list_vectors_of_length(arrays, n):
+        if _COHERENCE_NAME.match(name) and not np.iscomplexobj(values):
             taken.add(name)
             yield Signal(name, values, "coherence")
     yield from (
@@ -188,28 +270,30 @@ def _frf_signals(
     )
 
 
-def _over_time(v: Mapping[str, Any]) -> Contents | None:
+def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
     """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell. What
     else stands in the file has no role, so that `--columns` can have it; an FRF is taken before signals of no name."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
-    rate = next((float(v[name]) for name in v if _RATE.fullmatch(name) and _is_number(v[name])), None)
-    axis = next((name for name in arrays if _TIME.fullmatch(name) and _has_company(name, arrays)), None)
+    rate = next((float(v[name]) for name in v if _RATE_NAME.fullmatch(name) and _is_number(v[name])), None)
+    axis = next((name for name in arrays if _TIME_NAME.fullmatch(name) and _has_equal_length(name, arrays)), None)
     if rate is None and axis is None:
         return None
     n = arrays[axis].size if axis else max((max(value.shape) for value in arrays.values()), default=0)
     signals = [Signal(axis, arrays[axis], "time")] if axis else []
     signals += [
-        Signal(name, values, role_of(name, ""), rate=rate) for name, values in _of_length(arrays, n) if name != axis
+        Signal(name, values, infer_role(name, ""), rate=rate)
+        for name, values in _list_vectors_of_length(arrays, n)
+        if name != axis
     ]
     others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
-    beside = list(columns_of(others))
+    beside = list(list_array_signals(others))
     has_frf = any(signal.role == "frf" for signal in beside)
     if not signals or (has_frf and not any(signal.role in ("force", "response") for signal in signals)):
         return None
     return Contents((*signals, *(replace(signal, role="") for signal in beside)))
 
 
-def _has_company(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
+def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
     """Whether it is a vector as long as others: an axis, though its values may be none."""
     axis = arrays[name]
     return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
@@ -219,7 +303,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.number)) and bool(value > 0)
 
 
-def _of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:
+def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:
     """Vectors of a length, and the columns of matrices, which are name:1, name:2, ..."""
     for name, values in arrays.items():
         if values.shape == (n,):
@@ -229,5 +313,5 @@ def _of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str
             yield from ((f"{name}:{i}", column) for i, column in enumerate(columns, 1))
 
 
-def _rises(axis: NDArray[Any]) -> bool:
+def _is_rising(axis: NDArray[Any]) -> bool:
     return axis.ndim == 1 and axis.size > 1 and not np.iscomplexobj(axis) and bool(np.all(np.diff(axis) > 0))

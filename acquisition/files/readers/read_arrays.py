@@ -1,24 +1,60 @@
-"""Arrays as Python users keep them: .npy, .npz, HDF5 of any paths. Names that are known say what they are."""
+"""Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files."""
 
 from __future__ import annotations
 
+import json
+import re
+import struct
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents
-from acquisition.files.readers.array_columns import columns_of
-from acquisition.files.readers.format import Format
-from acquisition.files.readers.hdf5_in import HDF5
-from acquisition.files.readers.mat_layouts import recognised
-from acquisition.files.readers.mat_variables import mat_variables
-from acquisition.files.readers.unpacked import HARMLESS, RATIO
+from acquisition.files.contents.column_headings import infer_role
+from acquisition.files.contents.contents import Contents, Format, Signal, list_array_signals, list_distinct_names
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, MAX_UNPACKED_RATIO, MIN_UNPACKED_LIMIT
+from acquisition.files.readers.mat_layouts import find_window, recognize_layout
+from acquisition.files.readers.mat_variables import MAT_V73_SIGNATURE, read_mat_variables
 
-NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
+_MAT_V5_SIGNATURE = b"MATLAB 5.0 MAT-file"
+_MAT_V4_KINDS = range(53)
+_MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
+
+
+def read_mat(path: Path) -> Contents:
+    """Its arrays; DataError where it is damaged or unpacks out of proportion."""
+    variables = read_mat_variables(path)
+    contents = recognize_layout(variables)
+    if contents is not None:
+        return contents
+    return Contents(tuple(list_array_signals(variables)), window=find_window(variables))
+
+
+def _is_mat(head: bytes, _path: Path) -> bool:
+    return head.startswith((_MAT_V5_SIGNATURE, MAT_V73_SIGNATURE)) or _is_mat_v4(head)
+
+
+def _is_mat_v4(head: bytes) -> bool:
+    """Whether it begins with the header of a matrix, least or most significant byte first, and its name.
+
+    Source: MAT-File Format (The MathWorks), level 4: type, rows, columns, whether complex, length of the name.
+    """
+    for order, least in (("<", 0), (">", 1000)):
+        kind, rows, columns, is_complex, length = struct.unpack_from(f"{order}5i", head.ljust(20))
+        sizes = rows >= 0 and columns >= 0 and is_complex in (0, 1)
+        if kind - least in _MAT_V4_KINDS and sizes and _MAT_V4_NAME.fullmatch(head[20 : 20 + max(length, 0)]):
+            return True
+    return False
+
+
+MAT_FORMAT = Format("mat", "MATLAB file", (".mat", ".vna"), _is_mat, read_mat)
+
+
+NPY_SIGNATURE, ZIP_SIGNATURE = b"\x93NUMPY", b"PK\x03\x04"
 """How these files begin."""
 
 
@@ -26,52 +62,110 @@ def read_numpy(path: Path) -> Contents:
     """The arrays of a .npy or .npz file; DataError where they are no numbers, damaged, or unpack out of proportion."""
     try:
         with path.open("rb") as file:
-            return _read(file, path)
+            return _read_numpy_file(file, path)
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
         raise DataError(f"{path}: cannot be read ({error}); save its numbers alone, without Python objects") from error
 
 
-def _read(file: BinaryIO, path: Path) -> Contents:
+def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     if zipfile.is_zipfile(file):
-        _check_unpacked(file, path)
+        _check_zip_size(file, path)
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
-        return _contents(_fields(loaded))
+        return _make_array_contents(_split_array_fields(loaded))
     with loaded:
-        return _contents({name: loaded[name][()] for name in loaded.files})
+        return _make_array_contents({name: loaded[name][()] for name in loaded.files})
 
 
-def _fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
+def _split_array_fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     """An array by its name, or the fields of one that has fields."""
     names = array.dtype.names
     return {"array": array} if names is None else {name: array[name] for name in names}
 
 
-def _check_unpacked(file: BinaryIO, path: Path) -> None:
+def _check_zip_size(file: BinaryIO, path: Path) -> None:
     packed = path.stat().st_size
     with zipfile.ZipFile(file) as archive:
         unpacked = sum(member.file_size for member in archive.infolist())
-    if unpacked > max(HARMLESS, RATIO * packed):
+    if unpacked > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
         raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
 
 
 def read_hdf5(path: Path) -> Contents:
     """The data sets of an HDF5 file by their paths; DataError where it is damaged or unpacks out of proportion."""
-    return _contents(mat_variables(path))
+    return _make_array_contents(read_mat_variables(path))
 
 
-def _contents(variables: Mapping[str, Any]) -> Contents:
-    return recognised(variables) or Contents(tuple(columns_of(variables, glue="/")))
+def _make_array_contents(variables: Mapping[str, Any]) -> Contents:
+    return recognize_layout(variables) or Contents(tuple(list_array_signals(variables, glue="/")))
 
 
 def _is_numpy(head: bytes, path: Path) -> bool:
-    return head.startswith(NPY) or (head.startswith(ZIP) and path.suffix.lower() == ".npz")
+    return head.startswith(NPY_SIGNATURE) or (head.startswith(ZIP_SIGNATURE) and path.suffix.lower() == ".npz")
 
 
 def _is_hdf5(head: bytes, _path: Path) -> bool:
-    return head.startswith(HDF5)
+    return head.startswith(HDF5_SIGNATURE)
 
 
-NUMPY = Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy)
-FOREIGN_HDF5 = Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5)
+NUMPY_FORMAT = Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy)
+FOREIGN_HDF5_FORMAT = Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5)
+
+
+_SEP005_KEYS = ("data", "name", "unit_str")
+
+
+def read_sep005(path: Path) -> Contents:
+    """Its channels; DataError where it is damaged or no list of time series."""
+    try:
+        channels = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise DataError(f"{path}: damaged or cut short ({error})") from error
+    return parse_sep005(str(path), channels)
+
+
+def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
+    """What a list of SEP005 dictionaries holds; place: for errors. Channels of one group were recorded together."""
+    signals, groups = list[Signal](), dict[str, int]()
+    for number, channel in enumerate(channels, 1):
+        where = f"{place}: channel {number}"
+        missing = [key for key in _SEP005_KEYS if key not in channel] + (
+            [] if {"fs", "time"} & channel.keys() else ["fs"]
+        )
+        if missing:
+            raise DataError(f"{where} has no {', '.join(missing)}; SEP005 asks for them")
+        record = groups.setdefault(str(channel.get("group", "")), len(groups))
+        try:
+            values = np.asarray(channel["data"], dtype=np.float64).ravel()
+            rate = None if channel.get("fs") is None else float(channel["fs"])
+            time = None if rate is not None else np.asarray(channel["time"], dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(f"{where}: {error}") from error
+        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
+        if rate is not None and not rate > 0:
+            raise DataError(f"{where}: fs={rate} Hz is not > 0")
+        signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
+        signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
+    first = channels[0] if channels else {}
+    return Contents(
+        tuple(signals),
+        created=_parse_timestamp(first.get("start_timestamp")),
+        direction=str(first.get("direction", "")),
+        tool=str(first.get("tool", "")),
+        machines=list_distinct_names(groups),
+    )
+
+
+def _parse_timestamp(text: object) -> datetime | None:
+    try:
+        return datetime.fromisoformat(str(text)).astimezone()
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+def _is_sep005(head: bytes, _path: Path) -> bool:
+    return head.lstrip().startswith(b"[") and b"{" in head[:200] and b'"' in head[:200]
+
+
+SEP005_FORMAT = Format("sep005", "SDyPy SEP005 time series", (".json",), _is_sep005, read_sep005)

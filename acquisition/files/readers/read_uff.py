@@ -12,26 +12,25 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Role, Signal
-from acquisition.files.readers.format import Format
-from acquisition.files.readers.text import decoded
-from acquisition.files.readers.uff_function import Function, read_function
+from acquisition.files.contents.contents import Contents, Format, Role, Signal
+from acquisition.files.readers.text_file import decode_utf8_or_latin1
+from acquisition.files.readers.uff_dataset_58 import UffFunction, read_function
 
-_MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
-_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN"), 7: ("in", "lbf"), 9: ("mm", "N")}
+_DATA_SET_MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
+_UNIT_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN"), 7: ("in", "lbf"), 9: ("mm", "N")}
 """Data set 164: code -> units of length and force."""
-_MOTIONS = {8: ("displacement", ""), 11: ("velocity", "/s"), 12: ("acceleration", "/s^2")}
+_MOTION_TYPES = {8: ("displacement", ""), 11: ("velocity", "/s"), 12: ("acceleration", "/s^2")}
 """Type of an ordinate -> its quantity, and what stands behind its length."""
-_FORCES = (9, 13)
-_TIME, _FRF, _COHERENCE = 1, 4, 6
-_DATES = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-%m-%dT%H:%M:%S%z")
+_FORCE_TYPES = (9, 13)
+_TIME_TYPE, _FRF_TYPE, _COHERENCE_TYPE = 1, 4, 6
+_DATE_FORMATS = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-%m-%dT%H:%M:%S%z")
 
 
 @dataclass(frozen=True)
-class DataSets:
+class UffDataSets:
     """What the data sets of a file hold."""
 
-    functions: Sequence[Function]
+    functions: Sequence[UffFunction]
     """Data sets 58, in their order."""
     system: tuple[str, str] | None
     """Units of length and force by data set 164."""
@@ -41,10 +40,10 @@ class DataSets:
 
 def read_uff(path: Path) -> Contents:
     """Its FRFs with their coherence, or its signals over time; DataError with the data set where it is damaged."""
-    sets = _data_sets(path, path.read_bytes())
-    frfs = [function for function in sets.functions if function.type == _FRF]
-    kinds = sorted({function.type for function in sets.functions} - {_TIME, _FRF, _COHERENCE})
-    signals = list(_frf_signals(sets, frfs)) if frfs else list(_time_signals(sets))
+    sets = _read_data_sets(path, path.read_bytes())
+    frfs = [function for function in sets.functions if function.type == _FRF_TYPE]
+    kinds = sorted({function.type for function in sets.functions} - {_TIME_TYPE, _FRF_TYPE, _COHERENCE_TYPE})
+    signals = list(_make_frf_signals(sets, frfs)) if frfs else list(_make_time_signals(sets))
     if not signals:
         content = f"functions of type {', '.join(map(str, kinds))}" if kinds else "no data set 58"
         raise DataError(f"{path}: holds {content}; FRFs (type 4) and signals over time (type 1) are read")
@@ -53,18 +52,18 @@ def read_uff(path: Path) -> Contents:
     return Contents(
         tuple(signals),
         averages=averages.pop() if len(averages) == 1 else None,
-        created=_created(first),
-        direction=_direction(sets),
+        created=_parse_date(first),
+        direction=_get_common_direction(sets),
         tool=first.keys.get("tool", ""),
         machines=sets.models,
         window=next((function.window for function in (frfs or sets.functions) if function.window), ""),
-        notes=tuple(_notes(frfs)),
+        notes=tuple(_list_notes(frfs)),
     )
 
 
-def _data_sets(path: Path, content: bytes) -> DataSets:
-    functions, system, models, at = list[Function](), None, dict[str, None](), 0
-    while (opening := _MARK.match(content, at)) is not None:
+def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
+    functions, system, models, at = list[UffFunction](), None, dict[str, None](), 0
+    while (opening := _DATA_SET_MARK.match(content, at)) is not None:
         begin = opening.end()
         kind = content[begin : content.find(b"\n", begin)].split()[:1]
         if kind and kind[0] in (b"58", b"58b"):
@@ -75,53 +74,57 @@ def _data_sets(path: Path, content: bytes) -> DataSets:
             at = len(content) if end < 0 else end + 1
         if kind == [b"151"]:
             named = re.match(rb"[^\n]*\n([^\n]*)", content[begin : begin + 400])
-            name = decoded(named[1]).strip() if named else ""
+            name = decode_utf8_or_latin1(named[1]).strip() if named else ""
             models |= {name: None} if name not in ("", "NONE") else {}
-        closing = _MARK.match(content, at)
+        closing = _DATA_SET_MARK.match(content, at)
         if closing is None:
             raise DataError(f"{path}: its last data set has no end (-1); it is cut short or damaged")
         if kind == [b"164"]:
             code = re.match(rb"[^\n]*\n\s*(\d+)", content[begin:])
-            system = _SYSTEMS.get(int(code[1])) if code else None
+            system = _UNIT_SYSTEMS.get(int(code[1])) if code else None
         at = closing.end()
     if content[at:].strip():
         raise DataError(f"{path}: {content[at:].strip()[:20]!r} stands behind its last data set; it is damaged")
-    return DataSets(functions, system, tuple(models))
+    return UffDataSets(functions, system, tuple(models))
 
 
-def _frf_signals(sets: DataSets, frfs: Sequence[Function]) -> Iterator[Signal]:
+def _make_frf_signals(sets: UffDataSets, frfs: Sequence[UffFunction]) -> Iterator[Signal]:
     """Each in a record of its own, turned to the positive direction of both axes."""
     for record, frf in enumerate(frfs):
-        unit, quantity = _frf_unit(frf, sets.system)
+        unit, quantity = _get_frf_unit(frf, sets.system)
         sign = -1.0 if frf.response_direction * frf.reference_direction < 0 else 1.0
         yield Signal("frequency", frf.abscissa, "frequency", frf.abscissa_axis.unit or "Hz", record=record)
         yield Signal(frf.name, sign * frf.values, "frf", unit, quantity, record=record)
         for function in sets.functions:
-            if function.type == _COHERENCE and function.place == frf.place and function.values.size == frf.values.size:
+            if (
+                function.type == _COHERENCE_TYPE
+                and function.place == frf.place
+                and function.values.size == frf.values.size
+            ):
                 yield Signal(f"coherence of {frf.name}", function.values, "coherence", record=record)
                 break
 
 
-def _frf_unit(frf: Function, system: tuple[str, str] | None) -> tuple[str, str]:
+def _get_frf_unit(frf: UffFunction, system: tuple[str, str] | None) -> tuple[str, str]:
     """Unit and quantity of the response, as far as the file tells."""
-    quantity, per_time = _MOTIONS.get(frf.ordinate.type, ("", ""))
+    quantity, per_time = _MOTION_TYPES.get(frf.ordinate.type, ("", ""))
     top, below = frf.ordinate.unit, frf.denominator.unit
     if not top and system and quantity:
         top = f"{system[0]}{per_time}"
-    if not below and system and frf.denominator.type in _FORCES:
+    if not below and system and frf.denominator.type in _FORCE_TYPES:
         below = system[1]
     return (f"({top})/({below})" if top and below else top), quantity
 
 
-def _time_signals(sets: DataSets) -> Iterator[Signal]:
+def _make_time_signals(sets: UffDataSets) -> Iterator[Signal]:
     """Channels; where one comes again, the next hit begins."""
     record, places = 0, set[tuple[object, ...]]()
-    for function in (listed for listed in sets.functions if listed.type == _TIME):
+    for function in (listed for listed in sets.functions if listed.type == _TIME_TYPE):
         if (function.place, function.ordinate.type) in places:
             record, places = record + 1, set()
         places.add((function.place, function.ordinate.type))
-        quantity, per_time = _MOTIONS.get(
-            function.ordinate.type, ("force" if function.ordinate.type in _FORCES else "", "")
+        quantity, per_time = _MOTION_TYPES.get(
+            function.ordinate.type, ("force" if function.ordinate.type in _FORCE_TYPES else "", "")
         )
         unit = function.ordinate.unit
         if not unit and sets.system and quantity:
@@ -133,13 +136,15 @@ def _time_signals(sets: DataSets) -> Iterator[Signal]:
             yield Signal("time", function.abscissa, "time", function.abscissa_axis.unit or "s", record=record)
 
 
-def _direction(sets: DataSets) -> str:
+def _get_common_direction(sets: UffDataSets) -> str:
     """At the tool tip, where all responses have the same."""
-    responses = {abs(function.response_direction) for function in sets.functions if function.ordinate.type in _MOTIONS}
+    responses = {
+        abs(function.response_direction) for function in sets.functions if function.ordinate.type in _MOTION_TYPES
+    }
     return {1: "x", 2: "y", 3: "z"}.get(responses.pop(), "") if len(responses) == 1 else ""
 
 
-def _notes(frfs: Sequence[Function]) -> Iterator[str]:
+def _list_notes(frfs: Sequence[UffFunction]) -> Iterator[str]:
     turned = sum(frf.response_direction * frf.reference_direction < 0 for frf in frfs)
     if turned:
         yield f"{turned} FRF(s) of opposite directions, turned round"
@@ -147,10 +152,10 @@ def _notes(frfs: Sequence[Function]) -> Iterator[str]:
         yield "hit and response differ in direction"
 
 
-def _created(function: Function) -> datetime | None:
+def _parse_date(function: UffFunction) -> datetime | None:
     """The third line, or that of our own files; local time where it has no zone."""
     text = function.keys.get("recorded") or function.lines[2].strip()
-    for form in _DATES:
+    for form in _DATE_FORMATS:
         try:
             return datetime.strptime(text, form).astimezone()
         except (ValueError, OverflowError, OSError):
@@ -163,4 +168,4 @@ def _is_uff(head: bytes, _path: Path) -> bool:
     return first.strip() == b"-1" and first.startswith(b"    -1")
 
 
-UFF = Format("uff", "universal file, data set 58", (".uff", ".unv", ".uf", ".bunv"), _is_uff, read_uff)
+UFF_FORMAT = Format("uff", "universal file, data set 58", (".uff", ".unv", ".uf", ".bunv"), _is_uff, read_uff)

@@ -1,17 +1,57 @@
-"""One cut as the learning takes it."""
+"""One test cut as evidence: label, cutting force by power, and repeated cuts.
+
+All that is chosen here is plausible, not measured, but for cuts that chatter.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lobes import Cut
-from lobewatch.cuts.learning.force_by_power import ForceByPower
-from lobewatch.machine.journal.heard_cut import CutWord
+from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.settings.drive_power import CutPower
 
-AGED = 0.02
+DRIVE_POWER_SPREAD = 0.15
+"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency of
+motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
+EDGE_FORCE_SPREAD, UNKNOWN_EDGE_FORCE_SPREAD = 0.3, 0.5
+"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it was
+measured with), and where it is not: what is published differs by three times."""
+POWER_READING_SPREAD = 0.05
+"""Standard deviation, relative, of one reading: a display that jumps, a feed or a radial depth a little off."""
+CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD = 0.89, 0.08
+"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations in
+time: edges that have left the cut do not rub, and thick chips, which it has beside thin ones, cost less. See
+docs/cuts.md."""
+
+
+@dataclass(frozen=True)
+class PowerEvidence:
+    """Kt by power; errors as standard deviations of its logarithm."""
+
+    force: float
+    """Kt over the one that the cut was taken for."""
+    common_error: float
+    """Error that all readings of a material share."""
+    own_error: float
+    """Error of this one alone."""
+
+
+def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
+    """What a power says of a cut in a material."""
+    of_edges = power.edge_share / (1 + power.edge_share)
+    common = math.hypot(
+        DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
+    )
+    middle, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
+    return PowerEvidence(power.tangential / cut.tangential / middle, common, math.hypot(POWER_READING_SPREAD, scatter))
+
+
+AGED_FREQUENCY_CHANGE = 0.02
 """Change of the natural frequency, relative, after which a cut says 61 % of what it said; chosen."""
-SAME_SPEED, SAME_DEPTH = 0.002, 0.01
+REPEAT_SPEED_TOLERANCE, REPEAT_DEPTH_TOLERANCE = 0.002, 0.01
 """Relative distances up to which a cut is another one again."""
 
 
@@ -25,7 +65,7 @@ class CutEvidence:
     """Spindle speed (rpm)."""
     depth: float
     """Axial depth (m)."""
-    word: CutWord
+    verdict: CutVerdict
     """Word for what it sounded like."""
     frequency: float = math.nan
     """Chatter frequency (Hz); NaN where none was heard or told."""
@@ -35,35 +75,66 @@ class CutEvidence:
     """Cuts with the same number share their cutting coefficients; 0 are those of the cut asked about."""
     speed_found: bool = True
     """Whether the speed was found in the sound; else it is the commanded one."""
-    moved: float = 1.0
+    frequency_ratio: float = 1.0
     """Natural frequency at rest when it was made, over that of now."""
     id: str = ""
     """Number of the cut in the journal."""
-    power: ForceByPower | None = None
+    power: PowerEvidence | None = None
     """Kt by its power; None where nobody has read it."""
 
     @property
     def weight(self) -> float:
         """Weight of what it says: less, the more the natural frequency has moved since."""
-        return math.exp(-(((self.moved - 1) / AGED) ** 2) / 2)
+        return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
-    def is_again(self, other: CutEvidence) -> bool:
+    def is_repeat_of(self, other: CutEvidence) -> bool:
         """Whether another cut is this one made again: of one program, in one material, at one speed and depth."""
-        near = abs(math.log(other.speed_rpm / self.speed_rpm)) < SAME_SPEED
+        near = abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
         same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)
-        return near and same and abs(math.log(other.depth / self.depth)) < SAME_DEPTH
+        return near and same and abs(math.log(other.depth / self.depth)) < REPEAT_DEPTH_TOLERANCE
 
     @property
     def tooth_frequency(self) -> float:
         """Times a second that the cut repeats (Hz): teeth a second where they are evenly spaced."""
-        return self.cut.repeats * self.speed_rpm / 60
+        return self.cut.repeats_per_turn * self.speed_rpm / 60
 
     @property
-    def chatters(self) -> bool:
+    def has_chatter(self) -> bool:
         """Whether it was not stable."""
-        return self.word != "stable"
+        return self.verdict != "stable"
 
     @property
     def has_frequency(self) -> bool:
         """Whether it says something of natural frequencies."""
-        return self.word == "flip" or (self.chatters and math.isfinite(self.frequency))
+        return self.verdict == "flip" or (self.has_chatter and math.isfinite(self.frequency))
+
+
+TAKEN_SPEED_TOLERANCE, TAKEN_DEPTH_TOLERANCE = 0.01, 0.04
+"""Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen: what is
+less deep than an edge (`likelihood.EDGE`) the spindles that are learnt tell by themselves ..."""
+REJECTED_DEPTH_TOLERANCE = 0.10
+"""... but not where they do not believe it."""
+
+
+def is_setting_taken(
+    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence] = ()
+) -> bool:
+    """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since.
+
+    doubted: cuts that are not believed, which take more.
+    """
+    return any(
+        cut.has_chatter
+        and abs(math.log(speed_rpm / cut.speed_rpm)) < TAKEN_SPEED_TOLERANCE
+        and depth > (1 - (REJECTED_DEPTH_TOLERANCE if cut in doubted else TAKEN_DEPTH_TOLERANCE)) * cut.depth
+        and not any(cut.is_repeat_of(later) and not later.has_chatter for later in cuts[place + 1 :])
+        for place, cut in enumerate(cuts)
+    )
+
+
+def find_cut_to_repeat(cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence]) -> CutEvidence | None:
+    """The first cut that is not believed and was made once only; None where there is none."""
+    for cut in cuts:
+        if cut in doubted and sum(cut.is_repeat_of(other) for other in cuts) == 1:
+            return cut
+    return None

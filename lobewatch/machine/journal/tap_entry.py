@@ -9,14 +9,14 @@ from typing import Any, Self
 
 import msgspec
 
-from acquisition import UNSAID, Conditions, DataError, Remark, TapTest
+from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, Remark, TapTest
 from modal import ModeEdits
 
-BY_FIT = ModeEdits()
+NO_MODE_EDITS = ModeEdits()
 """Nobody chose modes."""
-LATER = ("accepted", "excluded", "by_hand")
+FIELDS_OF_OTHER_LINES = ("accepted", "excluded", "by_hand")
 """Fields of a tap test that other lines of the journal say."""
-TAP_LINE = b'{"kind": "tap", '
+TAP_LINE_PREFIX = b'{"kind": "tap", '
 """Beginning of the line of a tap test."""
 
 
@@ -46,7 +46,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Direction at the tool tip, "x" or "y"."""
     source_sha256: str
     """SHA-256 of the recording it was replayed from; empty for a live test."""
-    conditions: Conditions = UNSAID
+    conditions: Conditions = UNKNOWN_CONDITIONS
     """Conditions that it was taken under; unknown in lines of older versions."""
     asked: tuple[str, ...] = ()
     """Questions about its time when it was committed, by code; lines of older versions have none."""
@@ -56,7 +56,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Questions about it that a person has accepted, by code; lines of their own."""
     excluded: str = ""
     """Reason why a person has taken it out of the series; empty where it counts; lines of their own."""
-    by_hand: ModeEdits = BY_FIT
+    by_hand: ModeEdits = NO_MODE_EDITS
     """Modes of it that a person chose; lines of their own."""
 
     @classmethod
@@ -70,7 +70,11 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
 
     @classmethod
     def from_line(
-        cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "", by_hand: ModeEdits = BY_FIT
+        cls,
+        line: dict[str, Any],
+        accepted: tuple[str, ...] = (),
+        excluded: str = "",
+        by_hand: ModeEdits = NO_MODE_EDITS,
     ) -> Self:
         """Entry of the line of the journal that `line` has made."""
         fields = line if line.get("conditions") else {key: line[key] for key in line if key != "conditions"}
@@ -80,8 +84,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     @property
     def line(self) -> dict[str, Any]:
         """Line of the journal."""
-        fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in LATER}
-        return {"kind": "tap", **fields, "conditions": self.conditions.known, "asked": list(self.asked)}
+        fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in FIELDS_OF_OTHER_LINES}
+        return {"kind": "tap", **fields, "conditions": self.conditions.specified, "asked": list(self.asked)}
 
     @property
     def file(self) -> str:
@@ -89,7 +93,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         return f"taps/{self.id}.h5"
 
 
-class _Line(msgspec.Struct, gc=False):
+class _TapLine(msgspec.Struct, gc=False):
     """Fields of the line of a tap test."""
 
     id: str
@@ -104,21 +108,21 @@ class _Line(msgspec.Struct, gc=False):
     operator: str = ""
 
 
-_decode = msgspec.json.Decoder(list[_Line]).decode
+_decode_tap_lines = msgspec.json.Decoder(list[_TapLine]).decode
 
 
-def tap_entries(
+def decode_tap_entries(
     lines: Iterable[bytes],
     accepted: Mapping[str, tuple[str, ...]],
     excluded: Mapping[str, str],
     by_hand: Mapping[str, ModeEdits],
 ) -> Iterator[TapEntry]:
-    """Entries of lines of the journal that begin with `TAP_LINE`, and what others say of them, by identity.
+    """Entries of lines of the journal that begin with `TAP_LINE_PREFIX`, and what others say of them, by identity.
 
     Twenty times as fast as `TapEntry.from_line` of each.
     """
-    for line in _decode(b"[" + b",".join(lines) + b"]"):
-        conditions = msgspec.convert(line.conditions, Conditions) if line.conditions else UNSAID
+    for line in _decode_tap_lines(b"[" + b",".join(lines) + b"]"):
+        conditions = msgspec.convert(line.conditions, Conditions) if line.conditions else UNKNOWN_CONDITIONS
         file, labels = (line.id, line.sha256, line.size), (line.time, line.tool, line.direction)
-        later = accepted.get(line.id, ()), excluded.get(line.id, ""), by_hand.get(line.id, BY_FIT)
+        later = accepted.get(line.id, ()), excluded.get(line.id, ""), by_hand.get(line.id, NO_MODE_EDITS)
         yield TapEntry(*file, *labels, line.source_sha256, conditions, line.asked, line.operator, *later)

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.machine.settings.cut_tables import CutTable
-from lobewatch.machine.settings.drive import drive_limit
+from lobewatch.machine.settings.drive_power import drive_depth_limit
 from lobewatch.machine.settings.machine_file import Machine
-from lobewatch.machine.settings.plausible import DEPTH
-from lobewatch.machine.settings.tool_limits import ToolLimits, tool_limits
+from lobewatch.machine.settings.plausibility import DEPTH_RATIO_RANGE
+from lobewatch.machine.settings.tool_limits import ToolLimits, find_tool_limits
 
-RPM, MM = 10.0, 0.05
+SPEED_STEP_RPM, DEPTH_STEP_MM = 10.0, 0.05
 """Steps that can be set at a machine (rpm and mm); numbers are rounded inwards to them."""
-ROUNDING = 1e-6
+STEP_ROUNDING = 1e-6
 """Share of a step that rounding of numbers may miss."""
 
 
@@ -34,24 +34,24 @@ class CutRange:
     @classmethod
     def of(cls, machine: Machine, table: CutTable) -> CutRange:
         """The range of a cut."""
-        return cls(machine, table, tool_limits(machine, table))
+        return cls(machine, table, find_tool_limits(machine, table))
 
     @property
     def low_rpm(self) -> float:
         """Slowest speed (rpm)."""
         low, spindle = self.limits.low_rpm, self.machine.speed.low_rpm
-        return low if low == spindle else math.ceil(low / RPM) * RPM
+        return low if low == spindle else math.ceil(low / SPEED_STEP_RPM) * SPEED_STEP_RPM
 
     @property
     def high_rpm(self) -> float:
         """Fastest speed (rpm), below the slowest where there is none."""
         high, spindle = self.limits.high_rpm, self.machine.speed.high_rpm
-        return high if high == spindle else math.floor(high / RPM) * RPM
+        return high if high == spindle else math.floor(high / SPEED_STEP_RPM) * SPEED_STEP_RPM
 
     @property
     def deepest_mm(self) -> float:
         """Greatest depth of cut of the tool (mm), and none that would be asked about."""
-        return min(self.limits.deepest_mm, DEPTH[1] * self.table.tool_diameter_mm)
+        return min(self.limits.deepest_mm, DEPTH_RATIO_RANGE[1] * self.table.tool_diameter_mm)
 
     @property
     def is_empty(self) -> bool:
@@ -59,7 +59,7 @@ class CutRange:
         return self.low_rpm > self.high_rpm
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """Speeds inside, for people."""
         spindle = self.machine.speed
         if self.is_empty:
@@ -67,29 +67,29 @@ class CutRange:
         is_whole = (self.low_rpm, self.high_rpm) == (spindle.low_rpm, spindle.high_rpm)
         return f"{self.low_rpm:g}..{self.high_rpm:g} rpm{'' if is_whole else ', which the tool bears'}"
 
-    def depths(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth_limits(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deepest cut (mm) that tool and drive allow at speeds (rpm)."""
-        return np.minimum(self.deepest_mm, 1e3 * drive_limit(self.machine, self.table, speed_rpm))
+        return np.minimum(self.deepest_mm, 1e3 * drive_depth_limit(self.machine, self.table, speed_rpm))
 
-    def floored(self, depth_mm: float) -> float:
+    def round_down_depth(self, depth_mm: float) -> float:
         """The deepest depth (mm) that can be set, is not deeper and would not be asked about; 0 where there is none."""
-        floored = floored_mm(depth_mm)
-        return floored if floored >= DEPTH[0] * self.table.tool_diameter_mm else 0.0
+        floored = round_down_depth_mm(depth_mm)
+        return floored if floored >= DEPTH_RATIO_RANGE[0] * self.table.tool_diameter_mm else 0.0
 
-    def holds(self, speed_rpm: float, depth_mm: float) -> bool:
+    def contains(self, speed_rpm: float, depth_mm: float) -> bool:
         """Whether a speed (rpm) and a depth (mm) lie inside."""
         is_reached = self.low_rpm <= speed_rpm <= self.high_rpm
-        return is_reached and depth_mm <= float(self.depths(np.array([speed_rpm]))[0])
+        return is_reached and depth_mm <= float(self.depth_limits(np.array([speed_rpm]))[0])
 
     def speeds(self, step: float) -> NDArray[np.float64]:
         """Speeds that can be set (rpm), rising, a relative step apart at least."""
         if self.is_empty:
             return np.empty(0)
         number = int(math.log(self.high_rpm / self.low_rpm) / step) + 2
-        wanted = np.round(np.geomspace(self.low_rpm, self.high_rpm, number) / RPM) * RPM
+        wanted = np.round(np.geomspace(self.low_rpm, self.high_rpm, number) / SPEED_STEP_RPM) * SPEED_STEP_RPM
         return np.unique(np.clip(wanted, self.low_rpm, self.high_rpm))
 
 
-def floored_mm(depth_mm: float) -> float:
+def round_down_depth_mm(depth_mm: float) -> float:
     """The deepest depth (mm) that can be set and is not deeper."""
-    return round(math.floor(depth_mm / MM + ROUNDING) * MM, 6)
+    return round(math.floor(depth_mm / DEPTH_STEP_MM + STEP_ROUNDING) * DEPTH_STEP_MM, 6)

@@ -1,4 +1,4 @@
-"""Tables of machine.toml about cutting: the reference cut, programs, materials and the drive."""
+"""Tables of machine.toml on cutting: reference cut, programs, materials, drive and uncertainty."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from lobes import Coefficients, Direction, tangential_and_radial
-from lobes.cut import checked_pitch
-from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
+from lobes import CuttingCoefficients, Direction, tangential_and_radial
+from lobes.cut import normalize_pitch
+from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
 """Angles from x to the feed (rad), by axis of the machine."""
-ENGAGEMENTS = math.radians(15)
+MAX_ENGAGEMENT_STEP = math.radians(15)
 """Engagements of a path are looked at no further apart (rad)."""
-Range = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
+ValueRange = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
 """Least and greatest value. Of fixed length, `tuple[A, B]`, msgspec 0.22 reads it wrongly beside a number."""
-Wear = Literal["new", "used", "worn"]
+ToolWear = Literal["new", "used", "worn"]
 """How worn the edges of a tool may be."""
-IsoGroup = Literal["P", "M", "K", "N", "S", "H"]
+IsoMaterialGroup = Literal["P", "M", "K", "N", "S", "H"]
 """Group of materials by ISO 513."""
 
 
-def pitch_of(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
+def convert_pitch(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
     """Pitches (rad) of a cutter, () where its teeth are evenly spaced; ValueError for what is none."""
-    return checked_pitch([math.radians(angle) for angle in pitch_deg or ()], teeth)
+    return normalize_pitch([math.radians(angle) for angle in pitch_deg or ()], teeth)
 
 
 def corner_engagement(tool: float, radial: float, corner: float) -> float:
@@ -43,15 +43,15 @@ def corner_engagement(tool: float, radial: float, corner: float) -> float:
     return math.acos(max(cosine, -1.0))
 
 
-def engagements_between(least: float, most: float) -> tuple[float, ...]:
-    """Radial depths over diameter from one to another, at most `ENGAGEMENTS` apart as angles of engagement."""
+def immersion_steps(least: float, most: float) -> tuple[float, ...]:
+    """Radial depths over diameter from one to another, at most `MAX_ENGAGEMENT_STEP` apart as angles of engagement."""
     low, high = (math.acos(1 - 2 * immersion) for immersion in (least, most))
-    steps = math.ceil((high - low) / ENGAGEMENTS - 1e-9)
+    steps = math.ceil((high - low) / MAX_ENGAGEMENT_STEP - 1e-9)
     between = [(1 - math.cos(low + (high - low) * i / steps)) / 2 for i in range(1, steps)]
     return (least, *between, *([most] if steps else []))
 
 
-class CutTable(Table, frozen=True):
+class CutTable(TomlTable, frozen=True):
     """[reference_cut], and what it shares with a program.
 
     >>> pocket = CutTable(4, (2.0, 8.0), 16.0, "down", material="AA 7075")  # radial depth 2 to 8 mm
@@ -61,7 +61,7 @@ class CutTable(Table, frozen=True):
 
     teeth: Annotated[int, Meta(ge=1)]
     """Number of teeth."""
-    radial_depth_mm: Positive | Range
+    radial_depth_mm: Positive | ValueRange
     """Radial depth (mm), or the least and the greatest that it meets."""
     tool_diameter_mm: Positive
     """Diameter of the tool (mm)."""
@@ -85,7 +85,7 @@ class CutTable(Table, frozen=True):
     """Axis of the machine that it is fed along, "x", "y" or "both"."""
 
     @property
-    def feeds(self) -> tuple[str, ...]:
+    def feed_axes(self) -> tuple[str, ...]:
         """Axes of the machine that it is fed along."""
         return tuple(FEED_ANGLES) if self.feed == "both" else (self.feed,)
 
@@ -103,7 +103,7 @@ class CutTable(Table, frozen=True):
     @property
     def immersions(self) -> tuple[float, ...]:
         """Radial depths over diameter that it meets on its way, rising: one, or so many that none lies far between."""
-        return engagements_between(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
+        return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
 
     @property
     def deepest_mm(self) -> float:
@@ -122,7 +122,7 @@ class CutTable(Table, frozen=True):
             raise ValueError("give material, or both tangential_n_per_mm2 and radial_n_per_mm2, or all three")
         if self.feed not in (*FEED_ANGLES, "both"):
             raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
-        pitch_of(self.pitch_deg, self.teeth)
+        convert_pitch(self.pitch_deg, self.teeth)
 
 
 class ProgramTable(CutTable, frozen=True, kw_only=True):
@@ -145,7 +145,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     """Axial depth (mm); NaN where it is asked for."""
     corner_radius_mm: Positive | None = None
     """Radius of the tightest corner on its path (mm); None for a straight one."""
-    wear: Wear | None = None
+    wear: ToolWear | None = None
     """Wear of the tool that it may be run with; None: that of [doubt]."""
     thin: bool = False
     """Whether the wall that is cut gives way: then it is never called stable."""
@@ -156,10 +156,10 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         if self.flute_length_mm is not None and self.depth_mm > self.flute_length_mm:
             raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
         if self.corner_radius_mm is not None:
-            self.in_corner(self.corner_radius_mm)
+            self.corner_immersion(self.corner_radius_mm)
 
     @property
-    def is_open(self) -> bool:
+    def is_incomplete(self) -> bool:
         """Whether its speed or its depth is asked for."""
         return math.isnan(self.speed_rpm) or math.isnan(self.depth_mm)
 
@@ -168,9 +168,9 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         """Radial depths over diameter that it meets on its way, those into its corners too."""
         if self.corner_radius_mm is None:
             return super().immersions
-        return engagements_between(self.radial_mm[0] / self.tool_diameter_mm, self.in_corner(self.corner_radius_mm))
+        return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.corner_immersion(self.corner_radius_mm))
 
-    def in_corner(self, radius_mm: float) -> float:
+    def corner_immersion(self, radius_mm: float) -> float:
         """Radial depth over diameter of a straight cut that is engaged as this one in a corner of that radius (mm).
 
         ValueError for a corner tighter than the tool.
@@ -189,7 +189,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         return max(super().deepest_mm, 0.0 if math.isnan(self.depth_mm) else self.depth_mm)
 
 
-class MaterialTable(Table, frozen=True):
+class MaterialTable(TomlTable, frozen=True):
     """[[material]]: cutting coefficients of one's own, Ktc and Krc or Ks and beta, with edge coefficients if known."""
 
     name: Annotated[str, Meta(min_length=1)]
@@ -200,7 +200,7 @@ class MaterialTable(Table, frozen=True):
     tangential_edge_n_per_mm: NotNegative = math.nan
     radial_edge_n_per_mm: NotNegative = math.nan
     source: str = "machine.toml"
-    iso_group: IsoGroup | None = None
+    iso_group: IsoMaterialGroup | None = None
 
     def __post_init__(self) -> None:
         """Refuse a material without one whole pair of coefficients."""
@@ -213,14 +213,14 @@ class MaterialTable(Table, frozen=True):
                 "give either tangential_n_per_mm2 and radial_n_per_mm2, or specific_force_n_per_mm2 and force_angle_deg"
             )
 
-    def build(self) -> Coefficients:
+    def build(self) -> CuttingCoefficients:
         """The coefficients in SI units."""
         tangential, radial = self.tangential_n_per_mm2, self.radial_n_per_mm2
         if self.specific_force_n_per_mm2 is not None and self.force_angle_deg is not None:
             tangential, radial = tangential_and_radial(
                 self.specific_force_n_per_mm2, math.radians(self.force_angle_deg)
             )
-        return Coefficients(
+        return CuttingCoefficients(
             self.name,
             (tangential or 0.0) * 1e6,
             (radial or 0.0) * 1e6,
@@ -231,8 +231,38 @@ class MaterialTable(Table, frozen=True):
         )
 
 
-class Drive(Table, frozen=True):
+class DriveTable(TomlTable, frozen=True):
     """[drive]: power and torque of the spindle motor; optional."""
 
     power_kw: PositiveOrInfinite = math.inf
     torque_nm: PositiveOrInfinite = math.inf
+
+
+Percent = Annotated[float, Meta(ge=0, le=100)]
+
+
+class UncertaintyTable(TomlTable, frozen=True):
+    """Half-widths (%) of independent uniform distributions. docs/lobes.md says where the defaults come from."""
+
+    frequency_percent: Percent | None = None
+    """Natural frequency from tap test to tap test; None: the series' own scatter from 8 tests on, before that 0.3."""
+    damping_percent: Percent | None = None
+    """Damping ratio from tap test to tap test; None: likewise, before that 10."""
+    stiffness_percent: Percent | None = None
+    """Modal stiffness from tap test to tap test; None: likewise, before that 3."""
+    speed_percent: Percent = 1.0
+    """Spindle speed."""
+    coefficients_percent: Percent = 20.0
+    """Cutting coefficients and their ratio, where no published range is known."""
+    predicted_frequency_percent: Percent = 3.0
+    """Natural frequencies of a tool that was never tapped."""
+    predicted_damping_percent: Percent = 30.0
+    """Damping ratios of such a tool."""
+    predicted_stiffness_percent: Percent = 15.0
+    """Modal stiffnesses of such a tool."""
+    untapped_frequency_percent: Percent = 5.0
+    """Natural frequencies in a direction that was not tapped, against the other one."""
+    untapped_stiffness_percent: Percent = 30.0
+    """Modal stiffnesses in such a direction."""
+    wear: ToolWear = "new"
+    """How worn tools may be; a program may say otherwise."""

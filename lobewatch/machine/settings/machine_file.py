@@ -14,26 +14,35 @@ import msgspec
 
 from acquisition import DataError
 from dsm import Spindle
-from lobes import Coefficients, Cut, folded_name, materials_by_name, nearest_name
-from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable, pitch_of
-from lobewatch.machine.settings.daq_tables import Daq
-from lobewatch.machine.settings.doubt_table import DoubtTable
+from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
+from lobewatch.machine.settings.cut_tables import (
+    FEED_ANGLES,
+    CutTable,
+    DriveTable,
+    MaterialTable,
+    ProgramTable,
+    UncertaintyTable,
+    convert_pitch,
+)
 from lobewatch.machine.settings.notify_table import NotifyTable
-from lobewatch.machine.settings.readable_error import comma_hint, readable
-from lobewatch.machine.settings.setting_questions import questions_of_program
-from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
-from lobewatch.machine.settings.spindle_tables import SpindleTable
-from lobewatch.machine.settings.toml_table import Table, check_texts
-from lobewatch.machine.settings.toml_text import toml_tables, toml_text
-from lobewatch.machine.settings.tool_table import ToolTable
+from lobewatch.machine.settings.setting_questions import find_program_questions
+from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
+from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
+from lobewatch.machine.settings.toml_schema import (
+    TomlTable,
+    check_control_characters,
+    explain_validation_error,
+    suggest_decimal_point,
+)
+from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] beside the names of programs."""
-OWN = "machine.toml"
+USER_SOURCE = "machine.toml"
 """Source of what a person has entered."""
 
 
-class Machine(Table, frozen=True):
+class Machine(TomlTable, frozen=True):
     """All tables of machine.toml.
 
     >>> from pathlib import Path
@@ -49,21 +58,21 @@ class Machine(Table, frozen=True):
     0.166
     """
 
-    machine: Identity
+    machine: MachineTable
     """Identity of the machine: [machine]."""
-    tap: TapSetup = TapSetup()
+    tap: TapTable = TapTable()
     """Way in which it is tapped: [tap]."""
-    daq: Daq = Daq()
+    daq: DaqTable = DaqTable()
     """Device and its sensors: [daq]."""
-    mode: ModeChoice = ModeChoice()
+    mode: ModeTable = ModeTable()
     """Mode that is followed: [mode]."""
-    limits: Limits = Limits()
+    limits: LimitsTable = LimitsTable()
     """Falls from which it warns and alarms: [limits]."""
-    speed: SpeedRange = SpeedRange()
+    speed: SpeedTable = SpeedTable()
     """Speeds of the diagrams: [speed]."""
-    drive: Drive = Drive()
+    drive: DriveTable = DriveTable()
     """Power and torque of the spindle: [drive]."""
-    doubt: DoubtTable = DoubtTable()
+    doubt: UncertaintyTable = UncertaintyTable()
     """Widths of what is not known: [doubt]."""
     notify: NotifyTable = NotifyTable()
     """Where alarms are sent: [notify]."""
@@ -71,7 +80,7 @@ class Machine(Table, frozen=True):
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
     """Cut that is watched beside the programs: [reference_cut]."""
-    listed: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
+    all_programs: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
     """Programs as they stand in the file: those that are run, and those whose speed or depth is asked for."""
     spindle: SpindleTable | None = None
     """Shaft and bearings of the model: [spindle]; None without one."""
@@ -82,8 +91,8 @@ class Machine(Table, frozen=True):
         """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
         self._check_tools()
         self._check_hammer()
-        names = [program.name for program in self.listed]
-        for i, program in enumerate(self.listed, 1):
+        names = [program.name for program in self.all_programs]
+        for i, program in enumerate(self.all_programs, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
                 raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
             if not (math.isnan(program.speed_rpm) or self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm):
@@ -93,46 +102,46 @@ class Machine(Table, frozen=True):
                 )
         names = [material.name for material in self.material]
         for i, name in enumerate(names, 1):
-            if folded_name(name) in map(folded_name, names[: i - 1]):
+            if fold_material_name(name) in map(fold_material_name, names[: i - 1]):
                 raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
         if self.reference_cut:
             self.coefficients(self.reference_cut)
-        for i, program in enumerate(self.listed, 1):
+        for i, program in enumerate(self.all_programs, 1):
             self.coefficients(program)
             self._check_tool_of(f"program {i}", program)
 
     @property
     def program(self) -> tuple[ProgramTable, ...]:
         """Programs that are run, with a speed and a depth."""
-        return tuple(program for program in self.listed if not program.is_open)
+        return tuple(program for program in self.all_programs if not program.is_incomplete)
 
     @property
-    def open_programs(self) -> tuple[ProgramTable, ...]:
+    def incomplete_programs(self) -> tuple[ProgramTable, ...]:
         """Programs whose speed or depth is asked for."""
-        return tuple(program for program in self.listed if program.is_open)
+        return tuple(program for program in self.all_programs if program.is_incomplete)
 
-    def coefficients(self, table: CutTable) -> Coefficients:
+    def coefficients(self, table: CutTable) -> CuttingCoefficients:
         """Cutting coefficients of a cut: its own, else those of its material; ValueError for one that is not known.
 
         A material goes by any of its names; case and blanks do not count, and a [[material]] comes first.
         """
         tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
         if table.material is None:
-            return Coefficients("", tangential, radial, source=OWN)
+            return CuttingCoefficients("", tangential, radial, source=USER_SOURCE)
         known = self._material(table.material)
         if table.tangential_n_per_mm2 is None:
             return known
         unpublished: dict[str, Any] = {"tangential_range": None, "ratio_range": None, "specific_forces": ()}
-        return replace(known, tangential=tangential, radial=radial, source=OWN, **unpublished)
+        return replace(known, tangential=tangential, radial=radial, source=USER_SOURCE, **unpublished)
 
-    def _material(self, name: str) -> Coefficients:
-        own = {folded_name(material.name): material.build() for material in self.material}
+    def _material(self, name: str) -> CuttingCoefficients:
+        own = {fold_material_name(material.name): material.build() for material in self.material}
         by_name = {**materials_by_name(), **own}
-        if folded_name(name) not in by_name:
-            near = nearest_name(name, by_name)
+        if fold_material_name(name) not in by_name:
+            near = nearest_material_name(name, by_name)
             known = f"is {near!r} meant? lobewatch materials lists those that are known; or add a [[material]]"
             raise ValueError(f"material={name!r} is not known; {known}")
-        return by_name[folded_name(name)]
+        return by_name[fold_material_name(name)]
 
     def build_cut(self, table: CutTable) -> Cut:
         """A cut in SI units, at its greatest radial depth on the straight, the feed along x."""
@@ -144,7 +153,7 @@ class Machine(Table, frozen=True):
             tangential=coefficients.tangential,
             radial=coefficients.radial,
             helix_lag=2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter,
-            pitch=pitch_of(self._pitch_deg(table), table.teeth),
+            pitch=convert_pitch(self._pitch_deg(table), table.teeth),
         )
 
     def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
@@ -154,26 +163,26 @@ class Machine(Table, frozen=True):
 
     def helix_deg(self, table: CutTable) -> float | None:
         """Helix angle of a cut (deg): its own, else that of its [[tool]]; None where neither says it."""
-        tool = self.tool_of(table)
+        tool = self.find_tool(table)
         return tool.helix_deg if table.helix_deg is None and tool else table.helix_deg
 
     def _pitch_deg(self, table: CutTable) -> Sequence[float] | None:
         """Pitches of a cut (deg): its own, else those of its [[tool]]."""
-        tool = self.tool_of(table)
+        tool = self.find_tool(table)
         return tool.pitch_deg if table.pitch_deg is None and tool else table.pitch_deg
 
-    def tool_of(self, table: CutTable) -> ToolTable | None:
+    def find_tool(self, table: CutTable) -> ToolTable | None:
         """The [[tool]] of a program; None where there is none, and of the reference cut, which never changes."""
         name = table.tool if isinstance(table, ProgramTable) else None
         return next((tool for tool in self.tool if tool.name == name), None)
 
     def _check_tool_of(self, place: str, program: ProgramTable) -> None:
         """Refuse what its [[tool]] cannot be: pitches of other teeth, flutes shorter than its depth."""
-        tool = self.tool_of(program)
+        tool = self.find_tool(program)
         if tool is None:
             return
         try:
-            pitch_of(self._pitch_deg(program), program.teeth)
+            convert_pitch(self._pitch_deg(program), program.teeth)
         except ValueError as error:
             raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
@@ -217,7 +226,7 @@ class Machine(Table, frozen=True):
         spindle = self.spindle.build()
         if tool == self.tap.tool:
             return spindle
-        return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+        return self.find_modelled_tool(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
 
     @property
     def modelled_tools(self) -> list[ToolTable]:
@@ -229,7 +238,7 @@ class Machine(Table, frozen=True):
         """Standard error of each diameter of the model, relative (-); 0 without a model."""
         return self.spindle.tolerance if self.spindle else 0.0
 
-    def tool_named(self, name: str) -> ToolTable:
+    def find_modelled_tool(self, name: str) -> ToolTable:
         """A [[tool]] with a shape; DataError where there is none of this name."""
         for tool in self.modelled_tools:
             if tool.name == name:
@@ -243,7 +252,9 @@ class Machine(Table, frozen=True):
         tables |= {program.name: program for program in self.program if program.tool == tool}
         return {
             name: tuple(
-                replace(cut, feed_angle=FEED_ANGLES[feed]) for cut in self.engaged_cuts(table) for feed in table.feeds
+                replace(cut, feed_angle=FEED_ANGLES[feed])
+                for cut in self.engaged_cuts(table)
+                for feed in table.feed_axes
             )
             for name, table in tables.items()
         }
@@ -256,7 +267,7 @@ class Machine(Table, frozen=True):
     @property
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
-        return _hash(
+        return _hash_settings(
             "questions, K against the model",
             self.mode,
             self.spindle,
@@ -271,32 +282,32 @@ class Machine(Table, frozen=True):
         """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
         hashes = {}
         for program in self.program:
-            asked = [doubted.claim for doubted in questions_of_program(self, program, on_model=True)]
+            asked = [doubted.statement for doubted in find_program_questions(self, program, on_model=True)]
             tool = self._pitch_deg(program), self.helix_deg(program)
             decides = program, tool, self.coefficients(program), self.doubt, asked
-            hashes[program.name] = _hash("four words over the doubt, plausible or asked", *decides)
+            hashes[program.name] = _hash_settings("four words over the doubt, plausible or asked", *decides)
         return hashes
 
 
-def _hash(*settings: object) -> str:
+def _hash_settings(*settings: object) -> str:
     return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
-def read_machine(path: Path) -> Machine:
+def read_machine_file(path: Path) -> Machine:
     """The machine file; DataError with the place for what is wrong in it, OSError where it cannot be read."""
-    return parse_machine(toml_text(path), str(path))
+    return parse_machine_file(read_toml_text(path), str(path))
 
 
-def parse_machine(text: str, name: str = "machine.toml") -> Machine:
+def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
     """The machine file from its text; DataError with the place for what is wrong in it."""
     tables: dict[str, Any] = {}
     try:
-        tables = toml_tables(text)
-        check_texts(tables)
+        tables = parse_toml_tables(text)
+        check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{comma_hint(text)}") from error
+        raise DataError(f"{name}: {error}{suggest_decimal_point(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {readable(str(error), tables, Machine)}") from error
+        raise DataError(f"{name}: {explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error

@@ -6,13 +6,13 @@ import os
 from typing import NamedTuple
 from urllib.parse import quote, unquote, urlsplit
 
-from lobewatch.machine.settings.toml_table import Table
+from lobewatch.machine.settings.toml_schema import TomlTable
 
-PORTS = {"mqtt": 1883, "mqtts": 8883}
+DEFAULT_MQTT_PORTS = {"mqtt": 1883, "mqtts": 8883}
 """Port by scheme, where the address names none; mqtts is encrypted."""
-PASSWORD = "LOBEWATCH_MQTT_PASSWORD"
+PASSWORD_VARIABLE = "LOBEWATCH_MQTT_PASSWORD"
 """Variable of the environment: machine.toml is copied into each tap file, so the password need not stand in it."""
-PASSWORD_HOST = "LOBEWATCH_MQTT_HOST"
+PASSWORD_HOST_VARIABLE = "LOBEWATCH_MQTT_HOST"
 """Variable of the environment: host, or host:port, that the password is for, whomever a machine.toml names."""
 
 
@@ -35,10 +35,10 @@ class Broker(NamedTuple):
     @property
     def address(self) -> str:
         """Address for people: without the password."""
-        return f"{self.scheme}://{self.place}"
+        return f"{self.scheme}://{self.host_port}"
 
     @property
-    def place(self) -> str:
+    def host_port(self) -> str:
         """Host and port."""
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
@@ -46,18 +46,18 @@ class Broker(NamedTuple):
     def without_password(self) -> str:
         """Address that can be kept: with user and prefix."""
         user = f"{quote(self.user, safe='')}@" if self.user else ""
-        return f"{self.scheme}://{user}{self.place}/{self.prefix}"
+        return f"{self.scheme}://{user}{self.host_port}/{self.prefix}"
 
     @property
-    def withheld(self) -> str:
+    def password_warning(self) -> str:
         """Why this user goes without the password of the environment; empty where there is no such password."""
-        if not self.user or self.password or not os.environ.get(PASSWORD):
+        if not self.user or self.password or not os.environ.get(PASSWORD_VARIABLE):
             return ""
-        named = os.environ.get(PASSWORD_HOST) or "not set"
-        return f"{PASSWORD} is not used: {PASSWORD_HOST} is {named}; set it to {self.place} if this broker may have it"
+        named = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
+        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {named}; set it to {self.host_port} if this broker may have it"
 
 
-class NotifyTable(Table, frozen=True):
+class NotifyTable(TomlTable, frozen=True):
     """[notify]: nobody is told where nothing stands."""
 
     mqtt: str = ""
@@ -65,15 +65,15 @@ class NotifyTable(Table, frozen=True):
     def __post_init__(self) -> None:
         """Refuse an address that is none."""
         if self.mqtt:
-            broker_of(self.mqtt)
+            parse_broker(self.mqtt)
 
     @property
     def broker(self) -> Broker | None:
         """Broker of `mqtt`; None where nobody is told."""
-        return broker_of(self.mqtt) if self.mqtt else None
+        return parse_broker(self.mqtt) if self.mqtt else None
 
 
-def broker_of(address: str) -> Broker:
+def parse_broker(address: str) -> Broker:
     """Broker of mqtt://[user[:password]@]host[:port][/prefix]; ValueError for what is none."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
     allowed = "give mqtt://HOST, mqtt://USER@HOST:PORT/PREFIX, or mqtts:// where it is encrypted"
@@ -84,18 +84,18 @@ def broker_of(address: str) -> Broker:
     except ValueError:
         raise ValueError(refusal) from None
     prefix = url.path.strip("/") or "lobewatch"
-    if url.scheme not in PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
+    if url.scheme not in DEFAULT_MQTT_PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
         raise ValueError(refusal)
-    port = port or PORTS[url.scheme]
-    password = unquote(url.password or "") or (_password_for(url.hostname, port) if url.username else "")
+    port = port or DEFAULT_MQTT_PORTS[url.scheme]
+    password = unquote(url.password or "") or (_find_password(url.hostname, port) if url.username else "")
     return Broker(url.scheme, url.hostname, port, unquote(url.username or ""), password, prefix)
 
 
-def _password_for(host: str, port: int) -> str:
+def _find_password(host: str, port: int) -> str:
     """Password of the environment, where it is for this host; else empty."""
     try:
-        named = urlsplit(f"//{os.environ.get(PASSWORD_HOST, '')}")
+        named = urlsplit(f"//{os.environ.get(PASSWORD_HOST_VARIABLE, '')}")
         is_for_it = named.hostname == host and named.port in (None, port)
     except ValueError:
         is_for_it = False
-    return os.environ.get(PASSWORD, "") if is_for_it else ""
+    return os.environ.get(PASSWORD_VARIABLE, "") if is_for_it else ""

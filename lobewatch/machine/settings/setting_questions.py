@@ -5,48 +5,45 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from lobes import folded_name
-from lobewatch.machine.settings.cut_tables import CutTable, Drive, MaterialTable, ProgramTable
-from lobewatch.machine.settings.daq_tables import Daq
-from lobewatch.machine.settings.doubt_table import DoubtTable
-from lobewatch.machine.settings.plausible import (
-    TEMPLATE_BEARINGS,
-    Doubted,
-    about_alike,
-    about_cut,
-    about_drive,
-    about_its_tool,
-    about_material,
-    about_shape,
-    about_spindle,
-    about_stick_out,
-    about_tool,
-    out_of_range,
+from lobes import fold_material_name
+from lobewatch.machine.settings.cut_tables import CutTable, DriveTable, MaterialTable, ProgramTable, UncertaintyTable
+from lobewatch.machine.settings.plausibility import (
+    TEMPLATE_BEARING_STIFFNESS,
+    ImplausibleSetting,
+    check_cut,
+    check_drive,
+    check_material,
+    check_program_tool,
+    check_ranges,
+    check_same_tool,
+    check_spindle,
+    check_stick_out,
+    check_tool,
+    check_tool_shape,
 )
-from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
-from lobewatch.machine.settings.spindle_tables import SpindleTable
-from lobewatch.machine.settings.tool_table import ToolTable
+from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
+from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
 
 
-class AskedMachine(Protocol):
+class MachineTables(Protocol):
     """The tables of machine.toml, as `Machine` has them."""
 
     @property
-    def machine(self) -> Identity: ...  # noqa: D102
+    def machine(self) -> MachineTable: ...  # noqa: D102
     @property
-    def tap(self) -> TapSetup: ...  # noqa: D102
+    def tap(self) -> TapTable: ...  # noqa: D102
     @property
-    def daq(self) -> Daq: ...  # noqa: D102
+    def daq(self) -> DaqTable: ...  # noqa: D102
     @property
-    def mode(self) -> ModeChoice: ...  # noqa: D102
+    def mode(self) -> ModeTable: ...  # noqa: D102
     @property
-    def limits(self) -> Limits: ...  # noqa: D102
+    def limits(self) -> LimitsTable: ...  # noqa: D102
     @property
-    def speed(self) -> SpeedRange: ...  # noqa: D102
+    def speed(self) -> SpeedTable: ...  # noqa: D102
     @property
-    def drive(self) -> Drive: ...  # noqa: D102
+    def drive(self) -> DriveTable: ...  # noqa: D102
     @property
-    def doubt(self) -> DoubtTable: ...  # noqa: D102
+    def doubt(self) -> UncertaintyTable: ...  # noqa: D102
     @property
     def material(self) -> Sequence[MaterialTable]: ...  # noqa: D102
     @property
@@ -59,42 +56,44 @@ class AskedMachine(Protocol):
     def tool(self) -> Sequence[ToolTable]: ...  # noqa: D102
 
 
-def questions_of_program(machine: AskedMachine, program: ProgramTable, on_model: bool) -> list[Doubted]:
+def find_program_questions(machine: MachineTables, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
     """Open questions that the word on a program waits for; on_model: whether that rests on [spindle], too."""
-    return _open(machine, [*_about_program(machine, program), *(_about_model(machine, program) if on_model else ())])
+    return _remove_accepted(
+        machine, [*_check_program(machine, program), *(_check_model(machine, program) if on_model else ())]
+    )
 
 
-def all_questions(machine: AskedMachine) -> list[Doubted]:
+def find_all_questions(machine: MachineTables) -> list[ImplausibleSetting]:
     """All open questions of a machine.toml."""
-    asked = [*_about_machine(machine)]
+    asked = [*_check_machine(machine)]
     for program in machine.program:
-        asked += _about_program(machine, program)
-        asked += _about_model(machine, program)
+        asked += _check_program(machine, program)
+        asked += _check_model(machine, program)
     if machine.spindle is not None:
-        asked += about_spindle(machine.spindle)
+        asked += check_spindle(machine.spindle)
     if machine.reference_cut is not None:
-        asked += _about_cut(machine, machine.reference_cut, "[reference_cut]")
-    return _open(machine, asked)
+        asked += _check_cut_and_material(machine, machine.reference_cut, "[reference_cut]")
+    return _remove_accepted(machine, asked)
 
 
-def guessed_bearings(machine: AskedMachine) -> Doubted | None:
+def find_template_bearings(machine: MachineTables) -> ImplausibleSetting | None:
     """Question about a bearing stiffness that nobody has given; None where somebody has, or has accepted it."""
     spindle = machine.spindle
-    if spindle is None or spindle.bearing_stiffness_n_per_um != TEMPLATE_BEARINGS:
+    if spindle is None or spindle.bearing_stiffness_n_per_um != TEMPLATE_BEARING_STIFFNESS:
         return None
     why = "is what a new machine.toml holds, and no tap test has found it yet: all of the model rests on it"
     key = "bearing_stiffness_n_per_um"
-    asked = Doubted("setting-guessed", "[spindle]", key, f"{TEMPLATE_BEARINGS:g}", why)
-    return next(iter(_open(machine, [asked])), None)
+    asked = ImplausibleSetting("setting-guessed", "[spindle]", key, f"{TEMPLATE_BEARING_STIFFNESS:g}", why)
+    return next(iter(_remove_accepted(machine, [asked])), None)
 
 
-def _open(machine: AskedMachine, asked: list[Doubted]) -> list[Doubted]:
+def _remove_accepted(machine: MachineTables, asked: list[ImplausibleSetting]) -> list[ImplausibleSetting]:
     """Each question once, without those that a person has answered."""
-    by_claim = {doubted.claim: doubted for doubted in asked}
+    by_claim = {doubted.statement: doubted for doubted in asked}
     return [doubted for claim, doubted in by_claim.items() if claim not in machine.machine.accepted]
 
 
-def _about_machine(machine: AskedMachine) -> Iterator[Doubted]:
+def _check_machine(machine: MachineTables) -> Iterator[ImplausibleSetting]:
     """What every word rests on."""
     tables = {
         "[machine]": machine.machine,
@@ -106,37 +105,37 @@ def _about_machine(machine: AskedMachine) -> Iterator[Doubted]:
         "[doubt]": machine.doubt,
     }
     for place, table in tables.items():
-        yield from out_of_range(table, place)
+        yield from check_ranges(table, place)
     for i, channel in enumerate(machine.daq.channel, 1):
-        yield from out_of_range(channel, f"[[daq.channel]] {i}")
-    yield from about_drive(machine.drive, machine.speed)
+        yield from check_ranges(channel, f"[[daq.channel]] {i}")
+    yield from check_drive(machine.drive, machine.speed)
 
 
-def _about_program(machine: AskedMachine, program: ProgramTable) -> Iterator[Doubted]:
-    yield from _about_machine(machine)
+def _check_program(machine: MachineTables, program: ProgramTable) -> Iterator[ImplausibleSetting]:
+    yield from _check_machine(machine)
     place = f"program {program.name!r}"
-    yield from _about_cut(machine, program, place)
+    yield from _check_cut_and_material(machine, program, place)
     if program in machine.program:  # of a cut that is only asked about, its geometry was just said
         same_tool = {f"program {other.name!r}": other for other in machine.program if other.tool == program.tool}
-        yield from (doubted for doubted in about_alike(same_tool) if doubted.place == place)
+        yield from (doubted for doubted in check_same_tool(same_tool) if doubted.location == place)
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from about_tool(tool, f"tool {tool.name!r}")
-            yield from about_its_tool(program, tool, place)
+            yield from check_tool(tool, f"tool {tool.name!r}")
+            yield from check_program_tool(program, tool, place)
     if program.tool == machine.tap.tool:
-        yield from about_stick_out(machine.tap, {place: program})
+        yield from check_stick_out(machine.tap, {place: program})
 
 
-def _about_cut(machine: AskedMachine, cut: CutTable, place: str) -> Iterator[Doubted]:
-    yield from about_cut(cut, place)
+def _check_cut_and_material(machine: MachineTables, cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
+    yield from check_cut(cut, place)
     for material in machine.material:
-        if cut.material is not None and folded_name(material.name) == folded_name(cut.material):
-            yield from about_material(material, f"material {material.name!r}")
+        if cut.material is not None and fold_material_name(material.name) == fold_material_name(cut.material):
+            yield from check_material(material, f"material {material.name!r}")
 
 
-def _about_model(machine: AskedMachine, program: ProgramTable) -> Iterator[Doubted]:
+def _check_model(machine: MachineTables, program: ProgramTable) -> Iterator[ImplausibleSetting]:
     if machine.spindle is not None:
-        yield from about_spindle(machine.spindle)
+        yield from check_spindle(machine.spindle)
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from about_shape(tool, f"tool {tool.name!r}")
+            yield from check_tool_shape(tool, f"tool {tool.name!r}")

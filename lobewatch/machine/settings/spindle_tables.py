@@ -1,4 +1,4 @@
-"""[spindle] of machine.toml: the model, in the units of a drawing."""
+"""Tables of machine.toml on the spindle model and the tools."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
-from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
+from lobes import ToolMaterial
+from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
+from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 
-class SegmentTable(Table, frozen=True):
+class SegmentTable(TomlTable, frozen=True):
     """A segment of the shaft, by its length and diameters."""
 
     length_mm: Positive
@@ -45,13 +47,13 @@ class SegmentTable(Table, frozen=True):
             self.outer_mm / 1e3,
             self.bore_mm / 1e3,
             material=MATERIALS[self.material] if self.material else None,
-            end_outer_diameter=_metres(self.end_outer_mm),
-            end_bore_diameter=_metres(self.end_bore_mm),
-            mass_diameter=_metres(self.mass_outer_mm),
+            end_outer_diameter=_to_metres(self.end_outer_mm),
+            end_bore_diameter=_to_metres(self.end_bore_mm),
+            mass_diameter=_to_metres(self.mass_outer_mm),
         )
 
 
-class BearingTable(Table, frozen=True):
+class BearingTable(TomlTable, frozen=True):
     """A bearing, by its place and stiffness."""
 
     position_mm: NotNegative
@@ -76,7 +78,7 @@ class BearingTable(Table, frozen=True):
         )
 
 
-class MassTable(Table, frozen=True):
+class MassTable(TomlTable, frozen=True):
     """A lumped mass: a pulley, a balance ring."""
 
     position_mm: NotNegative
@@ -90,7 +92,7 @@ class MassTable(Table, frozen=True):
         return LumpedMass(self.position_mm / 1e3, self.mass_kg, *inertias)
 
 
-class JointTable(Table, frozen=True):
+class JointTable(TomlTable, frozen=True):
     """A joint: tool in holder, holder in spindle."""
 
     position_mm: Positive
@@ -104,7 +106,7 @@ class JointTable(Table, frozen=True):
         return Joint(self.position_mm / 1e3, stiffness, self.rotational_stiffness_n_m_per_rad, group=self.group)
 
 
-class SpindleTable(Table, frozen=True):
+class SpindleTable(TomlTable, frozen=True):
     """[spindle]: the model; optional."""
 
     segments: Annotated[list[SegmentTable], Meta(min_length=1)]
@@ -141,7 +143,7 @@ class SpindleTable(Table, frozen=True):
                 f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing, at {first:g} mm; "
                 "give the length of the tool alone"
             )
-        _in_mm(self.build)
+        _check_model(self.build)
 
     def build(self) -> Spindle:
         """The spindle in SI units."""
@@ -162,13 +164,59 @@ def _check_wall(bore: float, outer: float, bore_key: str, outer_key: str) -> Non
         raise ValueError(f"{bore_key}={bore:g} is not smaller than {outer_key}={outer:g}")
 
 
-def _metres(millimetres: float | None) -> float | None:
+def _to_metres(millimetres: float | None) -> float | None:
     return None if millimetres is None else millimetres / 1e3
 
 
-def _in_mm(build: Callable[[], Spindle]) -> None:
+def _check_model(build: Callable[[], Spindle]) -> None:
     """Refuse what is left to refuse, in the words of dsm, which are in SI units."""
     try:
         build()
     except ValueError as error:
         raise ValueError(f"{error} (here in SI units)") from error
+
+
+class ToolTable(TomlTable, frozen=True):
+    """[[tool]]: a tool; segments, from its tip to where it leaves the holder, are for one that the model predicts."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    segments: tuple[SegmentTable, ...] = ()
+    masses: tuple[MassTable, ...] = ()
+    pitch_deg: tuple[float, ...] | None = None
+    teeth: Annotated[int, Meta(ge=1)] | None = None
+    diameter_mm: Positive | None = None
+    helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
+    flute_length_mm: Positive | None = None
+    tool_material: ToolMaterial | None = None
+    cutting_speed_m_min: Positive | ValueRange | None = None
+    feed_per_tooth_mm: Positive | ValueRange | None = None
+    max_speed_rpm: Positive | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse pitches that are none, ranges that do not rise, and masses on nothing."""
+        convert_pitch(self.pitch_deg, self.teeth or len(self.pitch_deg or ()))
+        for key in ("cutting_speed_m_min", "feed_per_tooth_mm"):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and value[0] > value[1]:
+                low, high = value
+                raise ValueError(
+                    f"{key}=[{low:g}, {high:g}] does not rise; give [least, greatest], or the greatest alone"
+                )
+        if self.masses and not self.segments:
+            raise ValueError("masses without segments; give the shape of the tool too, or leave the masses out")
+
+    def build(self, spindle: Spindle) -> Spindle:
+        """The tool as a free shaft in SI units, of the spindle's theory and material where it names none."""
+        return Spindle(
+            [segment.build() for segment in self.segments],
+            (),
+            youngs_modulus=spindle.youngs_modulus,
+            density=spindle.density,
+            theory=spindle.theory,
+            shear_modulus=spindle.shear_modulus,
+            masses=[mass.build() for mass in self.masses],
+        )
+
+    def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
+        """The whole spindle with this tool in place of the one drawn."""
+        return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))

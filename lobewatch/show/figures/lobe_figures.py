@@ -1,9 +1,11 @@
-"""Pictures of stability lobes, in the colours of figures.py."""
+"""Plot stability lobes: diagram, waterfall over time, map over radial depth."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 from textwrap import fill
 
 import numpy as np
@@ -15,53 +17,68 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from lobes import Cut, RadialLobes
-from lobewatch.cuts.learning.at_speed import LobesAtSpeed
-from lobewatch.machine.journal.heard_cut import HeardCut, geometry
-from lobewatch.show.figures.labels import PHONE, PictureLabels
-from lobewatch.show.figures.style import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
-from lobewatch.verdicts import Setting, Verdict, Word
-from lobewatch.verdicts.limit_band import LimitBand
+from acquisition import DataError, Remark
+from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
+from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.history import HistoryRow
+from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.logbook import LobeComparison, Logbook
+from lobewatch.machine import Machine
+from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
+from lobewatch.show.figures.drawing import (
+    ALARM_ORANGE,
+    FIRST_GREY,
+    GOOD_GREEN,
+    NEWEST_BLUE,
+    PHONE_FONT_SIZE,
+    UNKNOWN_GREY,
+    LabelPlacer,
+    new_axes,
+    save_figure,
+)
+from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
+from lobewatch.verdicts import Setting, Stability, Verdict
+from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 
 Floats = NDArray[np.float64]
 
-MAP = "cividis"
+DEPTH_COLORMAP = "cividis"
 """Colours of depth: dark is shallow, bright is deep, in grey too."""
-BAND = "what is not known of spindle and cut moves the limit within this band"
-WINDOW = "safe speeds and depths"
-DOUBT = "#B58900"
-MARKS = {
-    Word.STABLE: (GOOD, "o"),
-    Word.DOUBTFUL: (DOUBT, "^"),
-    Word.NOT_STABLE: (ALARM, "X"),
-    Word.UNKNOWN: (UNKNOWN, "D"),
+BAND_LABEL = "what is not known of spindle and cut moves the limit within this band"
+WINDOW_LABEL = "safe speeds and depths"
+DOUBTFUL_YELLOW = "#B58900"
+VERDICT_MARKS = {
+    Stability.STABLE: (GOOD_GREEN, "o"),
+    Stability.DOUBTFUL: (DOUBTFUL_YELLOW, "^"),
+    Stability.NOT_STABLE: (ALARM_ORANGE, "X"),
+    Stability.UNKNOWN: (UNKNOWN_GREY, "D"),
 }
 """Colour and mark of a program by the verdict on it."""
-SAFE = "#00664A"
-LEARNT = "#8A3D78"
-LARGE, SMALL = (8.0, 4.6), (5.6, 2.3)
+POCKET_GREEN = "#00664A"
+LEARNED_PURPLE = "#8A3D78"
+LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (5.6, 2.3)
 """Size of a diagram that stands alone, and of one beside words (inches)."""
-LEVELS = 12
+MAP_LEVELS = 12
 """Steps of colour in a map."""
-BAR = "limiting depth (mm); brightest: this or more"
-SHORT = 10.0
+DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"
+MAX_DAYS_WITH_TIME = 10.0
 """Days below which dates are told with their time."""
-HEARD_MARKS = {False: ("heard stable", GOOD, "o"), True: ("heard to chatter", ALARM, "x")}
+TEST_CUT_MARKS = {False: ("heard stable", GOOD_GREEN, "o"), True: ("heard to chatter", ALARM_ORANGE, "x")}
 """Name, colour and mark of cuts by whether they chatter; wide and hollow, so that a program's own shows through."""
-HEARD_SIZE, MARK_SIZE = 11.0, 9.0
+TEST_CUT_MARK_SIZE, PROGRAM_MARK_SIZE = 11.0, 9.0
 """Size of these marks, and of those of programs (points)."""
-FEW = 6
+MAX_SPEED_TICKS = 6
 """Number of speeds, at most, that are named along a small picture."""
 
 
-def lobes_figure(
+def plot_lobes(
     speed_rpm: Floats,
     depths: Mapping[str, Floats],
     programs: Sequence[Verdict] = (),
     title: str = "",
     band: LimitBand | None = None,
     pockets: Sequence[Setting] = (),
-    heard: Sequence[HeardCut] = (),
+    heard: Sequence[CutEntry] = (),
     learnt: LobesAtSpeed | None = None,
     *,
     is_small: bool = False,
@@ -71,7 +88,7 @@ def lobes_figure(
     band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it;
     learnt: what these have taught; is_small: beside words that say the rest, with the names of programs alone.
     """
-    figure, (axes,) = new_axes(1, SMALL if is_small else LARGE)
+    figure, (axes,) = new_axes(1, SMALL_FIGURE_SIZE if is_small else LARGE_FIGURE_SIZE)
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
     wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
@@ -79,18 +96,18 @@ def lobes_figure(
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
     low, high = (now[1], now[1]) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
-    axes.fill_between(speed_rpm, high, 2 * top, color=NOW, alpha=0.10, lw=0)
+    axes.fill_between(speed_rpm, high, 2 * top, color=NEWEST_BLUE, alpha=0.10, lw=0)
     if band is not None:
-        axes.fill_between(speed_rpm, low, high, color=NOW, alpha=0.35, lw=0, label=BAND)
-    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
+        axes.fill_between(speed_rpm, low, high, color=NEWEST_BLUE, alpha=0.35, lw=0, label=BAND_LABEL)
+    axes.plot(speed_rpm, now[1] * 1e3, color=NEWEST_BLUE, lw=1.6, label=now[0])
     for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=f"{label}, first tap tests")
+        axes.plot(speed_rpm, depth * 1e3, color=FIRST_GREY, ls="--", lw=1.2, label=f"{label}, first tap tests")
     if learnt is not None:
-        _draw_learnt(axes, learnt, 2 * top)
+        _draw_learned(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     axes.set(xlabel="spindle speed (rpm)", ylabel="" if is_small else "limiting depth (mm)")
     if is_small:
-        axes.xaxis.set_major_locator(MaxNLocator(FEW))
+        axes.xaxis.set_major_locator(MaxNLocator(MAX_SPEED_TICKS))
         figure.draw_without_rendering()  # its room is known from now on
     _draw_marks(axes, programs, pockets, heard, is_small)
     if not is_small:
@@ -98,35 +115,37 @@ def lobes_figure(
     return figure
 
 
-def waterfall_figure(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, title: str = "") -> Figure:
+def plot_waterfall(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, title: str = "") -> Figure:
     """Limiting depth over speed and time: depth (n, m) in m at n times, the oldest below."""
     figure, (axes,) = new_axes(1, (8.0, 4.2))
-    top = _top(depth)
-    rows, columns = _edges(date2num(times), 30.0), _edges(speed_rpm, 1.0)
-    mesh = axes.pcolormesh(columns, rows, np.minimum(depth * 1e3, top), cmap=MAP, vmin=0, vmax=top, rasterized=True)
-    figure.colorbar(mesh, ax=axes, label=BAR)
+    top = _map_limit(depth)
+    rows, columns = _cell_edges(date2num(times), 30.0), _cell_edges(speed_rpm, 1.0)
+    mesh = axes.pcolormesh(
+        columns, rows, np.minimum(depth * 1e3, top), cmap=DEPTH_COLORMAP, vmin=0, vmax=top, rasterized=True
+    )
+    figure.colorbar(mesh, ax=axes, label=DEPTH_SCALE_LABEL)
     axes.yaxis.set_major_locator(AutoDateLocator())
-    axes.yaxis.set_major_formatter(DateFormatter("%Y-%m-%d" if np.ptp(rows) > SHORT else "%Y-%m-%d %H:%M"))
+    axes.yaxis.set_major_formatter(DateFormatter("%Y-%m-%d" if np.ptp(rows) > MAX_DAYS_WITH_TIME else "%Y-%m-%d %H:%M"))
     axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="date", xlim=(speed_rpm[0], speed_rpm[-1]))
     axes.grid(visible=False)
     return figure
 
 
-def radial_figure(lobes: RadialLobes, diameter: float, present: float, title: str = "") -> Figure:
+def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: str = "") -> Figure:
     """Limiting depth over speed and radial depth for a cutter of this diameter (m), as a map with lines.
 
     present is the immersion (radial depth over diameter) of the cut itself, a dashed line. The contours are those of
     one over depth, which is smooth where a pocket has no limit.
     """
     figure, (axes,) = new_axes(1, (8.0, 4.2))
-    depths = np.asarray(MaxNLocator(LEVELS).tick_values(0, _top(lobes.depth)))[1:]
+    depths = np.asarray(MaxNLocator(MAP_LEVELS).tick_values(0, _map_limit(lobes.depth)))[1:]
     radial, softness = lobes.immersion * diameter * 1e3, 1e-3 / lobes.depth
     levels = 1 / depths[::-1]
-    colours = colormaps[MAP](np.linspace(1, 0, levels.size + 1))
+    colours = colormaps[DEPTH_COLORMAP](np.linspace(1, 0, levels.size + 1))
     mesh = axes.contourf(lobes.speed_rpm, radial, softness, levels=levels, colors=colours, extend="both")
     axes.contour(lobes.speed_rpm, radial, softness, levels=levels, colors="black", linewidths=0.3)
-    axes.axhline(present * diameter * 1e3, color=ALARM, ls="--", lw=2, clip_on=False)
-    bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=BAR)
+    axes.axhline(present * diameter * 1e3, color=ALARM_ORANGE, ls="--", lw=2, clip_on=False)
+    bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=DEPTH_SCALE_LABEL)
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
     if lobes.remarks:
@@ -136,81 +155,169 @@ def radial_figure(lobes: RadialLobes, diameter: float, present: float, title: st
     return figure
 
 
-def _edges(middles: Floats, alone: float) -> Floats:
+def _cell_edges(middles: Floats, alone: float) -> Floats:
     """Edges of cells around their middles; a cell that stands alone has this width."""
     halves = np.diff(middles) / 2 if middles.size > 1 else np.array([alone / 2])
     inner = middles[:-1] + halves[: middles.size - 1]
     return np.concatenate((middles[:1] - halves[0], inner, middles[-1:] + halves[-1]))
 
 
-def _top(depth: Floats) -> float:
+def _map_limit(depth: Floats) -> float:
     """Depth (mm) at which a map of depths (m) ends."""
     finite = depth[np.isfinite(depth)] * 1e3
     return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
 
 
-def _draw_learnt(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
+def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     """Line and band of the spindle at speed; depths (mm) end at the deepest."""
-    label = f"at speed, learnt from {learnt.cuts} test cut{'s' if learnt.cuts > 1 else ''}"
+    label = f"at speed, learnt from {learnt.n_cuts} test cut{'s' if learnt.n_cuts > 1 else ''}"
     left = "98 % of what test cuts have left open"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
-    axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNT, alpha=0.25, lw=0, label=left)
-    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=label)
+    axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)
+    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
 
 
 def _draw_marks(
-    axes: Axes, programs: Sequence[Verdict], pockets: Sequence[Setting], heard: Sequence[HeardCut], is_small: bool
+    axes: Axes, programs: Sequence[Verdict], pockets: Sequence[Setting], heard: Sequence[CutEntry], is_small: bool
 ) -> None:
     """What stands on the lobes; the words of a small picture are names of programs, as far as there is room."""
-    labels = PictureLabels(axes, PHONE, may_lack=True) if is_small else PictureLabels(axes)
-    draw_heard(axes, heard, labels)
+    labels = LabelPlacer(axes, PHONE_FONT_SIZE, may_lack=True) if is_small else LabelPlacer(axes)
+    draw_test_cuts(axes, heard, labels)
     for i, pocket in enumerate(pockets):
-        _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
+        _draw_pocket(axes, pocket, labels, WINDOW_LABEL if i == 0 else "")
     for program in programs:
         _draw_program(axes, program, labels)
     for pocket in () if is_small else pockets:
         text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
-        labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above", "right", "left"))
+        labels.add(text, (pocket.speed_rpm, pocket.depth_mm), POCKET_GREEN, ("above", "right", "left"))
     for program in programs:
-        name, place = program.program.name, _place(program)
-        labels.add(name if is_small else f"{name}\n{program.word}", place)
+        name, place = program.program.name, _program_point(program)
+        labels.add(name if is_small else f"{name}\n{program.stability}", place)
 
 
-def _draw_pocket(axes: Axes, pocket: Setting, labels: PictureLabels, label: str) -> None:
+def _draw_pocket(axes: Axes, pocket: Setting, labels: LabelPlacer, label: str) -> None:
     """A box as wide as the window and as high as the depth."""
     low, high = pocket.window_rpm
-    box = Rectangle((low, 0), high - low, pocket.depth_mm, fc="white", ec=SAFE, lw=1.2, hatch="////", label=label)
+    box = Rectangle(
+        (low, 0), high - low, pocket.depth_mm, fc="white", ec=POCKET_GREEN, lw=1.2, hatch="////", label=label
+    )
     axes.add_patch(box)
-    labels.keep_free((low, 0.0), (high, pocket.depth_mm))
+    labels.reserve_area((low, 0.0), (high, pocket.depth_mm))
 
 
-def _draw_program(axes: Axes, verdict: Verdict, labels: PictureLabels) -> None:
-    colour, mark = MARKS[verdict.word]
-    axes.plot(*_place(verdict), mark, color=colour, ms=MARK_SIZE, mec="white")
-    labels.keep_clear(_place(verdict), MARK_SIZE)
+def _draw_program(axes: Axes, verdict: Verdict, labels: LabelPlacer) -> None:
+    colour, mark = VERDICT_MARKS[verdict.stability]
+    axes.plot(*_program_point(verdict), mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
+    labels.reserve_mark(_program_point(verdict), PROGRAM_MARK_SIZE)
 
 
-def _place(verdict: Verdict) -> tuple[float, float]:
+def _program_point(verdict: Verdict) -> tuple[float, float]:
     """Speed (rpm) and depth (mm) of a program."""
     return verdict.program.speed_rpm, verdict.program.depth_mm
 
 
-def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[HeardCut]:
+def select_test_cuts(cuts: Sequence[CutEntry], name: str, tool: str, cut: Cut) -> list[CutEntry]:
     """Test cuts of this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
-    alike = [heard for heard in cuts if heard.counts and heard.tool == tool and geometry(heard.cut) == geometry(cut)]
+    alike = [
+        heard
+        for heard in cuts
+        if heard.is_usable and heard.tool == tool and geometry_key(heard.cut) == geometry_key(cut)
+    ]
     force = cut.tangential, cut.radial
     return [heard for heard in alike if heard.program == name or (heard.cut.tangential, heard.cut.radial) == force]
 
 
-def draw_heard(axes: Axes, cuts: Sequence[HeardCut], labels: PictureLabels) -> None:
+def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) -> None:
     """A mark for each cut, with the frequency that it chattered at; before other words look for a place."""
-    for chatters, (name, colour, mark) in HEARD_MARKS.items():
-        marked = [cut for cut in cuts if cut.chatters == chatters]
+    for chatters, (name, colour, mark) in TEST_CUT_MARKS.items():
+        marked = [cut for cut in cuts if cut.has_chatter == chatters]
         if marked:
             places = [cut.speed_rpm for cut in marked], [1e3 * cut.depth for cut in marked]
-            axes.plot(*places, mark, color=colour, mfc="none", ms=HEARD_SIZE, mew=2.2, zorder=4, label=name)
+            axes.plot(*places, mark, color=colour, mfc="none", ms=TEST_CUT_MARK_SIZE, mew=2.2, zorder=4, label=name)
     for cut in cuts:
-        labels.keep_clear((cut.speed_rpm, 1e3 * cut.depth), HEARD_SIZE)
+        labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
     for cut in cuts:
         if cut.chatter_frequency_hz is not None:
-            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM)
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM_ORANGE)
+
+
+RADIAL_IMMERSIONS = np.linspace(0.05, 1.0, 39)
+MAX_WATERFALL_ROWS = 200
+"""Tap tests of a waterfall."""
+
+
+def save_lobe_figures(
+    logbook: Logbook,
+    comparison: LobeComparison,
+    method: LobeMethod,
+    figure: Path | None,
+    radial: Path | None,
+    waterfall: Path | None,
+) -> list[Remark]:
+    """Write the pictures that have a file, all or none; returns what is to be said of them."""
+    pictures, remarks = list[tuple[Figure, Path]](), list[Remark]()
+    if figure is not None:
+        pictures.append((plot_comparison(logbook.machine, comparison, logbook.cuts), figure))
+    if radial is not None:
+        picture, about = plot_radial_lobes(logbook.machine, comparison.now, method)
+        pictures.append((picture, radial))
+        remarks += [replace(remark, about="--radial") for remark in about]
+    if waterfall is not None:
+        pictures.append((plot_series_waterfall(logbook, comparison.now), waterfall))
+    for picture, path in pictures:
+        save_figure(picture, path)
+    return remarks
+
+
+def plot_comparison(machine: Machine, comparison: LobeComparison, cuts: Sequence[CutEntry]) -> Figure:
+    """The diagram now in its doubt, beside the one then, with safe settings, programs and test cuts of the same cut."""
+    now = comparison.now
+    depths = {diagram.assembly.label: diagram.lobes.depth for diagram in (comparison.then, now) if diagram is not None}
+    title = f"{_lobes_title(machine, now)}, from the {now.source}"
+    band = compute_limit_band(now.lobes, now.name, now.assembly, machine)
+    heard = select_test_cuts(cuts, now.name, now.assembly.tool, now.cuts[0])
+    verdicts, pockets = comparison.verdicts, comparison.pockets
+    learnt = compute_lobes_at_speed(verdicts, machine)
+    return plot_lobes(now.lobes.speed_rpm, depths, verdicts, title, band, pockets, heard, learnt)
+
+
+def _lobes_title(machine: Machine, now: LobeChart) -> str:
+    predicted = f", {now.assembly.label}" if now.assembly.predicted else ""
+    return f"{machine.machine.name}: {now.name}\n{now.lobes.method}{predicted}"
+
+
+def plot_radial_lobes(machine: Machine, now: LobeChart, method: LobeMethod) -> tuple[Figure, tuple[Remark, ...]]:
+    """The limits over speed and radial depth, and what is wrong with the method at small ones."""
+    speeds = now.lobes.speed_rpm if method is not LobeMethod.SEMI_DISCRETISATION else now.lobes.speed_rpm[::4]
+
+    def limits(cut: Cut) -> StabilityLobes:
+        cuts = [replace(simultaneous, immersion=cut.immersion) for simultaneous in now.cuts]
+        return compute_lobe_chart(method, now.x, now.y, cuts, speeds)
+
+    radial = radial_lobes(limits, now.cuts[0], RADIAL_IMMERSIONS)
+    diameter = now.table.tool_diameter_mm / 1e3
+    return plot_radial_map(radial, diameter, now.cuts[0].immersion, _lobes_title(machine, now)), radial.remarks
+
+
+def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
+    """The limits over all tap tests of the series of the newest; DataError where there are no measured ones."""
+    cut, tool = now.name, now.assembly.tool
+    newest = None if now.assembly.predicted else logbook.measurement(now.assembly.tap_id)
+    series = [] if newest is None else logbook.history.series(tool, newest.direction)
+    shown = [row for row in _pick_evenly(series) if row.x]
+    diagrams = [
+        (row.time, lobes[cut]) for row in shown if cut in (lobes := compute_row_lobes(row, logbook.machine, [cut]))
+    ]
+    if not diagrams:
+        raise DataError(f"--waterfall shows measured lobes; no tap test with tool {tool!r} has any of {cut!r}")
+    title = f"{logbook.machine.machine.name}: {cut}\nzero order"
+    depth = np.stack([lobes.depth for _, lobes in diagrams])
+    return plot_waterfall(speed_grid(logbook.machine), [time for time, _ in diagrams], depth, title)
+
+
+def _pick_evenly(rows: Sequence[HistoryRow]) -> list[HistoryRow]:
+    """The first, the newest, and others evenly between them, no more than one can see."""
+    return [
+        rows[i]
+        for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_WATERFALL_ROWS)).round().astype(int))
+    ]

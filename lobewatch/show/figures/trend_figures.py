@@ -14,28 +14,28 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from lobewatch.decay.trend import Trend, days_of
-from lobewatch.machine.settings.setup_tables import Limits
-from lobewatch.show.figures.style import ALARM, EVENT, NOW, THEN, new_axes
+from lobewatch.machine.settings.setup_tables import LimitsTable
+from lobewatch.monitoring.trend import Trend, point_days
+from lobewatch.show.figures.drawing import ALARM_ORANGE, EVENT_GREY, FIRST_GREY, NEWEST_BLUE, new_axes
 
 Floats = NDArray[np.float64]
 
-LOW = (8.0, 2.8)
+TREND_FIGURE_SIZE = (8.0, 2.8)
 """Size of a picture of one value (inches)."""
-AHEAD = 0.5
+FORECAST_SHARE = 0.5
 """Share of the length of the series that is drawn beyond it."""
 
 
-class Marks(NamedTuple):
+class TrendMarks(NamedTuple):
     """Marks beside a trend."""
 
     events: Sequence[tuple[datetime, str]] = ()
     """Times and texts of what was done."""
-    hollow: Sequence[tuple[datetime, float]] = ()
+    excluded: Sequence[tuple[datetime, float]] = ()
     """Values that do not count."""
 
 
-NOTHING_ELSE = Marks()
+NO_MARKS = TrendMarks()
 
 
 class TrendCurve(NamedTuple):
@@ -53,21 +53,21 @@ class TrendCurve(NamedTuple):
     """Values that are exceeded with a chance of 10 %, shape (m,)."""
 
 
-def course_of(trend: Trend) -> TrendCurve | None:
+def make_trend_curve(trend: Trend) -> TrendCurve | None:
     """The curve of a trend; None below 8 points."""
     forecast = trend.forecast
     if forecast is None:
         return None
-    past = days_of(trend.points)
-    near = forecast.dates <= max(past[-1] + AHEAD * (past[-1] - past[0]), forecast.dates[1])
-    low, high = (trend.first * np.exp(forecast.fan(quantile)[near] / 100) for quantile in (0.1, 0.9))
-    line = np.append(forecast.fitted, forecast.line[near])
+    past = point_days(trend.points)
+    near = forecast.dates <= max(past[-1] + FORECAST_SHARE * (past[-1] - past[0]), forecast.dates[1])
+    low, high = (trend.first_value * np.exp(forecast.quantile_line(quantile)[near] / 100) for quantile in (0.1, 0.9))
+    line = np.append(forecast.fitted, forecast.mean_line[near])
     return TrendCurve(
-        np.append(past, forecast.dates[near]), trend.first * np.exp(line / 100), forecast.dates[near], low, high
+        np.append(past, forecast.dates[near]), trend.first_value * np.exp(line / 100), forecast.dates[near], low, high
     )
 
 
-def frf_figure(
+def plot_frf(
     earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
 ) -> Figure:
     """Real and imaginary part of receptance and coherence, the newest and the first test.
@@ -76,7 +76,7 @@ def frf_figure(
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [(now, "now", NOW, "-"), *([(earliest, "first", THEN, "--")] if earliest is not None else [])]
+    tests = [(now, "now", NEWEST_BLUE, "-"), *([(earliest, "first", FIRST_GREY, "--")] if earliest is not None else [])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -94,15 +94,15 @@ def frf_figure(
     return figure
 
 
-def trend_figure(
+def plot_trend(
     times: Sequence[datetime],
     values: NDArray[np.float64],
     stds: NDArray[np.float64],
     label: str,
-    limits: Limits | None = None,
-    marks: Marks = NOTHING_ELSE,
+    limits: LimitsTable | None = None,
+    marks: TrendMarks = NO_MARKS,
     course: TrendCurve | None = None,
-    size: tuple[float, float] = LOW,
+    size: tuple[float, float] = TREND_FIGURE_SIZE,
 ) -> Figure:
     """A value over time with its 95 % interval; with limits, where its fall calls for attention.
 
@@ -110,11 +110,11 @@ def trend_figure(
     """
     figure, (axes,) = new_axes(1, size)
     days = date2num(times)
-    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NOW, capsize=2)
+    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NEWEST_BLUE, capsize=2)
     if limits is not None:
         for percent, colour, dashes in (
-            (limits.frequency_warn_percent, THEN, "--"),
-            (limits.frequency_alarm_percent, ALARM, "-"),
+            (limits.frequency_warn_percent, FIRST_GREY, "--"),
+            (limits.frequency_alarm_percent, ALARM_ORANGE, "-"),
         ):
             level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
@@ -124,8 +124,8 @@ def trend_figure(
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
     if course is not None:
-        axes.plot(course.days, course.line, color=NOW, lw=1)
-        axes.fill_between(course.days_ahead, course.low, course.high, color=NOW, alpha=0.2, lw=0)
+        axes.plot(course.days, course.line, color=NEWEST_BLUE, lw=1)
+        axes.fill_between(course.days_ahead, course.low, course.high, color=NEWEST_BLUE, alpha=0.2, lw=0)
     _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
@@ -135,13 +135,13 @@ def trend_figure(
     return figure
 
 
-def _add_marks(axes: Axes, marks: Marks) -> None:
-    if marks.hollow:
-        days = date2num([time for time, _ in marks.hollow])
-        axes.plot(days, [value for _, value in marks.hollow], "o", ms=5, mfc="none", mec=NOW)
+def _add_marks(axes: Axes, marks: TrendMarks) -> None:
+    if marks.excluded:
+        days = date2num([time for time, _ in marks.excluded])
+        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=NEWEST_BLUE)
     for time, text in marks.events:
         day = date2num(time)
-        axes.axvline(day, color=EVENT, ls=":", lw=1)
+        axes.axvline(day, color=EVENT_GREY, ls=":", lw=1)
         place: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points", "rotation": 90, "fontsize": 8}
         axes.annotate(
             shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place

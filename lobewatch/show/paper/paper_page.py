@@ -1,37 +1,211 @@
-"""A page of the comparison with the paper, with its figures beside it."""
+"""Write a page of the comparison with the paper, with its figures."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import jinja2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from acquisition import DataError
-from acquisition.atomic import atomic_write, make_folder
-from lobewatch.paper import PaperStudy
-from lobewatch.show.figures.style import save_figure
-from lobewatch.show.paper.describe_paper import cells
-from lobewatch.show.paper.paper_figures import FIGURES
+from acquisition.file_io import atomic_write, make_folder
+from dsm import WhirlMap, mode_shapes
+from lobewatch.paper import PaperStudy, printed
+from lobewatch.paper.finite_elements import ELEMENT_COUNTS, ElementKind
+from lobewatch.show.figures.drawing import ALARM_ORANGE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE, new_axes, save_figure
+from lobewatch.show.figures.spindle_figures import draw_shaft, draw_shapes
+from lobewatch.show.paper.paper_text import paper_cells
 
-PAGE = "paper.md"
+PAPER_FIGURE_SIZE = (8.0, 4.4)
+"""Inches."""
+PAPER_MARK: dict[str, Any] = {"color": ALARM_ORANGE, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
+"""Mark of a number of the paper."""
+RESPONSE_BAND = (1300.0, 2200.0)
+"""Frequencies of Figs. 5 and 6 (Hz)."""
+MAX_DEPTH_RATIO = 6.0
+"""Depth up to which lobes are drawn, in lowest limits of the new spindle."""
+
+
+def _plot_shaft(study: PaperStudy) -> Figure:
+    figure, (shaft, shapes) = new_axes(2, (8.0, 6.0))
+    spindle = study.plain.new.spindle
+    draw_shaft(shaft, spindle)
+    shaft.set(title="surrogate, to scale: not the paper's dimensions", xlabel="")
+    draw_shapes(shapes, mode_shapes(spindle, 3, np.linspace(0.0, spindle.length, 400)))
+    return figure
+
+
+def _plot_convergence(study: PaperStudy) -> Figure:
+    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+    looks: tuple[tuple[ElementKind, str, str, str], ...] = (
+        ("linear", "straight lines with shear (as BEAM188)", ALARM_ORANGE, "s"),
+        ("timoshenko", "cubics with shear", NEWEST_BLUE, "o"),
+        ("euler-bernoulli", "cubics without shear", GOOD_GREEN, "^"),
+    )
+    for kind, label, colour, mark in looks:
+        error = np.array(study.meshes.frequencies[kind]) / study.meshes.exact[kind] - 1
+        axes.loglog(ELEMENT_COUNTS, error, color=colour, marker=mark, label=label)
+    paper = printed.FEM_FREQUENCY / printed.RIGID_FREQUENCY - 1
+    axes.loglog(printed.FEM_ELEMENTS, paper, label="paper: FEM above DSM", **PAPER_MARK)
+    axes.set(xlabel="elements", ylabel="share above the exact f_1 (-)")
+    axes.legend(loc="lower left")
+    return figure
+
+
+def _plot_real_part(study: PaperStudy) -> Figure:
+    return _plot_response(study, "Re")
+
+
+def _plot_imaginary_part(study: PaperStudy) -> Figure:
+    return _plot_response(study, "Im")
+
+
+def _plot_response(study: PaperStudy, part: str) -> Figure:
+    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+    tap = study.tap
+
+    def values(receptance: NDArray[np.complex128]) -> NDArray[np.float64]:
+        return (receptance.real if part == "Re" else receptance.imag) * 1e6
+
+    axes.plot(
+        tap.frf.frequency, values(tap.frf.receptance), color=NEWEST_BLUE, lw=1.8, label="mode with the paper's numbers"
+    )
+    surrogate = f"surrogate, {len(tap.surrogate_modes)} modes"
+    axes.plot(
+        tap.surrogate_frf.frequency, values(tap.surrogate_frf.receptance), color=FIRST_GREY, ls="--", label=surrogate
+    )
+    hits = tap.tapped.in_band(RESPONSE_BAND)
+    axes.plot(hits.frequency, values(hits.receptance), ".", color=GOOD_GREEN, ms=5, label="ten emulated hits on it")
+    if part == "Re":
+        below, above = tap.extremes
+        _draw_mark(axes, tap.measured.receptance(np.array([below])).real[0] * 1e6, below, "omega_A")
+        _draw_mark(axes, tap.measured.receptance(np.array([above])).real[0] * 1e6, above, "omega_B")
+    else:
+        _draw_mark(axes, tap.depth * 1e6, tap.measured.frequency, "D")
+    axes.axhline(0, color="black", lw=0.6)
+    axes.set(xlabel="frequency (Hz)", ylabel=f"{part} G (µm/N)", xlim=RESPONSE_BAND)
+    axes.legend(loc="lower left")
+    return figure
+
+
+def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
+    axes.plot(frequency, height, color=ALARM_ORANGE, marker="o", ls="")
+    text: dict[str, Any] = {"xytext": (10, 0), "textcoords": "offset points", "va": "center"}
+    axes.annotate(f"{name}: {frequency:.1f} Hz, {height:.4f} µm/N", (frequency, height), **text)
+
+
+def _plot_rigid_whirl(study: PaperStudy) -> Figure:
+    return _plot_whirl((study.plain.rigid_whirl, study.shear.rigid_whirl), printed.RIGID_CRITICAL_SPEED)
+
+
+def _plot_free_whirl(study: PaperStudy) -> Figure:
+    return _plot_whirl((study.plain.whirl, study.shear.whirl), printed.CRITICAL_SPEED)
+
+
+def _plot_whirl(maps: tuple[WhirlMap, WhirlMap], critical: float) -> Figure:
+    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+    plain, shear = maps
+    speed = plain.speed_rpm / 1e3
+    axes.plot(speed, plain.rotating_forward[0], color=NEWEST_BLUE, lw=1.8, label="seen from the shaft, as in the paper")
+    axes.plot(speed, plain.forward[0], color=GOOD_GREEN, lw=1.8, ls="--", label="seen from the housing")
+    label = "the same with shear and gyroscopic moments"
+    axes.plot(speed, shear.rotating_forward[0], color=NEWEST_BLUE, lw=0.9, ls=":")
+    axes.plot(speed, shear.forward[0], color=GOOD_GREEN, lw=0.9, ls=":", label=label)
+    axes.plot(speed, shear.backward[0], color=GOOD_GREEN, lw=0.9, ls=":")
+    axes.plot(speed, plain.speed_rpm / 60, color="black", lw=0.8, ls="-.", label="once a revolution")
+    axes.plot(critical / 1e3, 0, label="critical speed in the paper", clip_on=False, **PAPER_MARK)
+    axes.set(xlabel="spindle speed (1000 rpm)", ylabel="first frequency (Hz)")
+    axes.set(xlim=(0, speed[-1]), ylim=(0, 1.65 * plain.forward[0, 0]))
+    axes.legend(loc="upper left", ncols=2, fontsize=9)
+    return figure
+
+
+def _plot_stiffness_curve(study: PaperStudy) -> Figure:
+    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+    for shaft, name, dashes in (
+        (study.plain, "Euler-Bernoulli, as in the paper", "-"),
+        (study.shear, "Timoshenko", "--"),
+    ):
+        axes.semilogx(*shaft.curve, color=NEWEST_BLUE, ls=dashes, label=f"surrogate, {name}")
+        axes.axhline(shaft.rigid_frequency, color=FIRST_GREY, lw=0.8, ls=dashes)
+    axes.annotate("rigid bearings", (1.2e7, study.plain.rigid_frequency + 25), color=FIRST_GREY, fontsize=9)
+    points = (printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS), (printed.FREQUENCY, printed.OLD_FREQUENCY)
+    axes.plot(*points, label="paper, new and old", **PAPER_MARK)
+    axes.plot(1e13, printed.RIGID_FREQUENCY, label="paper, rigid", **(PAPER_MARK | {"marker": "s"}))
+    axes.set(
+        xlabel="stiffness of each bearing (N/m)", ylabel="first frequency (Hz)", xlim=(1e7, 1.5e13), ylim=(0, 2600)
+    )
+    axes.legend(loc="lower right")
+    return figure
+
+
+def _plot_paper_lobes(study: PaperStudy) -> Figure:
+    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+    lobes = study.lobes
+    looks = (
+        (lobes.new, "new: 1722 Hz", FIRST_GREY, "-"),
+        (lobes.by_rule, "old, K x 0.9 as in the paper", ALARM_ORANGE, "-"),
+        (lobes.by_model, "old, K of the model", NEWEST_BLUE, "--"),
+    )
+    for chart, label, colour, dashes in looks:
+        depth = np.minimum(chart.depth / lobes.new.minimum.depth, 2 * MAX_DEPTH_RATIO)
+        axes.plot(chart.speed_rpm / 1e3, depth, color=colour, ls=dashes, lw=1.5, label=label)
+    before, after = lobes.pocket
+    axes.annotate(
+        "", (after / 1e3, 5.2), (before / 1e3, 5.2), arrowprops={"arrowstyle": "->", "color": "black", "lw": 1.2}
+    )
+    axes.set(xlabel="spindle speed (1000 rpm)", ylabel="limiting depth / lowest limit, new (-)")
+    axes.set(xlim=(lobes.new.speed_rpm[0] / 1e3, lobes.new.speed_rpm[-1] / 1e3), ylim=(0, MAX_DEPTH_RATIO))
+    axes.legend(loc="upper left")
+    return figure
+
+
+class PaperFigure(NamedTuple):
+    """A figure of the page."""
+
+    caption: str
+    """What it shows."""
+    draw: Callable[[PaperStudy], Figure]
+    """Function that draws it."""
+
+
+PAPER_FIGURES: Mapping[str, PaperFigure] = {
+    "fig-3": PaperFigure("Fig. 3: the surrogate with its ten bearings, and its first modes", _plot_shaft),
+    "fig-8": PaperFigure("Fig. 8: the first frequency over the stiffness of each bearing", _plot_stiffness_curve),
+    "convergence": PaperFigure("Finite elements against the exact first frequency", _plot_convergence),
+    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _plot_rigid_whirl),
+    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _plot_free_whirl),
+    "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _plot_real_part),
+    "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_imaginary_part),
+    "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _plot_paper_lobes),
+}
+"""Figures 3 and 5 to 10, and the convergence of the finite elements, by the names of their files."""
+
+
+PAPER_PAGE_NAME = "paper.md"
 """Name of the page, and of its template."""
 
 
-def paper_page(study: PaperStudy) -> str:
+def render_paper_page(study: PaperStudy) -> str:
     """The page in Markdown."""
-    template = resources.files("lobewatch.show.paper").joinpath(PAGE).read_text(encoding="utf-8")
+    template = resources.files("lobewatch.show.paper").joinpath(PAPER_PAGE_NAME).read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
-    return environment.from_string(template).render(study=study, cells=cells, figures=FIGURES)
+    return environment.from_string(template).render(study=study, cells=paper_cells, figures=PAPER_FIGURES)
 
 
-def write_paper(study: PaperStudy, folder: Path) -> Path:
+def write_paper_page(study: PaperStudy, folder: Path) -> Path:
     """Write the page, and its figures in `images`, into a folder, made where it is not there; DataError for a file."""
     if folder.exists() and not folder.is_dir():
         raise DataError(f"{folder}: is a file; name a folder with --out")
     make_folder(folder / "images")
-    for name, picture in FIGURES.items():
+    for name, picture in PAPER_FIGURES.items():
         save_figure(picture.draw(study), folder / "images" / f"paper-{name}.png")
-    page = folder / PAGE
-    atomic_write(page, paper_page(study).encode())
+    page = folder / PAPER_PAGE_NAME
+    atomic_write(page, render_paper_page(study).encode())
     return page

@@ -1,4 +1,4 @@
-"""A page with everything in it, and its place on the disk."""
+"""Render an HTML page that holds everything it needs, and write it to disk."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ import re
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 from markupsafe import Markup, escape
 
 from acquisition import DataError, atomic_write
-from acquisition.errors import NOT_ALLOWED
+from acquisition.errors import PERMISSION_ERRNOS
 
-NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
+UPLOT_NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
 """First line of the script of the plots in place of its own, which has an address: a page names none."""
 
 
-def page(template: str, **content: Any) -> str:
+def render_page(template: str, **content: Any) -> str:
     """HTML of a template beside `report.html`; it is handed styles, script and plots."""
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters |= {
-        "in_css": _in_css,
-        "named": _named,
+        "in_css": _escape_css,
+        "named": _label_svg,
         "macro_name": _macro_name,
         "next": next,
-        "unbroken": _unbroken,
+        "unbroken": _join_units,
     }
-    return environment.get_template(template).render(_static() | content)
+    return environment.get_template(template).render(_static_files() | content)
 
 
 def script_sources() -> str:
     """The scripts of pages as sources of a content security policy."""
-    digests = (hashlib.sha256(_static()[name].encode()).digest() for name in ("script", "plot_script"))
+    digests = (hashlib.sha256(_static_files()[name].encode()).digest() for name in ("script", "plot_script"))
     return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
 
 
@@ -46,24 +46,24 @@ def write_page(path: Path, html: str) -> None:
     try:
         atomic_write(path, html.encode())
     except OSError as error:
-        if error.errno not in NOT_ALLOWED:
+        if error.errno not in PERMISSION_ERRNOS:
             raise
         raise DataError(f"{path}: {error.strerror}; name another file with --out") from error
 
 
 @cache
-def _static() -> dict[str, str]:
+def _static_files() -> dict[str, str]:
     pages, plots = (resources.files(f"lobewatch.{room}").joinpath("static") for room in ("show.report", "screen"))
     plot_script = plots.joinpath("uPlot.iife.min.js").read_text(encoding="utf-8")
     return {
         "style": pages.joinpath("report.css").read_text(encoding="utf-8"),
         "script": pages.joinpath("report.js").read_text(encoding="utf-8"),
         "plot_style": plots.joinpath("uPlot.min.css").read_text(encoding="utf-8"),
-        "plot_script": NOTICE + plot_script.partition("*/")[2],
+        "plot_script": UPLOT_NOTICE + plot_script.partition("*/")[2],
     }
 
 
-def _in_css(text: str) -> str:
+def _escape_css(text: str) -> str:
     """A name as part of a string of a style sheet."""
     return re.sub(r"[^\w .,:;()+-]", lambda match: f"\\{ord(match[0]):x} ", text)
 
@@ -73,10 +73,35 @@ def _macro_name(part: object) -> str:
     return type(part).__name__.lower()
 
 
-def _unbroken(text: str) -> str:
+def _join_units(text: str) -> str:
     """No line ends within a number, between it and its error, or before its unit."""
     return re.sub(r"(?<=\d) (?=\d{3}\b|%|±|mm\b|rpm\b|Hz\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
-def _named(picture: str, name: str) -> Markup:
+def _label_svg(picture: str, name: str) -> Markup:
     return Markup(picture.replace("<svg ", f'<svg role="img" aria-label="{escape(name)}" ', 1))
+
+
+GAUGE_WIDTH = 120.0
+"""Width of the scale, which ends a quarter beyond the alarm (units of the picture)."""
+GAUGE_OVERSHOOT = 1.25
+
+
+class Gauge(NamedTuple):
+    """Lengths in units of the picture."""
+
+    text: str
+    """The fall in words, with its limits."""
+    length: float
+    """Length of the bar."""
+    warn: float
+    """Place of the warning."""
+    alarm: float
+    """Place of the alarm."""
+
+
+def make_gauge(fall: float, warn: float, alarm: float) -> Gauge:
+    """The gauge of a fall, with the limits of it (%); of a rise it is empty."""
+    scale = GAUGE_WIDTH / (GAUGE_OVERSHOOT * alarm)
+    text = f"frequency {-fall:+z.2f} %; warning at -{warn:g} %, alarm at -{alarm:g} %"
+    return Gauge(text, min(max(fall, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

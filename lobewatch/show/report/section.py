@@ -1,14 +1,99 @@
-"""A section of the report: what it is made of."""
+"""Parts of a report section, and the numbers that go with its figures and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from lobewatch.show.figures.style import svg
-from lobewatch.show.report.figure_data import Numbers
+from acquisition import Frf
+from lobewatch.measurement.estimate import Estimate
+from lobewatch.monitoring.trend import date_of_days
+from lobewatch.show.figures.drawing import render_svg
+from lobewatch.show.figures.trend_figures import TrendCurve
+
+Floats = NDArray[np.float64]
+
+MAX_RESPONSE_LINES = 1500
+"""Lines of a response that are given, at most."""
+
+
+class NumberTable(NamedTuple):
+    """A table."""
+
+    heads: Sequence[str]
+    """Headings of the columns, with units."""
+    lines: Sequence[Sequence[Any]]
+    """Texts and numbers of each row."""
+
+    @property
+    def text(self) -> str:
+        """The table as JSON that can stand within a page; what is not finite is null."""
+        lines = [[_json_value(value) for value in line] for line in self.lines]
+        exact = json.dumps({"heads": list(self.heads), "lines": lines}, ensure_ascii=False, separators=(",", ":"))
+        return exact.replace("<", "\\u003c").replace("&", "\\u0026")
+
+
+def tabulate_value(
+    unit: str,
+    scale: float,
+    estimates: Iterable[tuple[datetime, Estimate]],
+    aside: Iterable[tuple[datetime, float]],
+    course: TrendCurve | None,
+) -> NumberTable:
+    """A value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
+
+    scale: of the unit; the values of `estimates` alone are in SI.
+    """
+    lines: list[list[Any]] = [
+        ["test", _day_text(time), estimate.value / scale, estimate.std / scale, "", ""] for time, estimate in estimates
+    ]
+    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in aside]
+    if course is not None:
+        past = course.days.size - course.days_ahead.size
+        lines += [
+            ["fitted", _day_text(date_of_days(day)), value, "", "", ""]
+            for day, value in zip(course.days[:past].tolist(), course.line[:past].tolist(), strict=True)
+        ]
+        ahead = np.column_stack([course.days_ahead, course.line[past:], course.low, course.high])[::10]
+        lines += [
+            ["forecast", _day_text(date_of_days(day)), value, "", low, high] for day, value, low, high in ahead.tolist()
+        ]
+    return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
+
+
+def tabulate_lobes(speed_rpm: Floats, depths: Mapping[str, Floats]) -> NumberTable:
+    """Lines over speed (n,), depths in m by what each is called."""
+    heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
+    step = math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)
+    return NumberTable(
+        heads, np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])[::step].tolist()
+    )
+
+
+def tabulate_response(frf: Frf) -> NumberTable:
+    """A frequency response in its band; no more lines than one can see."""
+    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
+    coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
+    columns = (frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence)
+    lines = np.column_stack([column[::step] for column in columns])
+    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], lines.tolist())
+
+
+def _day_text(time: datetime) -> str:
+    return f"{time:%Y-%m-%d}"
+
+
+def _json_value(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return float(f"{value:.5g}") if math.isfinite(value) else None
 
 
 class Paragraph(NamedTuple):
@@ -47,7 +132,7 @@ class DataTable(NamedTuple):
     """Classes of the style sheet: "words" for text to the left."""
     if_empty: str = ""
     """Text in place of the rows where there are none."""
-    numbers: Numbers | None = None
+    numbers: NumberTable | None = None
     """The table with all digits, to be saved as CSV."""
     key: str = ""
     """Name of the numbers in the page."""
@@ -58,7 +143,7 @@ class Drawing(NamedTuple):
 
     svg: str
     """The <svg> element."""
-    numbers: Numbers | None = None
+    numbers: NumberTable | None = None
     """Numbers of the picture, to be saved as CSV."""
 
 
@@ -71,7 +156,7 @@ class Fragment(NamedTuple):
     """Values that the template shows."""
 
 
-Part = Paragraph | BulletList | DataTable | Drawing | Fragment
+SectionPart = Paragraph | BulletList | DataTable | Drawing | Fragment
 
 
 class Section(NamedTuple):
@@ -79,7 +164,7 @@ class Section(NamedTuple):
 
     heading: str
     """Heading; empty for none."""
-    parts: Sequence[Part]
+    parts: Sequence[SectionPart]
     """Parts below the heading, from above."""
     is_framed: bool = True
     """Whether a line end stands before and after it in the file; without any meaning on the page."""
@@ -87,6 +172,6 @@ class Section(NamedTuple):
     """Whether the page must bring the script that plots."""
 
 
-def picture_section(heading: str, text: str, figure: Figure, numbers: Numbers | None = None) -> Section:
+def make_figure_section(heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Section:
     """A picture below what is to be known to read it; numbers: what is drawn."""
-    return Section(heading, [Paragraph(text, is_small=True), Drawing(svg(figure), numbers)])
+    return Section(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])

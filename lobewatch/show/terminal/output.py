@@ -1,15 +1,19 @@
-"""Results on stdout, as text for people or as one JSON object; progress and notes on stderr.
+"""Print results as text, JSON or CSV on stdout, and notes on stderr.
 
 Names and texts may come from anywhere: no control character of theirs reaches the terminal.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 import re
+import sys
+import webbrowser
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 import typer
 from rich.cells import cell_len
@@ -19,53 +23,56 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from acquisition import Remark, joined
-from acquisition.names import CONTROL
+from acquisition import Remark, merge_remarks
+from acquisition.errors import CONTROL_CHARACTERS
+from lobewatch.show.terminal.option_names import with_option_names
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
-INSTEAD = "\ufffd"
+REPLACEMENT_CHARACTER = "\ufffd"
 """Character that is shown for a control character."""
 
 
-class Terminal(Console):
+class SafeConsole(Console):
     """A console that texts cannot steer: of all control characters in them, only newline and tab pass."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
         """What is printed, piece by piece; the pieces that rich itself steers the terminal with are marked as such."""
         for piece in super().render(renderable, options):
-            yield piece if piece.control else piece._replace(text=printable(piece.text))
+            yield piece if piece.control else piece._replace(text=make_printable(piece.text))
 
 
-class Cells(Table):
+class SafeTable(Table):
     """A table whose rows cannot be broken: newline and tab do not pass either."""
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
         """One row."""
-        super().add_row(*(CONTROL.sub(INSTEAD, cell) if isinstance(cell, str) else cell for cell in cells), **options)
+        super().add_row(*(_one_line(cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
     @property
-    def least_width(self) -> int:
+    def min_table_width(self) -> int:
         """Characters a line, so that columns that cannot be broken are whole and the others hold a word; 0: any."""
         breaking = sum(not column.no_wrap for column in self.columns)
-        wholes = (_widest([column.header, *column.cells]) for column in self.columns if column.no_wrap)
-        return sum(wholes) + breaking * SHORTEST + GAP * (len(self.columns) - 1) if breaking else 0
+        wholes = (_max_cell_width([column.header, *column.cells]) for column in self.columns if column.no_wrap)
+        return sum(wholes) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
 
 
-SHORTEST = 10
+MIN_COLUMN_WIDTH = 10
 """Characters that a column that can be broken has at least."""
-GAP = 2
+COLUMN_GAP = 2
 """Between columns."""
-notes = Terminal(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+notes = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Console for progress and remarks."""
-results = Terminal(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
+results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
 """Console for results, wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
     """One JSON object (numbers that are not finite become null), or the texts and tables."""
     if as_json:
-        exact = CONTROL.sub(_escaped, json.dumps(_finite(payload), allow_nan=False, indent=2, ensure_ascii=False))
+        exact = CONTROL_CHARACTERS.sub(
+            _escape_control, json.dumps(_json_value(payload), allow_nan=False, indent=2, ensure_ascii=False)
+        )
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
         else:
@@ -73,15 +80,15 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
         return
     for text in texts:
         if isinstance(text, str):
-            results.file.write(f"{printable(text)}\n")
+            results.file.write(f"{make_printable(text)}\n")
             continue
-        least = text.least_width if isinstance(text, Cells) else 0
+        least = text.min_table_width if isinstance(text, SafeTable) else 0
         results.print(text, width=max(Console().width, least) if least else None)
 
 
-def table(*headings: str) -> Table:
+def new_table(*headings: str) -> Table:
     """An empty table; a heading that begins with "<" names a column of text, with "~" one that may be broken."""
-    rows = Cells(box=None, pad_edge=False, header_style="bold")
+    rows = SafeTable(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
         breaks = heading.startswith("~")
         justify: Literal["left", "right"] = "left" if breaks or heading.startswith("<") else "right"
@@ -89,28 +96,36 @@ def table(*headings: str) -> Table:
     return rows
 
 
-def _widest(cells: Iterable[RenderableType]) -> int:
+def _max_cell_width(cells: Iterable[RenderableType]) -> int:
     texts = (Text.from_markup(cell).plain for cell in cells if isinstance(cell, str))
     return max(cell_len(line) for text in texts for line in text.split("\n"))
 
 
-def printable(text: str) -> str:
-    """A text whose control characters are replaced, but for newline and tab."""
-    return CONTROL.sub(lambda match: match[0] if match[0] in "\n\t" else INSTEAD, text)
+def _one_line(cell: str) -> str:
+    return CONTROL_CHARACTERS.sub(REPLACEMENT_CHARACTER, with_option_names(cell))
 
 
-def _escaped(match: re.Match[str]) -> str:
+def make_printable(text: str) -> str:
+    """Replace control characters except newline and tab, and library names by their options."""
+    return CONTROL_CHARACTERS.sub(
+        lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
+    )
+
+
+def _escape_control(match: re.Match[str]) -> str:
     """A control character as JSON writes it inside of text; a newline stands between its lines only."""
     return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
 
 
-def _finite(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: _json_value(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
+        return [_json_value(entry) for entry in value]
+    if isinstance(value, str):
+        return with_option_names(value)
     if hasattr(value, "tolist"):
-        return _finite(value.tolist())
+        return _json_value(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -121,10 +136,71 @@ def remark_json(remark: Remark) -> dict[str, str]:
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
     """A line each; those that say the same of several things once."""
-    return [f"note: {remark}" for remark in joined(remarks)]
+    return [f"note: {remark}" for remark in merge_remarks(remarks)]
 
 
-def note_remarks(remarks: Iterable[Remark]) -> None:
+def print_remarks(remarks: Iterable[Remark]) -> None:
     """Print remarks beside the results, a line each."""
     for remark in remarks:
         notes.print(f"note: {remark}", markup=False)
+
+
+FORMULA_START = re.compile(r"(?![+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z)[=+\-@\t\r]")
+"""Beginning of a text that a spreadsheet takes for a formula; of a number never. As in report.js."""
+
+
+def format_csv(lines: Iterable[Sequence[Any]]) -> str:
+    """A table, its headings first; None is an empty cell."""
+    return "".join(",".join(map(format_csv_cell, line)) + "\n" for line in lines)
+
+
+def format_csv_cell(value: Any) -> str:
+    """One cell; before a text that would be a formula stands an apostrophe, which keeps it a text."""
+    text = "" if value is None else str(value)
+    if isinstance(value, str) and FORMULA_START.match(text):
+        text = f"'{text}"
+    return '"{}"'.format(text.replace('"', '""')) if re.search('[",\r\n]', text) else text
+
+
+Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
+Token = Annotated[
+    str | None, typer.Option(help="What a browser must know to see and alter anything; a new one where not given.")
+]
+WatchToken = Annotated[
+    str | None, typer.Option(help="What a browser must know only to see anything; a new one where not given.")
+]
+
+
+class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
+    """Answers while its context lasts."""
+
+    @property
+    def url(self) -> str:
+        """For those who may alter something."""
+        ...
+
+    @property
+    def watch_url(self) -> str:
+        """For those who may only watch."""
+        ...
+
+
+@contextlib.contextmanager
+def serve_screen(server: ScreenServer) -> Iterator[None]:
+    """Let a screen answer, and print its address."""
+    with server:
+        show_address(server.url, server.watch_url)
+        yield
+
+
+def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
+    """Print the address and that for those who may only watch; open the first where somebody sits at a screen."""
+    if as_json:
+        results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
+        results.file.flush()
+    else:
+        notes.print(f"screen: {url}", markup=False)
+        notes.print(f"only to watch: {watch_url}", markup=False)
+    display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.stdout.isatty() and display:
+        webbrowser.open(url)

@@ -1,15 +1,16 @@
-"""The operator's screen in a terminal, for SSH: the words and keys of the browser's."""
+"""Show the screen of a tap test in a terminal, and read its keys."""
 
 from __future__ import annotations
 
 import contextlib
 import math
+import re
 import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from rich.align import Align
 from rich.console import Console, Group, RenderableType
@@ -17,21 +18,78 @@ from rich.live import Live
 from rich.panel import Panel
 from rich.text import Text
 
-from dsm import rounded
-from lobewatch.show.terminal.keys import Keys
-from lobewatch.show.terminal.output import Terminal
-from lobewatch.show.terminal.printer import RunningTest, verdict_markup
+from dsm import format_rounded
+from lobewatch.show.terminal.output import SafeConsole
+from lobewatch.show.terminal.tap_printer import RunningTest, hit_markup
 from lobewatch.tap.state import Outcome, TapState, TapStep
 
-INTERVAL = 0.05
+PAGE_UP_CODES = ("\x1b[5~", "\xe0I", "\0I")
+"""Page Up as terminals and as Windows send it: presenters and foot switches do."""
+SPECIAL_KEY_CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
+"""Arrows and the like."""
+
+
+class KeyReader:
+    """Keys pressed between __enter__ and __exit__; none where standard input is no terminal."""
+
+    def __init__(self) -> None:
+        """Nothing is changed yet."""
+        self._before: list[Any] | None = None
+
+    def __enter__(self) -> Self:
+        """Let single keys through; Ctrl-C stays what it is."""
+        if sys.platform != "win32" and sys.stdin.isatty():
+            import termios
+            import tty
+
+            self._before = termios.tcgetattr(sys.stdin)
+            tty.setcbreak(sys.stdin, termios.TCSADRAIN)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """The terminal as it was."""
+        if sys.platform != "win32" and self._before is not None:
+            import termios
+
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+            self._before = None
+
+    def read(self) -> str:
+        """The keys that wait, in lower case; empty where there are none."""
+        if sys.platform == "win32":
+            import msvcrt
+
+            keys = []
+            while msvcrt.kbhit():
+                keys.append(msvcrt.getwch())
+            return normalize_keys("".join(keys))
+        if self._before is None:
+            return ""
+        import os
+        import select
+
+        ready = select.select([sys.stdin], [], [], 0)[0]
+        return normalize_keys(os.read(sys.stdin.fileno(), 64).decode("ascii", "ignore")) if ready else ""
+
+
+def normalize_keys(typed: str) -> str:
+    """What was typed in lower case, Page Up as "u"; other keys that send more than one character count for nothing."""
+    for page_up in PAGE_UP_CODES:
+        typed = typed.replace(page_up, "u")
+    return SPECIAL_KEY_CODES.sub("", typed).lower()
+
+
+KEY_POLL_INTERVAL = 0.05
 """Between two looks at keys and state (s)."""
-SHOWN_HITS = 6
+MAX_SHOWN_HITS = 6
 """Newest hits that are listed."""
 BELL_PAUSE = 0.2
 """Between two bells (s)."""
-HELD_TIME = 0.7
+KEY_REPEAT_TIME = 0.7
 """Undo keys that follow each other faster (s) are one that is held down: it counts once."""
-LOOKS: Mapping[TapStep, tuple[str, str]] = {
+STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.CHECKING: ("…", "black on #56b4e9"),
     TapStep.TAP: ("▼", "black on #56b4e9"),
     TapStep.WAIT: ("…", "black on #e69f00"),
@@ -43,9 +101,9 @@ LOOKS: Mapping[TapStep, tuple[str, str]] = {
     TapStep.FAILED: ("✗", "black on #ee8238"),
 }
 """Symbol and colours of each word, told apart by colour-blind people too."""
-BELLS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
+BELL_COUNTS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
 """Number of bells."""
-LIGHTS: Mapping[str, tuple[str, str]] = {
+STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
     "warn": ("!", "black on #f0e442"),
     "alarm": ("✗", "black on #ee8238"),
@@ -61,10 +119,10 @@ class TerminalScreen:
     def __init__(self, session: RunningTest, console: Console | None = None) -> None:
         """Nothing is shown yet; console None: standard error."""
         self._session = session
-        self._console = console or Terminal(stderr=True, highlight=False, emoji=False)
+        self._console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
-        self._keys = Keys()
+        self._keys = KeyReader()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
         self._live = Live(console=self._console, get_renderable=self._picture, refresh_per_second=10)
@@ -88,14 +146,14 @@ class TerminalScreen:
     def _watch(self) -> None:
         """Keys and bells."""
         before = self._session.state
-        while not self._ended.wait(INTERVAL):
-            for key in self._keys.pressed():
-                self.press(key)
+        while not self._ended.wait(KEY_POLL_INTERVAL):
+            for key in self._keys.read():
+                self.handle_key(key)
             state = self._session.state
-            self.ring(before, state)
+            self.ring_bells(before, state)
             before = state
 
-    def press(self, key: str) -> None:
+    def handle_key(self, key: str) -> None:
         """Do what a key stands for; while the sensor is moved, Enter and undo stand for the first choice."""
         state = self._session.state
         if state.choices and key != "m":
@@ -106,7 +164,7 @@ class TerminalScreen:
                 self._choose(chosen[0])
         elif key == "u":
             now = time.monotonic()
-            if now - self._undo_at > HELD_TIME:
+            if now - self._undo_at > KEY_REPEAT_TIME:
                 self._session.undo()
             self._undo_at = now
         elif key == "q":
@@ -131,27 +189,27 @@ class TerminalScreen:
             self._keys.__enter__()
             self._live.start()
 
-    def ring(self, before: TapState, state: TapState) -> None:
+    def ring_bells(self, before: TapState, state: TapState) -> None:
         """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
         word, hit = state.word != before.word, len(state.hits) > len(before.hits)
         is_due = word or (hit and not self._ahead_of_hit)
         if word or hit:
             self._ahead_of_hit = not hit
-        for _ in range(BELLS.get(state.word, 0) if is_due and not self._muted else 0):
+        for _ in range(BELL_COUNTS.get(state.word, 0) if is_due and not self._muted else 0):
             self._console.bell()
             self._ended.wait(BELL_PAUSE)
 
     def _picture(self) -> RenderableType:
-        return picture(self._session.state, self._muted)
+        return render_state(self._session.state, self._muted)
 
 
-def picture(state: TapState, muted: bool) -> RenderableType:
+def render_state(state: TapState, muted: bool) -> RenderableType:
     """One state of a test, as it stands on the terminal."""
     keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
-    return Group(*_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
+    return Group(*_state_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
 
 
-def _lines(state: TapState) -> Iterator[RenderableType]:
+def _state_lines(state: TapState) -> Iterator[RenderableType]:
     yield Text(" - ".join(filter(None, (state.title, state.device))), "bold")
     if state.resumed:
         yield Text(state.resumed)
@@ -160,11 +218,11 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
     if state.outcome is not None:
         yield from _outcome_lines(state.outcome)
         return
-    yield Text(_numbers(state))
+    yield Text(_level_line(state))
     for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
-    for hit in state.hits[-SHOWN_HITS:]:
-        yield Text.from_markup(f"{hit.number:3d}  {hit.peak:>8}  {verdict_markup(hit)}")
+    for hit in state.hits[-MAX_SHOWN_HITS:]:
+        yield Text.from_markup(f"{hit.number:3d}  {hit.peak:>8}  {hit_markup(hit)}")
 
 
 def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
@@ -172,33 +230,33 @@ def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
     yield Text(" ".join(outcome.texts))
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
-    symbol, style = LIGHTS[outcome.light]
+    symbol, style = STATUS_STYLES[outcome.status]
     early = "EARLY " if outcome.is_early else ""
-    yield Text.assemble((f" {symbol} {early}{outcome.light.upper()} ", style), f"  next: {outcome.next_step}")
+    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), f"  next: {outcome.next_step}")
 
 
 def _banner(state: TapState) -> RenderableType:
     """The full-width word."""
-    symbol, style = LOOKS[state.word]
+    symbol, style = STEP_STYLES[state.word]
     trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
     text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 
-def _levels(force: float, response: float) -> str:
-    return f"force {rounded(force, digits=2)} N rms, {_response(response)}"
+def _levels_text(force: float, response: float) -> str:
+    return f"force {format_rounded(force, digits=2)} N rms, {_response_text(response)}"
 
 
-def _response(response: float) -> str:
-    return f"response {rounded(response, digits=2)} m/s^2 rms"
+def _response_text(response: float) -> str:
+    return f"response {format_rounded(response, digits=2)} m/s^2 rms"
 
 
-def _numbers(state: TapState) -> str:
+def _level_line(state: TapState) -> str:
     """Levels, and how far the mean has come."""
     texts = []
     if state.levels is not None:
         force, response = state.levels
-        texts.append(_response(response) if force is None else _levels(force, response))
+        texts.append(_response_text(response) if force is None else _levels_text(force, response))
     if state.mean_change is not None:
         moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
         texts.append(f"{moves}; it has settled" if state.settled else moves)

@@ -32,24 +32,24 @@ from acquisition import (
     check_hit,
 )
 from acquisition.dataq.source import DataqStatus
-from acquisition.dataq.stream import HELD_BACK
-from acquisition.emulation.simulated_source import Signal
+from acquisition.dataq.stream import HELD_BACK_BYTES
+from acquisition.emulation.emulated_device import SignalFunction
 
 RATE = 25_000.0
-HELD = -(-HELD_BACK // 6)
+HELD = -(-HELD_BACK_BYTES // 6)
 TRIGGER = Trigger(level=20.0, n_samples=6250, pre_trigger=500)
 INPUTS = (
     SensorInput(0, Channel("force", 2.25e-3, 2.0)),
     SensorInput(5, Channel("acceleration", 1.02e-3, 5.0)),
 )
-SignalAt = Callable[[float], Signal]
+SignalAt = Callable[[float], SignalFunction]
 Make = Callable[..., DataqEmulator]
 
 
 @pytest.fixture(autouse=True)
 def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
     """An emulated device is quiet at once."""
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
 
 
 @pytest.fixture
@@ -202,7 +202,7 @@ def test_the_hit_in_which_the_buffer_ran_over_is_refused(emulated: Make) -> None
 
 
 def test_a_host_that_does_not_read_makes_the_buffer_run_over(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.emulator.BUFFER_SECONDS", 0.02)
+    monkeypatch.setattr("acquisition.dataq.emulator.DATAQ_BUFFER_SECONDS", 0.02)
     with emulated(realtime=True) as device:
         handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
         os.write(handle, b"encode 0\rslist 0 0\rslist 1 8\rsrate 400\rstart\r")
@@ -216,7 +216,7 @@ def test_a_host_that_does_not_read_makes_the_buffer_run_over(emulated: Make, mon
 
 
 def test_a_consumer_that_comes_too_late_is_told_of_the_gap(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.ports.serial_link.BUFFER_BYTES", 20_000)
+    monkeypatch.setattr("acquisition.ports.serial_ports.MAX_UNREAD_BYTES", 20_000)
     with emulated(realtime=True) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         while not source._link.overruns:  # noqa: SLF001
@@ -241,8 +241,8 @@ def test_a_device_that_scans_already_is_taken_over(emulated: Make) -> None:
 
 
 def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.5)
-    monkeypatch.setattr("acquisition.dataq.dialogue.DRAIN_TIME", 0.2)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.5)
+    monkeypatch.setattr("acquisition.dataq.protocol.MAX_DRAIN_TIME", 0.2)
     with (
         emulated(streaming_at_connect=True, deaf=True) as device,
         pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),
@@ -256,7 +256,7 @@ def test_old_firmware_is_refused(emulated: Make) -> None:
 
 
 def test_a_silent_device_is_given_up(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.source.SILENCE", 0.3)
+    monkeypatch.setattr("acquisition.dataq.source.DATAQ_SILENCE_TIMEOUT", 0.3)
     with emulated(stall_after=9000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         with pytest.raises(DeviceError, match=r"has sent no samples for 0\.3 s; switch it off and on"):
@@ -271,7 +271,7 @@ def test_hanging_up_is_said_in_one_sentence(emulated: Make) -> None:
 
 
 def test_digital_inputs_that_do_not_hold_still_are_told(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.source.SILENCE", 0.3)
+    monkeypatch.setattr("acquisition.dataq.source.DATAQ_SILENCE_TIMEOUT", 0.3)
     with emulated(digital_word=0x0001) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         with pytest.raises(DeviceError, match=r"do not hold still.*loss_detection = false"):
@@ -300,12 +300,12 @@ def test_a_halved_rate_is_that_of_the_clock_not_of_the_formula(signal_at: Signal
 def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -> None:
     """A ramp shows the instant of each conversion: input 5 comes a third of a scan after input 0."""
 
-    def ramp(rate: float) -> Signal:
+    def ramp(rate: float) -> SignalFunction:
         return lambda first, n: np.tile((first + np.arange(n)) / rate, (2, 1))
 
     inputs = tuple(SensorInput(number, Channel("force", 1.0, 10.0)) for number in (0, 5))
     with (
-        DataqEmulator(ramp, inputs, realtime=False, traits=DataqTraits(scanned=True)) as device,
+        DataqEmulator(ramp, inputs, realtime=False, traits=DataqTraits(is_multiplexed=True)) as device,
         DataqSource(device.port, inputs, 1000.0) as source,
     ):
         source.start()
@@ -317,7 +317,7 @@ def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -
 def test_an_overload_is_found_at_the_resolution_of_the_rate(bits: int) -> None:
     """A sine of 102 % of the range, in words whose lower bits are 0."""
 
-    def loud(rate: float) -> Signal:
+    def loud(rate: float) -> SignalFunction:
         return lambda first, n: np.tile(2.04 * np.sin(2 * np.pi * 300 / rate * (first + np.arange(n))), (2, 1))
 
     inputs = SensorInput(0, Channel("force", 1.0, 10.0)), SensorInput(5, Channel("acceleration", 1.0, 2.0))

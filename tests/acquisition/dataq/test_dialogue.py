@@ -9,11 +9,11 @@ import pytest
 from acquisition import Channel, DataqSource, DeviceError, DeviceIdentity, SensorInput
 from acquisition.dataq.protocol import (
     RateSetting,
-    choose_packet,
+    choose_packet_code,
     choose_rate,
-    firmware_of,
-    model_of,
-    range_code,
+    encode_range,
+    parse_firmware,
+    parse_model,
     split_lines,
 )
 
@@ -73,7 +73,7 @@ class ScriptedLink:
 @pytest.fixture(autouse=True)
 def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.dataq.source.SerialLink", ScriptedLink)
-    monkeypatch.setattr("acquisition.dataq.dialogue.ANSWER_TIME", 0.01)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_ECHO_TIMEOUT", 0.01)
 
 
 def connect(script: list[Pair], sample_rate: float | None = None, digital_word: bool = True) -> DataqSource:
@@ -195,20 +195,20 @@ def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_refus
     ("bytes_per_second", "ps"), [(600, 0), (1600, 0), (1601, 1), (100_000, 6), (204_800, 7), (300_000, 7)]
 )
 def test_packets_are_the_smallest_with_at_most_100_a_second(bytes_per_second: float, ps: int) -> None:
-    assert choose_packet(bytes_per_second) == ps
+    assert choose_packet_code(bytes_per_second) == ps
 
 
 def test_small_facts_of_the_protocol() -> None:
     assert split_lines(b"info 0 DATAQ\r\0\nstop\rinf") == (["info 0 DATAQ", "stop"], b"inf")
-    assert [model_of(text) for text in ("4108", "DI-2108-P", "2108p", "DI-4718B")] == [
+    assert [parse_model(text) for text in ("4108", "DI-2108-P", "2108p", "DI-4718B")] == [
         "4108",
         "2108P",
         "2108P",
         "4718B",
     ]
-    assert [firmware_of(text) for text in ("1.35", "87", "newest")] == [1.35, 1.35, None]
-    assert [range_code("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
-    assert [range_code("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]
+    assert [parse_firmware(text) for text in ("1.35", "87", "newest")] == [1.35, 1.35, None]
+    assert [encode_range("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
+    assert [encode_range("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]
     with pytest.raises(ValueError, match="input=8 is none of 0 to 7"):
         DataqSource("COM9", (replace(INPUTS[0], number=8),))
     with pytest.raises(ValueError, match=r"inputs \[0, 0\] of a DATAQ device must be different"):

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from acquisition import DeviceError
-from acquisition.dataq.digital_clock import LEARNT
-from acquisition.dataq.stream import HELD_BACK, Piece, ScanDecoder
+from acquisition.dataq.stream import CLOCK_TRAINING_PERIODS, HELD_BACK_BYTES, CodeBlock, ScanDecoder
 
 N = 4000
 
@@ -25,13 +24,13 @@ def scans(period: float, jitter: float = 0.0, start: float = 0.3) -> NDArray[np.
     return np.column_stack([random.normal(scale=20.0, size=(N, 2)), 0x7E00 + 0x0100 * high]).astype("<i2")
 
 
-def decoded(stream: bytes, cuts: list[int]) -> list[Piece]:
+def decoded(stream: bytes, cuts: list[int]) -> list[CodeBlock]:
     decoder = ScanDecoder(2, digital_word=True, clock=True)
     edges = [0, *sorted(cuts), len(stream)]
     return [piece for start, end in itertools.pairwise(edges) for piece in decoder.feed(stream[start:end])]
 
 
-def gaps(pieces: list[Piece]) -> list[tuple[int, int]]:
+def gaps(pieces: list[CodeBlock]) -> list[tuple[int, int]]:
     """Scans that came before each gap, and scans missing in it."""
     came = np.cumsum([0] + [codes.shape[1] for codes, _ in pieces])
     return [(int(at), lost) for at, (_, lost) in zip(came[:-1], pieces, strict=True) if lost]
@@ -44,14 +43,14 @@ def test_an_even_wave_is_no_loss(period: float, start: float, cuts: list[int]) -
     pieces = decoded(words.tobytes(), cuts)
     assert gaps(pieces) == []
     codes = np.concatenate([codes for codes, _ in pieces], axis=1)
-    assert np.array_equal(codes, words[: N - -(-HELD_BACK // 6), :2].T)
+    assert np.array_equal(codes, words[: N - -(-HELD_BACK_BYTES // 6), :2].T)
 
 
 @settings(max_examples=150, deadline=None)
 @given(
     period=st.floats(8.0, 99.0),
     packets=st.sampled_from([3, 6, 9]),
-    at=st.integers((LEARNT + 3) * 99, N - 600),
+    at=st.integers((CLOCK_TRAINING_PERIODS + 3) * 99, N - 600),
     inside=st.integers(0, 5),
     cuts=st.lists(st.integers(0, 6 * (N - 96)), max_size=10),
 )

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquisition.dataq.stream import HELD_BACK, Piece, ScanDecoder
+from acquisition.dataq.stream import HELD_BACK_BYTES, CodeBlock, ScanDecoder
 
 PULLED_UP = 0x7F00
 
@@ -21,13 +21,13 @@ def noise(n: int, seed: int, digital: int | None = PULLED_UP) -> NDArray[np.int1
     return words if digital is None else np.column_stack([words, np.full(n, digital, "<i2")])
 
 
-def decoded(stream: bytes, digital: bool = True, cuts: list[int] | None = None) -> list[Piece]:
+def decoded(stream: bytes, digital: bool = True, cuts: list[int] | None = None) -> list[CodeBlock]:
     decoder = ScanDecoder(2, digital)
     edges = [0, *sorted(cuts or []), len(stream)]
     return [piece for start, end in itertools.pairwise(edges) for piece in decoder.feed(stream[start:end])]
 
 
-def placed(pieces: list[Piece]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def placed(pieces: list[CodeBlock]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Codes (2, n) and the index of each scan."""
     indices, at = [], 0
     for codes, lost in pieces:
@@ -41,7 +41,7 @@ def placed(pieces: list[Piece]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
 def test_a_stream_cut_anywhere_gives_the_same_scans(seed: int, digital: bool, cuts: list[int]) -> None:
     words = noise(300, seed, PULLED_UP if digital else None)
     codes, indices = placed(decoded(words.tobytes(), digital, [min(cut, words.nbytes) for cut in cuts]))
-    assert codes.shape[1] == 300 - -(-HELD_BACK // (2 * words.shape[1]))
+    assert codes.shape[1] == 300 - -(-HELD_BACK_BYTES // (2 * words.shape[1]))
     assert np.array_equal(codes, words[: codes.shape[1], :2].T)
     assert np.array_equal(indices, np.arange(codes.shape[1]))
 
@@ -120,11 +120,11 @@ def test_the_text_of_an_overflow_is_never_taken_for_samples() -> None:
     words = noise(500, 1)
     decoder = ScanDecoder(2, digital_word=True)
     pieces = decoder.feed(words.tobytes() + b"stop 01\r")
-    assert decoder.ran_over()
+    assert decoder.has_overflowed()
     codes, _ = placed(pieces)
     assert np.array_equal(codes, words[: codes.shape[1], :2].T)
     decoder.begin(lost=77)
-    assert not decoder.ran_over()
+    assert not decoder.has_overflowed()
     ((codes, lost),) = decoder.feed(words.tobytes())
     assert lost == 77
     assert np.array_equal(codes, words[: codes.shape[1], :2].T)

@@ -23,8 +23,8 @@ from acquisition import (
     check_settings,
     probe_port,
 )
-from acquisition.devices import named_package, survey_ports
-from acquisition.devices.built_in import BUILT_IN
+from acquisition.devices import convert_driver_errors, scan_ports
+from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.ports import SerialLink
 
 WHO = DeviceIdentity("X", "1", "2")
@@ -66,7 +66,7 @@ def bad_daq(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def driver(name: str, probe: Callable[[SerialLink], Any], **more: Any) -> Driver:
-    return replace(BUILT_IN[0], name=name, probe=probe, **more)
+    return replace(BUILT_IN_DRIVERS[0], name=name, probe=probe, **more)
 
 
 def raising(error: BaseException) -> Callable[..., Any]:
@@ -118,7 +118,7 @@ def test_a_probe_that_fails_or_talks_rubbish_is_named_and_the_next_is_asked(
 
 
 def test_a_probe_that_hangs_is_left_behind(port: str, bad_daq: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["acquisition.devices.ask_driver"], "PROBE_TIME", 0.2)
+    monkeypatch.setattr(sys.modules["acquisition.devices.registry"], "DRIVER_ANSWER_TIMEOUT", 0.2)
     end, remarks = threading.Event(), list[Remark]()
     found = probe_port(port, [driver("bad", lambda _: end.wait()), driver("good", lambda _: WHO)], None, remarks)
     end.set()
@@ -137,8 +137,8 @@ def test_a_probe_that_says_the_device_is_gone_ends_nothing(port: str) -> None:
 
 
 def test_ports_goes_on_without_a_package_that_ends_the_program_when_loaded(port: str, bad_daq: None) -> None:
-    survey = survey_ports(port)
-    assert [seen.text for seen in survey.seen] == ["no answer"]
+    survey = scan_ports(port)
+    assert [seen.text for seen in survey.ports] == ["no answer"]
     assert [remark.text for remark in survey.remarks] == [
         "the package bad-daq cannot be loaded (SystemExit: not today)"
     ]
@@ -154,6 +154,6 @@ def test_settings_that_make_a_driver_fail_are_refused_with_its_package(bad_daq: 
 def test_a_driver_that_fails_when_opened_is_a_device_that_is_not_there(bad_daq: None, error: BaseException) -> None:
     with (
         pytest.raises(DeviceError, match="the package bad-daq fails when opening COM1"),
-        named_package("bad", "opening COM1"),
+        convert_driver_errors("bad", "opening COM1"),
     ):
         raise error

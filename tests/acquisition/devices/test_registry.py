@@ -15,12 +15,12 @@ from acquisition import (
     DeviceIdentity,
     DeviceSettings,
     Driver,
-    driver_names,
     find_driver,
+    list_driver_names,
     load_drivers,
     probe_port,
 )
-from acquisition.devices.built_in import BUILT_IN
+from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.ports import SerialLink
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
@@ -44,12 +44,12 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 
 def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     ours = ("taps", "dataq", "lines", "audio", "nidaqmx", "mcc172", "uldaq", "ljm")
-    assert driver_names() == ours
+    assert list_driver_names() == ours
     monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
-    assert driver_names() == (*ours, "dummy")
+    assert list_driver_names() == (*ours, "dummy")
     dummy = find_driver("dummy")
     assert (dummy.name, dummy.title) == ("dummy", "a dummy device")
-    assert load_drivers() == ((*BUILT_IN, dummy), ())
+    assert load_drivers() == ((*BUILT_IN_DRIVERS, dummy), ())
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Inst
     assert message in str(caught.value)
     assert str(caught.value).endswith("; update or remove that package")
     drivers, (remark,) = load_drivers()
-    assert drivers == BUILT_IN
+    assert drivers == BUILT_IN_DRIVERS
     assert (remark.code, str(remark)) == ("package-not-loaded", str(caught.value))
 
 
@@ -114,7 +114,7 @@ def test_only_drivers_that_fit_the_vendor_are_asked(port: str, vendor: int | Non
             heard.append(name)
             return None
 
-        return replace(BUILT_IN[0], name=name, probe=probe, vendors=frozenset(vendors))
+        return replace(BUILT_IN_DRIVERS[0], name=name, probe=probe, usb_vendors=frozenset(vendors))
 
     drivers = driver("any"), driver("one", 0x1111, 0x2222), driver("other", 0x2222)
     assert probe_port(port, drivers, vendor) is None
@@ -125,7 +125,7 @@ def test_the_first_answer_counts(port: str) -> None:
     who = DeviceIdentity("X", "1", "2")
 
     def driver(name: str, identity: DeviceIdentity | None) -> Driver:
-        return replace(BUILT_IN[0], name=name, probe=lambda _: identity)
+        return replace(BUILT_IN_DRIVERS[0], name=name, probe=lambda _: identity)
 
     drivers = driver("silent", None), driver("answering", who), driver("later", DeviceIdentity("Y"))
     found = probe_port(port, drivers)
@@ -134,5 +134,5 @@ def test_the_first_answer_counts(port: str) -> None:
 
 
 def test_a_driver_takes_all_settings_unless_it_says_otherwise() -> None:
-    driver = Driver("x", "a thing", BUILT_IN[0].open, BUILT_IN[0].probe)
+    driver = Driver("x", "a thing", BUILT_IN_DRIVERS[0].open, BUILT_IN_DRIVERS[0].probe)
     driver.check(DeviceSettings(1.0, (), loss_detection=False))

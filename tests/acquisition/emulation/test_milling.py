@@ -138,7 +138,7 @@ def test_it_dies_below_the_limit_and_grows_above_it_as_the_multipliers_say(cut: 
         made, passage = cut_of(cut, speed_rpm, depth), Passage(0.0, ramp, 0.4, 0.0)
         motion = simulate_cut(made, passage)
         assert multiplier(made, motion, passage) - 1 == pytest.approx(expected - 1, rel=0.1)
-        assert (motion.wander > 1e-2) == (expected > 1)
+        assert (motion.nonperiodic_share > 1e-2) == (expected > 1)
 
 
 def test_chatter_has_the_frequency_of_the_lobes() -> None:
@@ -262,7 +262,7 @@ def test_uneven_teeth_chatter_beyond_their_limit_and_not_below(pitch: tuple[floa
     )
     assert limit > 1.3 * even
     below, above = (
-        simulate_cut(cut_of(cut, speed, side * limit, pitch=cut.pitch), Passage(0.0, 0.02, 0.5, 0.0)).wander
+        simulate_cut(cut_of(cut, speed, side * limit, pitch=cut.pitch), Passage(0.0, 0.02, 0.5, 0.0)).nonperiodic_share
         for side in (0.94, 1.06)
     )
     assert below < 0.01 < 0.3 < above

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition.emulation import Housing, TipMotion, hear, random_housing
+from acquisition.emulation import Housing, TipMotion, make_random_housing, sample_housing
 
 RATE = 102400.0
 
@@ -27,7 +27,7 @@ def amplitude(heard: NDArray[np.float64], frequency: float, sample_rate: float =
 
 
 def sound(motion: TipMotion, housing: Housing) -> NDArray[np.float64]:
-    return hear(motion, housing, 6000.0, 25600.0, np.random.default_rng(1))
+    return sample_housing(motion, housing, 6000.0, 25600.0, np.random.default_rng(1))
 
 
 def test_the_housing_hears_the_tip_through_its_gain() -> None:
@@ -48,7 +48,7 @@ def test_without_a_filter_what_is_above_half_the_rate_is_folded_below_it() -> No
 
 def test_other_machines_and_the_spindle_sound_whether_it_cuts_or_not() -> None:
     still = TipMotion(RATE, np.zeros((2, int(0.5 * RATE))))
-    heard = sound(still, Housing((0.1, 0.1), lines=((500.0, 2.0), (1500.0, 0.5)), unbalance=1.5, noise=0.2))
+    heard = sound(still, Housing((0.1, 0.1), tones=((500.0, 2.0), (1500.0, 0.5)), unbalance=1.5, noise=0.2))
     assert [amplitude(heard, f) for f in (500.0, 1500.0, 100.0)] == pytest.approx([2.0, 0.5, 1.5], abs=0.05)
     assert amplitude(heard, 3000.0) < 0.05
 
@@ -60,7 +60,7 @@ def test_noise_has_the_rms_it_is_given() -> None:
 
 
 def test_random_housings_are_such_as_promised() -> None:
-    housings = [random_housing(np.random.default_rng(seed), 6000.0) for seed in range(200)]
+    housings = [make_random_housing(np.random.default_rng(seed), 6000.0) for seed in range(200)]
     assert all(0.01 <= min(one.gain) <= max(one.gain) <= 0.3 for one in housings)
-    assert all(len(one.lines) == 3 and 2 <= len(one.modes) <= 3 for one in housings)
-    assert random_housing(np.random.default_rng(3), 6000.0).modes == housings[3].modes
+    assert all(len(one.tones) == 3 and 2 <= len(one.modes) <= 3 for one in housings)
+    assert make_random_housing(np.random.default_rng(3), 6000.0).modes == housings[3].modes

@@ -19,7 +19,7 @@ from acquisition import (
     Trigger,
     capture_hits,
     check_hit,
-    cross_spectra,
+    compute_cross_spectra,
     estimate_frf,
     from_accelerance,
 )
@@ -94,7 +94,7 @@ def few_codes(tapper: Tapper) -> list[Hit]:
     """Hits whose force has no power at half the sample rate, the last line."""
     coarse = Channel("force", 2.25e-3, 4.5, 12), Channel("acceleration", 1.02e-3, 5.0, 12)
     taken = hits(tapper, coarse, 99, force_range=(200.0, 200.0), force_noise=0.0)
-    powers = [cross_spectra([hit])[0] for hit in taken]
+    powers = [compute_cross_spectra([hit])[0] for hit in taken]
     without = [hit for hit, power in zip(taken, powers, strict=True) if power[-1] < 1e-32 * power.max()]
     assert len(without) >= 2
     return without
@@ -110,7 +110,7 @@ def test_lines_that_no_hit_excites_are_zero_and_beyond_the_band(tapper: Tapper, 
         assert one.usable_band[1] < one.frequency[-1]
     assert frf.coherence is not None
     assert frf.coherence[-1] == 0
-    s_ff, s_xx, s_fx = (spectrum[1:-1] for spectrum in cross_spectra(some))
+    s_ff, s_xx, s_fx = (spectrum[1:-1] for spectrum in compute_cross_spectra(some))
     forms = {"H1": s_fx / s_ff, "H2": s_xx / np.conj(s_fx), "Hv": s_fx / np.abs(s_fx) * np.sqrt(s_xx / s_ff)}
     rising = s_ff > 1e-9 * np.max(s_ff)
     assert frf.accelerance[:-1][rising] == pytest.approx(forms[estimator][rising], rel=1e-9)

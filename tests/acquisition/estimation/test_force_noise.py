@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Hit, estimate_frf, force_noise
+from acquisition import Hit, estimate_frf, propagate_force_noise
 
 RATE, SIZE, PRE_TRIGGER = 10_000.0, 2000, 100
 LINES = np.array([50.0, 300.0, 500.0, 550.0, 900.0])
@@ -40,19 +40,19 @@ def impulse_variance() -> NDArray[np.float64]:
 
 
 def test_impulse() -> None:
-    found = covariance(list(force_noise([impulse(100.0, 2.0)], LINES)))
+    found = covariance(list(propagate_force_noise([impulse(100.0, 2.0)], LINES)))
     assert np.diag(found) == pytest.approx(impulse_variance() * (2.0 / 100.0) ** 2)
 
 
 def test_hits_count_by_their_own_noise_and_force() -> None:
     hits = [impulse(100.0, 2.0), impulse(300.0, 1.0)]
     expected = impulse_variance() * (2.0**2 * 100.0**2 + 1.0**2 * 300.0**2) / (100.0**2 + 300.0**2) ** 2
-    assert np.diag(covariance(list(force_noise(hits, LINES)))) == pytest.approx(expected)
+    assert np.diag(covariance(list(propagate_force_noise(hits, LINES)))) == pytest.approx(expected)
 
 
 def test_sign_and_time_of_a_sample() -> None:
     """Force that is too high by d at the impulse itself makes H1 too low by d / peak, at all lines alike."""
-    (columns,) = force_noise([impulse(100.0, 2.0)], LINES)
+    (columns,) = propagate_force_noise([impulse(100.0, 2.0)], LINES)
     at_pulse = columns[:, np.argmin(np.ptp(np.angle(-columns), axis=0))]
     assert at_pulse == pytest.approx(np.full(LINES.size, -0.02))
 
@@ -74,7 +74,7 @@ def test_covariance_is_that_of_simulated_averages() -> None:
     at = np.round(LINES / 5.0).astype(int) - 1
     frfs = np.array([estimate_frf(average()).receptance[at] for _ in range(2000)])
     error = frfs / frfs.mean(axis=0) - 1
-    made = [np.concatenate(list(force_noise(average(), LINES)), axis=1) for _ in range(100)]
+    made = [np.concatenate(list(propagate_force_noise(average(), LINES)), axis=1) for _ in range(100)]
     columns = np.concatenate(made, axis=1) / np.sqrt(100)
     size = np.real(np.diag(columns @ columns.conj().T))
     scale = np.sqrt(np.outer(size, size))
@@ -87,4 +87,4 @@ def test_covariance_is_that_of_simulated_averages() -> None:
 
 def test_hit_without_pulse_is_refused() -> None:
     with pytest.raises(ValueError, match="no force pulse"):
-        list(force_noise([Hit(np.zeros(SIZE), np.zeros(SIZE), RATE)], LINES))
+        list(propagate_force_noise([Hit(np.zeros(SIZE), np.zeros(SIZE), RATE)], LINES))

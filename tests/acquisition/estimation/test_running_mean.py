@@ -59,7 +59,7 @@ def test_it_is_the_estimate_from_all_hits_also_after_one_was_taken_back(hits: li
     mean = mean_of(hits)
     assert_same(mean, hits)
     others = [*hits[:2], *hits[3:]]
-    assert np.allclose(mean.without(hits[2]).receptance, estimate_frf(others).receptance, rtol=1e-12, atol=0)
+    assert np.allclose(mean.estimate_without(hits[2]).receptance, estimate_frf(others).receptance, rtol=1e-12, atol=0)
     assert_same(mean, hits)
     mean.remove(hits[2])
     assert_same(mean, others)
@@ -71,18 +71,18 @@ def test_it_is_the_estimate_from_all_hits_also_after_one_was_taken_back(hits: li
 def test_without_hits_there_is_nothing() -> None:
     mean = RunningMean()
     assert mean.frf is None
-    assert mean.change is None
-    assert not mean.settled
+    assert mean.relative_change is None
+    assert not mean.has_converged
     mean.add(pulse(1.0))
-    assert mean.change is None
+    assert mean.relative_change is None
 
 
 def test_the_change_is_that_of_the_accelerance() -> None:
     """H = 1, 1 and 1.3: the mean of three is 1.1, 0.1 / 1.1 from the mean of two."""
     mean = mean_of([pulse(1.0), pulse(1.0)])
-    assert mean.change == pytest.approx(0.0, abs=1e-12)
+    assert mean.relative_change == pytest.approx(0.0, abs=1e-12)
     mean.add(pulse(1.3))
-    assert mean.change == pytest.approx(0.1 / 1.1, rel=1e-9)
+    assert mean.relative_change == pytest.approx(0.1 / 1.1, rel=1e-9)
 
 
 def test_the_error_at_the_peak_is_that_of_bendat_and_piersol() -> None:
@@ -93,7 +93,7 @@ def test_the_error_at_the_peak_is_that_of_bendat_and_piersol() -> None:
     for scale in (1 + d, 1 - d):
         mean.add(pulse(scale))
     assert mean.peak_error == pytest.approx(d / np.sqrt(8), rel=1e-6)
-    assert not mean.settled
+    assert not mean.has_converged
 
 
 def test_it_settles_with_hits_that_agree_and_not_before_four() -> None:
@@ -101,7 +101,7 @@ def test_it_settles_with_hits_that_agree_and_not_before_four() -> None:
     mean = RunningMean()
     for _ in range(5):
         mean.add(pulse(1.0))
-        settled.append(mean.settled)
+        settled.append(mean.has_converged)
     assert settled == [False, False, False, True, True]
 
 
@@ -110,7 +110,7 @@ def test_noise_keeps_it_from_settling() -> None:
     for noise in (1.0, 0.001):
         mean = mean_of([pulse(1.0, noise, seed) for seed in range(10)])
         errors.append(mean.peak_error)
-        assert mean.settled == (noise < 0.1)
+        assert mean.has_converged == (noise < 0.1)
     assert errors[0] > 100 * errors[1]
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.estimation.spindle_speed import speed_of_pulses
+from acquisition.files.contents.spindle_speed import compute_speed_from_pulses
 
 RATE = 10e3
 
@@ -22,7 +22,7 @@ def test_the_mean_is_turns_over_time_whatever_noise_and_sign(
     rpm: float, each: int, is_inverse: bool, seed: int
 ) -> None:
     signal = pulses(rpm, each, width=0.3) + np.random.default_rng(seed).normal(scale=0.1, size=20_000)
-    speed = speed_of_pulses(-signal if is_inverse else signal, RATE, each)
+    speed = compute_speed_from_pulses(-signal if is_inverse else signal, RATE, each)
     assert np.nanmean(speed) == pytest.approx(rpm, rel=2e-4)
     assert np.isfinite(speed).mean() > 0.85
 
@@ -30,7 +30,7 @@ def test_the_mean_is_turns_over_time_whatever_noise_and_sign(
 def test_a_speed_that_ramps_is_followed() -> None:
     time = np.arange(40_000) / RATE
     turns = 50 * time + 5 * time**2  # 3000 to 5400 rpm
-    speed = speed_of_pulses(np.where(turns % 1 < 0.1, 1.0, 0.0), RATE)
+    speed = compute_speed_from_pulses(np.where(turns % 1 < 0.1, 1.0, 0.0), RATE)
     inside = np.isfinite(speed)
     assert np.allclose(speed[inside], 60 * (50 + 10 * time[inside]), rtol=0.03)
 
@@ -38,7 +38,7 @@ def test_a_speed_that_ramps_is_followed() -> None:
 def test_a_pulse_that_is_missing_leaves_the_speed_unknown_not_halved() -> None:
     signal = pulses(3000.0)
     signal[9900:10_150] = 0.2
-    speed = speed_of_pulses(signal, RATE)
+    speed = compute_speed_from_pulses(signal, RATE)
     assert np.isnan(speed[10_000])
     assert np.nanmean(speed) == pytest.approx(3000.0, rel=1e-3)
 
@@ -55,12 +55,12 @@ def test_a_pulse_that_is_missing_leaves_the_speed_unknown_not_halved() -> None:
 )
 def test_what_is_no_tachometer_is_refused(signal: np.ndarray, each: int, text: str) -> None:
     with pytest.raises(ValueError, match=text):
-        speed_of_pulses(signal, RATE, each)
+        compute_speed_from_pulses(signal, RATE, each)
 
 
 def test_a_pulse_begins_between_samples() -> None:
     turns, rate = 37.3, 2000.0  # 53.6 samples a turn: by whole samples turns differ by 1.9 %
-    speed = speed_of_pulses(np.sin(2 * np.pi * turns * np.arange(4000) / rate), rate)
+    speed = compute_speed_from_pulses(np.sin(2 * np.pi * turns * np.arange(4000) / rate), rate)
     known = speed[np.isfinite(speed)]
     assert known.size > 3800
     assert np.max(np.abs(known / (60 * turns) - 1)) < 2e-3

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
-from acquisition import DataError, Description, look, read_frf, read_hits
+from acquisition import DataError, Description, inspect_file, read_frf, read_hits
 
 
 def test_a_file_of_the_force_is_refused_beside_an_frf(tmp_path: Path) -> None:
@@ -45,7 +45,7 @@ def test_a_file_a_channel(tmp_path: Path) -> None:
         response, force=force, columns=columns
     )
     with pytest.raises(FileNotFoundError, match="nowhere"):
-        look(response, Description(force=tmp_path / "nowhere.txt"))
+        inspect_file(response, Description(force=tmp_path / "nowhere.txt"))
 
 
 @pytest.mark.parametrize("form", ["%.2E", "%.3f", "%.4f"])
@@ -58,7 +58,7 @@ def test_a_time_that_is_printed_with_few_digits(tmp_path: Path, form: str) -> No
     path = put(tmp_path / "a.txt", rows(printed, force, response))
     said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
     assert read_hits(path, said)[0].sample_rate == pytest.approx(4000, rel=3e-4)
-    assert any("few digits" in fact.value for fact in look(path, said).facts)
+    assert any("few digits" in fact.value for fact in inspect_file(path, said).facts)
 
 
 @pytest.mark.parametrize("lost", [1, 3])
@@ -111,7 +111,7 @@ BLOCK = rows(np.arange(1.0, 60.0), F, ACCELERANCE.real, ACCELERANCE.imag, separa
 @pytest.mark.parametrize("sign", [".", ","])
 def test_text_of_pulse(tmp_path: Path, sign: str) -> None:
     path = put(tmp_path / "a.txt", pulse(HEADER | {"Decimal Symbol": sign}, BLOCK.replace(".", sign)))
-    found = look(path).checked()
+    found = inspect_file(path).require_valid()
     assert found.frf is not None
     assert is_h(found.frf)
     assert f"{found.created:%Y-%m-%d %H:%M:%S}" == "2019-05-24 18:23:06"
@@ -122,16 +122,16 @@ def test_text_of_pulse(tmp_path: Path, sign: str) -> None:
     assert is_h(read_frf(two, Description(response=2)))
     cut = put(path, pulse(HEADER, BLOCK[: BLOCK.rindex("\r\n59") + 2]))
     with pytest.raises(DataError, match=r"line \d+: 58 of 59 rows are there; the file is cut short"):
-        look(cut)
+        inspect_file(cut)
     with pytest.raises(DataError, match="its header lacks 'x-axis size'"):
-        look(put(path, pulse({key: HEADER[key] for key in ("Decimal Symbol", "Data Type")}, BLOCK)))
+        inspect_file(put(path, pulse({key: HEADER[key] for key in ("Decimal Symbol", "Data Type")}, BLOCK)))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16", "utf-8"])
 def test_text_of_pulse_in_another_encoding(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "a.txt"
     path.write_bytes(pulse(HEADER, BLOCK).encode(encoding))
-    recording = look(path).checked()
+    recording = inspect_file(path).require_valid()
     assert recording.title == "B&K PULSE text"
     assert recording.frf is not None
     assert is_h(recording.frf)
@@ -155,4 +155,4 @@ def test_of_altered_bytes_nothing_else_than_a_message_comes(
     path = tmp_path / "a.txt"
     path.write_bytes(content)
     with contextlib.suppress(DataError):
-        look(path)
+        inspect_file(path)

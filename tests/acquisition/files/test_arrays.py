@@ -15,7 +15,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition import DataError, Description, Frf, look, read_frf, read_hits
+from acquisition import DataError, Description, Frf, inspect_file, read_frf, read_hits
 
 F = np.arange(1.0, 60.0)
 H = 1e-6 / (1 + 0.1j * F)
@@ -26,7 +26,7 @@ def is_h(frf: Frf, of: np.ndarray[Any, Any] = H) -> bool:
 
 
 def complaint(path: Path, **said: object) -> str:
-    return look(path, Description(**said)).complaint  # type: ignore[arg-type]
+    return inspect_file(path, Description(**said)).problems  # type: ignore[arg-type]
 
 
 def hdf5(path: Path, **arrays: Any) -> Path:
@@ -103,7 +103,7 @@ def test_data_sets_of_hdf5_by_path(tmp_path: Path, suffix: str) -> None:
     for end in (9, 100, len(content) // 2):
         path.write_bytes(content[:end])
         with pytest.raises(DataError, match=f"a{suffix}: damaged"):
-            look(path)
+            inspect_file(path)
 
 
 def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
@@ -206,17 +206,17 @@ def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     np.save(path, np.array([{"f": F}], dtype=object), allow_pickle=True)
     with pytest.raises(DataError, match=r"a\.npy: cannot be read \(Object arrays .*\); save its numbers alone"):
-        look(path)
+        inspect_file(path)
     np.save(path, H)
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(DataError, match=r"a\.npy: cannot be read"):
-        look(path)
+        inspect_file(path)
     bomb = tmp_path / "b.npz"
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("H.npy", "w") as member:
         for _ in range(11):
             member.write(bytes(10_000_000))
     with pytest.raises(DataError, match=r"b\.npz: .* MB that unpack to 110 MB; no tap test does"):
-        look(bomb)
+        inspect_file(bomb)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck), database=None)
@@ -237,7 +237,7 @@ def test_damaged_arrays_are_read_or_refused(
         content[place % len(content)] = byte
     path.write_bytes(content[: end % len(content) + 1] if not changes else content)
     with contextlib.suppress(DataError):
-        look(path, Description(unit="m/N", spacing=None if packed else 1.0))
+        inspect_file(path, Description(unit="m/N", spacing=None if packed else 1.0))
 
 
 def test_a_file_of_ours_stays_ours(tmp_path: Path) -> None:
@@ -245,4 +245,4 @@ def test_a_file_of_ours_stays_ours(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file.attrs["format"] = "lobewatch-cut"
     with pytest.raises(DataError, match="no tap test of lobewatch"):
-        look(path)
+        inspect_file(path)

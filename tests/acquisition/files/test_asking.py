@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import DataError, Description, Frf, look, read_frf, read_hits, read_recording
+from acquisition import DataError, Description, Frf, inspect_file, read_frf, read_hits, read_recording
 
 F = np.arange(1.0, 60.0)
 H = 1e-6 / (1 + 0.1j * F)
@@ -26,7 +26,7 @@ def put(path: Path, text: str) -> Path:
 
 
 def complaint(path: Path, **said: object) -> str:
-    return look(path, Description(**said)).complaint  # type: ignore[arg-type]
+    return inspect_file(path, Description(**said)).problems  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_headings_and_options_in_any_unit_give_the_same_receptance(
     path = put(tmp_path / "frf.txt", heading + rows(F, values.real, values.imag))
     frf = read_frf(path, Description(unit=unit if by_option else ""))
     assert frf.receptance == pytest.approx(H, rel=1e-7)
-    origins = {fact.name: fact.origin for fact in look(path, Description(unit=unit if by_option else "")).facts}
+    origins = {fact.name: fact.origin for fact in inspect_file(path, Description(unit=unit if by_option else "")).facts}
     assert origins["unit"] == ("option" if by_option else "file")
     assert origins["averages"] == "default"
 
@@ -166,7 +166,7 @@ def test_units_below_the_names_and_lines_above_them(tmp_path: Path) -> None:
     text = rows(time, force, response, separator=";").replace(".", ",")
     path = put(tmp_path / "hit.csv", f"Analyser 7\nmeasured by;me\nZeit;Kraft;Beschleunigung\ns;N;g\n{text}")
     assert read_hits(path)[0].acceleration == pytest.approx(response * 9.80665, abs=1e-6)
-    assert not look(path).complaint
+    assert not inspect_file(path).problems
 
 
 def test_text_of_two_bytes_a_character(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from written_tables import FORCE, HIT, RESPONSE, F, H, complaint, is_h, numeral, put, rows
 
-from acquisition import DataError, Description, Fact, look, read_frf, read_hits
-from acquisition.files.read_sound import read_sound
+from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
+from acquisition.files.read_cut import read_cut_recording
 
 HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
 
@@ -53,7 +53,7 @@ def test_columns_are_cut_to_the_shortest_that_is_used(
 ) -> None:
     lines = cells_of(separator, ends=ends).splitlines()
     text = "".join((line if is_filled_up else line.rstrip(separator)) + "\n" for line in lines)
-    found = look(put(tmp_path / "a.csv", text)).checked()
+    found = inspect_file(put(tmp_path / "a.csv", text)).require_valid()
     (hit,), n = found.hits, min(ends[:3])
     name = ("Time", "Force", "Acc")[ends.index(n)]
     assert Fact("rows", f"{n} of {max(ends[:3])}, as {name} ends there", "default") in found.facts
@@ -73,7 +73,7 @@ def test_numbers_beside_the_first_rows_are_notes_where_all_rows_have_as_many_cel
     longer = path.read_text().splitlines()
     longer[n] += f"{separator}5"
     with pytest.raises(DataError, match=f"line {n + 1}: 5 numbers where other rows have 3"):
-        look(put(tmp_path / "b.csv", "\n".join(longer) + "\n"))
+        inspect_file(put(tmp_path / "b.csv", "\n".join(longer) + "\n"))
 
 
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_an_frf_is_cut_where_its_coherence_ends_and_refused_for_a_gap(tmp_path: 
     lines = [row + "\n" for row in rows(F, H.real, H.imag, 0.9 + 0 * F, separator=",").split()]
     head = "Freq (Hz),Real (m/N),Imag (m/N),Coherence\n"
     ended = [row.replace(",0.9", ",") if i >= 40 else row for i, row in enumerate(lines)]
-    found = look(put(tmp_path / "a.csv", head + "".join(ended))).checked()
+    found = inspect_file(put(tmp_path / "a.csv", head + "".join(ended))).require_valid()
     assert found.frf is not None
     assert found.frf.frequency.tolist() == F[:40].tolist()
     assert found.frf.receptance == pytest.approx(H[:40], rel=1e-9)
@@ -180,8 +180,8 @@ def test_lvm_with_gaps_and_thousands_apart(tmp_path: Path, sign: str, other: str
 def test_a_cut_is_heard_to_where_its_sensor_ends(tmp_path: Path) -> None:
     lines = [f"{t},{a if i < 300 else ''},{3000 if i < 350 else ''}\n" for i, (t, _, a, _) in enumerate(HIT)]
     path = put(tmp_path / "a.csv", "Time (s),Acc (m/s^2),Speed (rpm)\n" + "".join(lines))
-    sound = read_sound(path)
+    sound = read_cut_recording(path)
     assert sound.acceleration == pytest.approx(RESPONSE[:300], abs=1e-7)
     path.write_text(path.read_text().replace(f"\n{HIT[9][0]},{HIT[9][2]},", f"\n{HIT[9][0]},,"))
     with pytest.raises(DataError, match="Acc is empty in line 11"):
-        read_sound(path)
+        read_cut_recording(path)

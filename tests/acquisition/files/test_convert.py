@@ -13,11 +13,22 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition import DataError, Description, Frf, Hit, TapTest, convert, from_accelerance, look, read_hits, write_tap
-from acquisition.files.convert import WRITERS
-from acquisition.files.writers.labels import Labels
-from acquisition.frf import Quantity
-from acquisition.tap import Circumstances, new_tap_id
+from acquisition import (
+    DataError,
+    Description,
+    Frf,
+    Hit,
+    TapTest,
+    convert,
+    from_accelerance,
+    inspect_file,
+    read_hits,
+    write_tap,
+)
+from acquisition.files.convert import EXPORT_FORMATS
+from acquisition.files.writers import ExportLabels
+from acquisition.frf import FrfQuantity
+from acquisition.tap_test import Circumstances, new_tap_id
 
 NOTHING = Description()
 WHEN = datetime(2024, 5, 1, 9, 30, tzinfo=UTC)
@@ -34,7 +45,7 @@ def frfs(draw: st.DrawFn) -> Frf:
     pairs = generator.normal(size=2 * n) * 10.0 ** draw(st.integers(-12, 3))
     values = pairs.view(np.complex128)
     coherence = generator.uniform(0, 1, n) if draw(st.booleans()) else None
-    form = draw(st.sampled_from(get_args(Quantity)))
+    form = draw(st.sampled_from(get_args(FrfQuantity)))
     made = Frf(frequency, values, coherence, draw(st.integers(1, 99)))
     return (
         replace(made, measured_as=form)
@@ -47,11 +58,11 @@ def frfs(draw: st.DrawFn) -> Frf:
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(frf=frfs(), direction=st.sampled_from(["x", "y"]))
 def test_an_frf_survives(extension: str, tmp_path: Path, frf: Frf, direction: str) -> None:
-    writer = WRITERS[extension]
-    assert writer.of_frf is not None
+    writer = EXPORT_FORMATS[extension]
+    assert writer.encode_frf is not None
     path = tmp_path / f"a{extension}"
-    path.write_bytes(writer.of_frf(frf, Labels(WHEN, direction, 'mill; "20"')))
-    found = look(path).checked()
+    path.write_bytes(writer.encode_frf(frf, ExportLabels(WHEN, direction, 'mill; "20"')))
+    found = inspect_file(path).require_valid()
     assert found.frf is not None
     digits = 2e-11 if extension == ".uff" else 1e-14
     scale = np.max(np.abs(frf.receptance))
@@ -77,8 +88,8 @@ def a_hit(number: int, n: int = 400) -> Hit:
 def test_hits_survive(extension: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{extension}"
     hits = [a_hit(1), a_hit(2), a_hit(3)]
-    path.write_bytes(WRITERS[extension].of_hits(hits, Labels(WHEN, "y")))
-    found = look(path).checked()
+    path.write_bytes(EXPORT_FORMATS[extension].encode_hits(hits, ExportLabels(WHEN, "y")))
+    found = inspect_file(path).require_valid()
     assert len(found.hits) == 3
     for old, new in zip(hits, found.hits, strict=True):
         assert new.force == pytest.approx(old.force, rel=2e-11)
@@ -96,7 +107,7 @@ def test_a_tap_file_becomes_each_format(tmp_path: Path) -> None:
     write_tap(tap, TapTest(new_tap_id(about), about, frf))
     for extension in OF_FRF:
         made = convert(tap, tmp_path / f"out{extension}", NOTHING)
-        back = look(made.path).checked()
+        back = inspect_file(made.path).require_valid()
         assert back.frf is not None
         assert back.frf.receptance == pytest.approx(frf.receptance, rel=1e-10)
         assert (back.direction, back.tool, back.created) == ("y", "cutter", WHEN)
@@ -117,7 +128,7 @@ def test_a_real_hit_becomes_a_text_table_and_back(beam: Path, tmp_path: Path) ->
 
 def test_sep005_has_what_the_guideline_asks_for(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
-    path.write_bytes(WRITERS[".json"].of_hits([a_hit(1, 8)], Labels(WHEN)))
+    path.write_bytes(EXPORT_FORMATS[".json"].encode_hits([a_hit(1, 8)], ExportLabels(WHEN)))
     for one in json.loads(path.read_bytes()):
         assert {"data", "name", "unit_str", "fs"} <= one.keys()
         assert one["start_timestamp"] == "2024-05-01T09:30:00+00:00"
@@ -133,8 +144,8 @@ def test_sep005_in_g_is_converted_and_without_a_unit_asked_for(tmp_path: Path) -
     assert read_hits(path)[0].acceleration == pytest.approx(hit.acceleration * 9.80665)
     channels[1]["unit_str"] = ""
     path.write_text(json.dumps(channels))
-    assert "the unit of acc (--unit" in look(path).complaint
+    assert "the unit of acc (--unit" in inspect_file(path).problems
     del channels[1]["fs"]
     path.write_text(json.dumps(channels))
     with pytest.raises(DataError, match="channel 2 has no fs"):
-        look(path)
+        inspect_file(path)

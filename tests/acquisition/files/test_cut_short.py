@@ -13,9 +13,9 @@ import scipy.io.wavfile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition import Circumstances, DataError, Description, Frf, Hit, TapTest, look, new_tap_id, write_tap
-from acquisition.files.convert import WRITERS
-from acquisition.files.writers.labels import Labels
+from acquisition import Circumstances, DataError, Description, Frf, Hit, TapTest, inspect_file, new_tap_id, write_tap
+from acquisition.files.convert import EXPORT_FORMATS
+from acquisition.files.writers import ExportLabels
 
 RANDOM = np.random.default_rng(1)
 HIT = Hit(RANDOM.normal(size=40), RANDOM.normal(size=40), 1000.0)
@@ -54,17 +54,17 @@ def tap_file(path: Path) -> None:
 
 def of_hits(extension: str) -> Callable[[Path], None]:
     def made(path: Path) -> None:
-        path.write_bytes(WRITERS[extension].of_hits([HIT], Labels()))
+        path.write_bytes(EXPORT_FORMATS[extension].encode_hits([HIT], ExportLabels()))
 
     return made
 
 
 def of_frf(extension: str) -> Callable[[Path], None]:
-    write = WRITERS[extension].of_frf
+    write = EXPORT_FORMATS[extension].encode_frf
     assert write is not None
 
     def made(path: Path) -> None:
-        path.write_bytes(write(FRF, Labels()))
+        path.write_bytes(write(FRF, ExportLabels()))
 
     return made
 
@@ -94,17 +94,17 @@ SAID = {"hit.wav": Description(columns=("force [N]", "acceleration [g]"), full_s
 def test_a_file_cut_at_any_byte_gives_no_other_numbers(tmp_path: Path, name: str) -> None:
     MADE[name](tmp_path / name)
     content, cut, said = (tmp_path / name).read_bytes(), tmp_path / f"cut {name}", SAID.get(name, Description())
-    whole = look(tmp_path / name, said).checked()
+    whole = inspect_file(tmp_path / name, said).require_valid()
 
     @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
     @given(st.integers(0, len(content) - 1) | st.integers(len(content) - 12, len(content) - 1))
     def check(end: int) -> None:
         cut.write_bytes(content[:end])
         try:
-            found = look(cut, said)
+            found = inspect_file(cut, said)
         except DataError:
             return
-        if not found.complaint:
+        if not found.problems:
             assert_begins(found.frf, whole.frf, may_be_shorter=name == "uncounted.csv")
             for one, other in zip(found.hits, whole.hits, strict=True):
                 assert one.force.tolist() == other.force.tolist()
@@ -129,7 +129,7 @@ def test_our_table_cut_at_each_byte_is_refused(tmp_path: Path, name: str) -> Non
     for end in range(len(content)):
         cut.write_bytes(content[:end])
         with pytest.raises(DataError, match=r"cut\.csv"):
-            look(cut)
+            inspect_file(cut)
 
 
 def test_a_table_of_ours_with_other_rows_than_it_says_is_refused_with_the_place(tmp_path: Path) -> None:
@@ -142,14 +142,14 @@ def test_a_table_of_ours_with_other_rows_than_it_says_is_refused_with_the_place(
     ):
         (tmp_path / "a.csv").write_text("".join(lines))
         with pytest.raises(DataError, match=place):
-            look(tmp_path / "a.csv")
+            inspect_file(tmp_path / "a.csv")
 
 
 def test_rows_that_another_program_counts_are_not_ours_to_judge(tmp_path: Path) -> None:
     of_frf(".csv")(tmp_path / "a.csv")
     text = (tmp_path / "a.csv").read_text().replace("written by: lobewatch", "written by: another")
     (tmp_path / "a.csv").write_text(text.replace("# rows: 40", "# rows: 41").rstrip())
-    frf = look(tmp_path / "a.csv").checked().frf
+    frf = inspect_file(tmp_path / "a.csv").require_valid().frf
     assert frf is not None
     assert np.array_equal(frf.receptance, FRF.receptance)
 
@@ -157,6 +157,6 @@ def test_rows_that_another_program_counts_are_not_ours_to_judge(tmp_path: Path) 
 def test_a_table_of_ours_with_the_line_ends_of_windows_is_read(tmp_path: Path) -> None:
     of_frf(".csv")(tmp_path / "a.csv")
     (tmp_path / "a.csv").write_bytes((tmp_path / "a.csv").read_bytes().replace(b"\n", b"\r\n"))
-    frf = look(tmp_path / "a.csv").checked().frf
+    frf = inspect_file(tmp_path / "a.csv").require_valid().frf
     assert frf is not None
     assert np.array_equal(frf.receptance, FRF.receptance)

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition import Channel, DataError
 from acquisition.files.cut_file import CutSignal, write_cut_signal
-from acquisition.files.read_sound import read_sound
+from acquisition.files.read_cut import read_cut_recording
 
 CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
 CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
@@ -49,7 +49,7 @@ def refused(recording: Path, rounds: int) -> int:
         spoilt = damaged(content, random.Random(seed))
         recording.write_bytes(spoilt)
         try:
-            sound = read_sound(recording)
+            sound = read_cut_recording(recording)
         except DataError:
             count += 1
         else:

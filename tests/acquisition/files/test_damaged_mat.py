@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from acquisition import DataError, Description, Frf, Hit, look, read_frf
-from acquisition.files.convert import WRITERS
+from acquisition import DataError, Description, Frf, Hit, inspect_file, read_frf
+from acquisition.files.convert import EXPORT_FORMATS
 from acquisition.files.readers import mat_variables
-from acquisition.files.writers.labels import Labels
+from acquisition.files.writers import ExportLabels
 
 DATA = Path(__file__).parents[2] / "data"
 F = np.arange(2.0, 100.0, 2.0)
@@ -62,11 +62,11 @@ def sound_files() -> dict[str, bytes]:
     files = {path.name: path.read_bytes() for path in sorted(DATA.glob("*/*.mat"))}
     generator = np.random.default_rng(1)
     hits = [Hit(generator.normal(size=60), generator.normal(size=60), 1000.0) for _ in range(3)]
-    writer = WRITERS[".mat"]
-    assert writer.of_frf is not None
+    writer = EXPORT_FORMATS[".mat"]
+    assert writer.encode_frf is not None
     files |= {
-        "our FRF": writer.of_frf(Frf(F, H, np.full(F.size, 0.9), 5), Labels()),
-        "our hits": writer.of_hits(hits, Labels()),
+        "our FRF": writer.encode_frf(Frf(F, H, np.full(F.size, 0.9), 5), ExportLabels()),
+        "our hits": writer.encode_hits(hits, ExportLabels()),
     }
     values = {"values": H[:, None], "quantity": {"label": "(m/s^2)/N"}}
     test_lab = {"FRF": {"x_values": {"start_value": 0.0, "increment": 2.0}, "y_values": values}}
@@ -145,7 +145,7 @@ for line in sys.stdin:
 @pytest.fixture
 def forks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Forks]:
     made = Forks()
-    monkeypatch.setattr(mat_variables, "run_apart", made.run_apart)
+    monkeypatch.setattr(mat_variables, "run_in_subprocess", made.run_apart)
     yield made
     made.close()
 
@@ -153,7 +153,7 @@ def forks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Forks]:
 def outcome(path: Path) -> str:
     """What becomes of a file."""
     try:
-        if look(path).complaint:
+        if inspect_file(path).problems:
             return "asked about"
         read_frf(path)
     except DataError as error:
@@ -191,7 +191,7 @@ def test_a_file_that_would_be_read_for_hours_is_refused_after_seconds(tmp_path: 
     (tmp_path / "a.mat").write_bytes(content)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with pytest.raises(DataError, match=r"a\.mat: damaged: its reader crashes or hangs on it; export it anew"):
-        look(tmp_path / "a.mat")
+        inspect_file(tmp_path / "a.mat")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 30
 

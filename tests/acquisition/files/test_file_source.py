@@ -23,7 +23,7 @@ from acquisition import (
     SimulatedSource,
     TapTest,
     Trigger,
-    average_good,
+    average_good_hits,
     capture_hits,
     check_hit,
     estimate_frf,
@@ -41,7 +41,7 @@ def tap_file(path: Path, tapper: Callable[..., HammeredStructure], channels: Pai
     source = SimulatedSource(tapper(double_hits=0.3, overloads=0.2), channels, 25600.0, 120_000)
     first, second, *others = capture_hits(source, TRIGGER)
     hits = (replace(first, lost_scans=7), replace(second, overload=2), *others)
-    frf, flags = average_good(hits)
+    frf, flags = average_good_hits(hits)
     tap = TapTest(new_tap_id(ABOUT), ABOUT, frf, hits, flags)
     write_tap(path, tap)
     return tap

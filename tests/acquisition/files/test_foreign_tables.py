@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
-from acquisition import DataError, Description, look, read_frf, read_hits, read_recording
+from acquisition import DataError, Description, inspect_file, read_frf, read_hits, read_recording
 
 
 @pytest.mark.parametrize(
@@ -100,13 +100,13 @@ def test_headings_that_are_comments_or_names_and_units_in_turn(tmp_path: Path, h
 
 def test_words_below_the_rows_are_told_and_a_broken_last_row_is_refused(tmp_path: Path) -> None:
     text = "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag)
-    found = look(put(tmp_path / "a.txt", f"{text}End of file\n")).checked()
+    found = inspect_file(put(tmp_path / "a.txt", f"{text}End of file\n")).require_valid()
     assert found.frf is not None
     assert is_h(found.frf)
     assert "below its rows stands 'End of file'" in [fact.value for fact in found.facts]
     for last in ("60\toverflow\tx\n", "nan\tnan\tnan\n", "x\t2\t3\n"):
         with pytest.raises(DataError, match=r"line 61|not finite|rising"):
-            look(put(tmp_path / "a.txt", text + last)).checked()
+            inspect_file(put(tmp_path / "a.txt", text + last)).require_valid()
 
 
 def test_a_column_of_clock_times_and_empty_columns_are_left_out(tmp_path: Path) -> None:
@@ -124,14 +124,16 @@ def test_a_column_of_clock_times_and_empty_columns_are_left_out(tmp_path: Path) 
 
 def test_a_column_of_words_is_told(tmp_path: Path) -> None:
     lines = rows(F, H.real, H.imag).replace("\n", "\tok\n")
-    found = look(put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n" + lines)).checked()
+    found = inspect_file(
+        put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n" + lines)
+    ).require_valid()
     assert "beside its columns stands 'ok' in the last row" in [fact.value for fact in found.facts]
 
 
 def test_numbers_above_a_text_are_no_table(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "1 a\n2 b\n3 c\n" + "words alone\n" * 20 + "4 words\n")
     with pytest.raises(DataError, match=r"a\.txt: line 1: no rows of numbers begin here; pass over .* --skip"):
-        look(path)
+        inspect_file(path)
 
 
 def test_a_line_at_0_hz_that_is_no_number_is_left_out(tmp_path: Path) -> None:
@@ -197,9 +199,9 @@ def layouts(draw: st.DrawFn) -> tuple[str, bool, bool]:
 def test_whatever_the_layout_two_commands_read_it(tmp_path: Path, layout: tuple[str, bool, bool]) -> None:
     text, is_said, with_index = layout
     path = put(tmp_path / "a.txt", text)
-    found = look(path)
-    assert bool(found.complaint) is not is_said
+    found = inspect_file(path)
+    assert bool(found.problems) is not is_said
     columns = ("-",) * with_index + ("frequency [Hz]", "real [m/N]", "imag")
-    found = found if is_said else look(path, Description(columns=columns))
-    assert found.checked().frf is not None
+    found = found if is_said else inspect_file(path, Description(columns=columns))
+    assert found.require_valid().frf is not None
     assert is_h(found.frf)  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import known_formats, read_hits
+from acquisition import list_formats, read_hits
 
 PLUGIN = Path(__file__).parents[2] / "plugins" / "dummy_format"
 RATE = 25600.0
@@ -135,7 +135,7 @@ def test_a_format_that_fails_on_a_file_is_left_out_or_named(tmp_path: Path, beam
 
 
 def test_recordings_are_told_by_content_whatever_their_name(beam: Path, tmp_path: Path) -> None:
-    assert [one.name for one in known_formats()] == [
+    assert [one.name for one in list_formats()] == [
         *("tap-file", "uff", "mat", "lvm", "tdms", "wav", "sep005", "numpy", "hdf5", "pulse", "table")
     ]
     renamed = tmp_path / "beam.csv"

@@ -14,9 +14,9 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 
-from acquisition import DataError, Description, Hit, look, read_frf, read_hits
-from acquisition.files.convert import WRITERS
-from acquisition.files.writers.labels import Labels
+from acquisition import DataError, Description, Hit, inspect_file, read_frf, read_hits
+from acquisition.files.convert import EXPORT_FORMATS
+from acquisition.files.writers import ExportLabels
 
 F = np.arange(0.0, 100.0, 2.0)
 H = 1e-6 / (1 + 0.2j * F)
@@ -49,7 +49,7 @@ def uff_with(path: Path, *, binary: bool = False, unit: str = "m/s^2", direction
 
 @pytest.mark.parametrize("binary", [True, False])
 def test_uff_ascii_and_binary_hold_the_same(tmp_path: Path, binary: bool) -> None:
-    found = look(uff_with(tmp_path / "a.uff", binary=binary)).checked()
+    found = inspect_file(uff_with(tmp_path / "a.uff", binary=binary)).require_valid()
     assert found.frf is not None
     assert found.frf.accelerance == pytest.approx(H[1:], rel=1e-10)
     assert found.frf.n_averages == 7
@@ -60,13 +60,13 @@ def test_uff_ascii_and_binary_hold_the_same(tmp_path: Path, binary: bool) -> Non
 def test_a_hammer_against_the_axis_turns_the_frf_round(tmp_path: Path) -> None:
     turned = read_frf(uff_with(tmp_path / "a.uff", direction=(2, -2)))
     assert turned.accelerance == pytest.approx(-H[1:], rel=1e-10)
-    assert look(tmp_path / "a.uff").direction == "y"
+    assert inspect_file(tmp_path / "a.uff").direction == "y"
 
 
 def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None:
     path = uff_with(tmp_path / "a.uff", unit="NONE")
-    assert "--unit" in look(path).complaint
-    assert "a unit of displacement" in look(path, Description(unit="m/N")).complaint
+    assert "--unit" in inspect_file(path).problems
+    assert "a unit of displacement" in inspect_file(path, Description(unit="m/N")).problems
     assert read_frf(path, Description(unit="g/N")).accelerance == pytest.approx(9.80665 * H[1:], rel=1e-10)
     system = (
         "    -1\n   164\n         9mm, newton                   2\n  1.0D+03  1.0D+00  1.0D+00\n  0.0D+00\n    -1\n"
@@ -131,7 +131,7 @@ def test_signal_calc_has_the_frequency_in_the_first_column(tmp_path: Path) -> No
     scipy.io.savemat(
         tmp_path / "a.mat", {**variables, "ChanName": names, "Unit": units, "X1": np.stack([F, F], axis=1)}
     )
-    assert "1 H1_2 tip, 2 H1_3 nut" in look(tmp_path / "a.mat").complaint
+    assert "1 H1_2 tip, 2 H1_3 nut" in inspect_file(tmp_path / "a.mat").problems
     frf = read_frf(tmp_path / "a.mat", Description(response=2))
     assert frf.accelerance == pytest.approx(3 * 9.80665 * H[1:])
     assert frf.coherence == pytest.approx(0.3)
@@ -140,7 +140,7 @@ def test_signal_calc_has_the_frequency_in_the_first_column(tmp_path: Path) -> No
 def test_vectors_over_time_with_a_rate(tmp_path: Path) -> None:
     force, acceleration = np.sin(np.arange(50.0)), np.cos(np.arange(50.0))
     scipy.io.savemat(tmp_path / "a.mat", {"fs": 2048.0, "force": force, "acc": acceleration})
-    assert "--force-unit" in look(tmp_path / "a.mat").complaint
+    assert "--force-unit" in inspect_file(tmp_path / "a.mat").problems
     (hit,) = read_hits(tmp_path / "a.mat", Description(unit="g", force_unit="lbf"))
     assert hit.sample_rate == 2048
     assert hit.force == pytest.approx(force * 4.4482216152605)
@@ -153,7 +153,7 @@ def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
     scipy.io.wavfile.write(tmp_path / "a.wav", 48000, (shares * top).astype(kind))
     assert (
         "--full-scale 500,50"
-        in look(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).complaint
+        in inspect_file(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).problems
     )
     said = Description(columns=("force [N]", "acceleration [m/s^2]"), full_scale=(500.0, 50.0))
     (hit,) = read_hits(tmp_path / "a.wav", said)
@@ -176,7 +176,7 @@ def test_tdms_with_units_and_without_the_package(tmp_path: Path, monkeypatch: py
     assert hit.acceleration == pytest.approx(9.80665 * hit.force)
     monkeypatch.setitem(sys.modules, "nptdms", None)
     with pytest.raises(DataError, match=r'pip install "lobewatch\[tdms\]"'):
-        look(path)
+        inspect_file(path)
 
 
 TWICE = np.sort(np.append(np.arange(63.0), 20.0)) / 25600
@@ -245,7 +245,7 @@ def test_a_time_that_is_there_twice_is_refused(tmp_path: Path, make: Callable[..
     with pytest.raises(DataError, match=r"its time steps are uneven: .* twice there"):
         read_hits(path, said)
     make(path, np.arange(64.0) / 25600, *signals)
-    assert "uneven" not in look(path, said).complaint
+    assert "uneven" not in inspect_file(path, said).problems
 
 
 def test_a_frequency_that_is_there_twice_is_refused(tmp_path: Path) -> None:
@@ -262,9 +262,9 @@ def one_of_each(folder: Path) -> dict[str, Path]:
     generator = np.random.default_rng(1)
     hit = Hit(generator.normal(size=60), generator.normal(size=60), 1000.0)
     made = {}
-    for extension, writer in WRITERS.items():
+    for extension, writer in EXPORT_FORMATS.items():
         made[extension] = folder / f"sound{extension}"
-        made[extension].write_bytes(writer.of_hits([hit], Labels()))
+        made[extension].write_bytes(writer.encode_hits([hit], ExportLabels()))
     made["binary"] = uff_with(folder / "binary.uff", binary=True)
     made["7.3"] = mat_73(folder / "newer.mat", {"freq": F[:20], "frf": H[:20]})
     made[".wav"] = folder / "sound.wav"
@@ -280,15 +280,15 @@ def test_a_file_that_is_cut_short_is_refused_or_asks_and_never_gives_other_numbe
             if kind == ".wav"
             else Description()
         )
-        whole = look(path, said)
+        whole = inspect_file(path, said)
         cuts = 5 if path.suffix == ".mat" else 40  # each is read by a program of its own first
         for end in {*range(1, len(content) - 2, max(len(content) // cuts, 1)), len(content) - 3}:
             cut.write_bytes(content[:end])
             try:
-                found = look(cut, said)
+                found = inspect_file(cut, said)
             except DataError:
                 continue
-            if found.complaint:
+            if found.problems:
                 continue
             assert found.frf is None, (kind, end)
             assert [hit.force.tolist() for hit in found.hits] == [hit.force.tolist() for hit in whole.hits], (kind, end)
@@ -297,10 +297,10 @@ def test_a_file_that_is_cut_short_is_refused_or_asks_and_never_gives_other_numbe
 def test_a_mat_file_on_which_its_reader_crashes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"freq": F, "frf": H})
-    assert not look(path, Description(unit="m/N")).complaint
+    assert not inspect_file(path, Description(unit="m/N")).problems
     monkeypatch.setattr(sys, "executable", "false")
     with pytest.raises(DataError, match="its reader crashes or hangs on it"):
-        look(path)
+        inspect_file(path)
 
 
 def test_a_small_mat_file_that_unpacks_to_much_is_refused_unread(tmp_path: Path) -> None:
@@ -308,4 +308,4 @@ def test_a_small_mat_file_that_unpacks_to_much_is_refused_unread(tmp_path: Path)
     with h5py.File(path, "r+") as file:
         file.create_dataset("big", shape=(100_000_000,), dtype="f8", chunks=(100_000,), compression="gzip")
     with pytest.raises(DataError, match=r"bomb\.mat: .* MB that unpack to 800"):
-        look(path)
+        inspect_file(path)

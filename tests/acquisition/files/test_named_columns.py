@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
-from acquisition import DataError, Description, look, read_frf, read_recording
+from acquisition import DataError, Description, inspect_file, read_frf, read_recording
 
 
 def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
@@ -21,7 +21,7 @@ def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
     npy = tmp_path / "a.npy"
     np.save(npy, H)
     with pytest.raises(DataError, match="--skip 4: a NumPy file is no text of lines; leave the option out"):
-        look(npy, Description(skip=4))
+        inspect_file(npy, Description(skip=4))
 
 
 SPELLINGS: dict[str, Callable[[complex], str]] = {

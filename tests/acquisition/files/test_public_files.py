@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import scipy.io
 
-from acquisition import DataError, Description, look, read_frf, read_hits
+from acquisition import DataError, Description, inspect_file, read_frf, read_hits
 
 DATA = Path(__file__).parents[2] / "data"
 
 
 def test_an_analysers_mat_file_with_frf_and_coherence() -> None:
     path = DATA / "vibrationtesting" / "case1.mat"
-    assert look(path).complaint == "it does not say: the unit of Hf_chan_2 (--unit, such as m/N, um/N, g/N)"
+    assert inspect_file(path).problems == "it does not say: the unit of Hf_chan_2 (--unit, such as m/N, um/N, g/N)"
     frf = read_frf(path, Description(unit="m/s^2/N", averages=10))
     raw = scipy.io.loadmat(path, squeeze_me=True)
     assert frf.frequency == pytest.approx(raw["Freq_domain"][1:])
@@ -35,7 +35,7 @@ def test_the_hit_beside_it_is_taken_by_its_names() -> None:
 
 def test_receptances_of_several_points_in_big_endian() -> None:
     path = DATA / "vibrationtesting" / "mckiddat.mat"
-    said = look(path).complaint
+    said = inspect_file(path).problems
     assert "which of its 3 FRFs is meant: 1 Recep:1, 2 Recep:2, 3 Recep:3 (--response 1)" in said
     assert "--unit" in said
     frf = read_frf(path, Description(response=2, unit="m/N"))
@@ -68,8 +68,8 @@ def test_uff_files_that_are_no_tap_test_say_why(name: str, said: str) -> None:
 
 
 def test_a_uff_frf_with_signs_that_are_no_ascii() -> None:
-    recording = look(DATA / "pyuff_uff58" / "non_ascii_header.uff")
-    assert not recording.complaint
+    recording = inspect_file(DATA / "pyuff_uff58" / "non_ascii_header.uff")
+    assert not recording.problems
     assert recording.frf is not None
     assert recording.frf.accelerance == pytest.approx(
         [
@@ -108,12 +108,12 @@ def test_lvm_with_a_time_column_for_each_channel(tmp_path: Path) -> None:
 def test_lvm_with_empty_channels_and_several_responses(tmp_path: Path) -> None:
     path = tmp_path / "empty.lvm"
     path.write_text(lengthened("with_empty_fields.lvm", 10), encoding="latin-1")
-    assert "what its columns are (Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1)" in look(path).complaint
+    assert "what its columns are (Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1)" in inspect_file(path).problems
     (hit,) = read_hits(path, Description(columns=("acceleration [g]", "force [N]", "-")))
     assert hit.force[0] == pytest.approx(7.254639)
     three = tmp_path / "three.lvm"
     three.write_text(lengthened("no_decimal_separator.lvm", 10), encoding="latin-1")
-    assert "1 ax, 2 ay, 3 az (--response 1)" in look(three).complaint
+    assert "1 ax, 2 ay, 3 az (--response 1)" in inspect_file(three).problems
     columns = ("force [N]=ax", "acceleration [g]=az")
     assert read_hits(three, Description(columns=columns))[0].acceleration[0] == pytest.approx(0.021503 * 9.80665)
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition import Frf, from_accelerance, look
-from acquisition.files.writers.labels import Labels
-from acquisition.files.writers.write_uff import uff_of_frf
+from acquisition import Frf, from_accelerance, inspect_file
+from acquisition.files.writers import ExportLabels, encode_uff_frf
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -33,7 +32,7 @@ def test_it_reads_what_we_write(tmp_path: Path, even: bool) -> None:
     frf = Frf(F, np.asarray(H, dtype=np.complex128), np.linspace(0, 1, F.size), 12)
     frf = frf if even else uneven(frf)
     path = tmp_path / "ours.uff"
-    path.write_bytes(uff_of_frf(frf, Labels(datetime(2024, 5, 1, 9, 30, tzinfo=UTC), "y", "cutter")))
+    path.write_bytes(encode_uff_frf(frf, ExportLabels(datetime(2024, 5, 1, 9, 30, tzinfo=UTC), "y", "cutter")))
     sets = pyuff.UFF(str(path)).read_sets()
     assert [one["type"] for one in sets] == [151, 164, 58, 58]
     assert (sets[1]["units_code"], sets[1]["length"], sets[1]["force"]) == (1, 1.0, 1.0)
@@ -78,7 +77,7 @@ def test_we_read_what_it_writes(tmp_path: Path, binary: int, even: int) -> None:
     )
     path = tmp_path / "theirs.uff"
     pyuff.UFF(str(path)).write_sets(made, "add")
-    found = look(path).checked()
+    found = inspect_file(path).require_valid()
     assert found.frf is not None
     assert found.frf.frequency == pytest.approx(frf.frequency, rel=1e-6)
     assert found.frf.receptance == pytest.approx(-frf.receptance, rel=5e-6)

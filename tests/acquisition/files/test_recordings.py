@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import DataError, Description, HitFlags, check_hit, look, read_frf, read_hits, read_recording
+from acquisition import DataError, Description, HitFlags, check_hit, inspect_file, read_frf, read_hits, read_recording
 
 N = 2000
 RATE = 5000.0
@@ -30,7 +30,7 @@ def test_real_lvm_with_decimal_comma_is_read_in_si(beam: Path) -> None:
     assert np.max(hit.force) == pytest.approx(195.605522)
     assert hit.acceleration[0] == pytest.approx(-0.007387 * 9.80665)
     assert check_hit(hit) == HitFlags.OK
-    assert f"{look(beam).created:%Y-%m-%d %H:%M:%S}" == "2018-12-17 10:18:21"
+    assert f"{inspect_file(beam).created:%Y-%m-%d %H:%M:%S}" == "2018-12-17 10:18:21"
 
 
 def test_real_cnc_table_is_refused_with_all_its_faults(cnc_csv: Path) -> None:
@@ -171,7 +171,7 @@ def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_p
 
 def test_a_file_that_does_not_tell_its_time_says_none(tmp_path: Path) -> None:
     path = table(tmp_path / "hit.csv", "time_s,force_N,acc_g", TIME, FORCE, ACCELERATION)
-    assert look(path).created is None
+    assert inspect_file(path).created is None
 
 
 def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:

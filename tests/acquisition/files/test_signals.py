@@ -10,7 +10,17 @@ import numpy as np
 import pytest
 import scipy.io
 
-from acquisition import DataError, Description, HitFlags, Structure, check_hit, convert, look, read_frf, read_hits
+from acquisition import (
+    DataError,
+    Description,
+    HitFlags,
+    Structure,
+    check_hit,
+    convert,
+    inspect_file,
+    read_frf,
+    read_hits,
+)
 
 RATE = 8000.0
 STRUCTURE = Structure(np.array([400.0]), np.array([0.03]), np.array([2e7]))
@@ -48,7 +58,7 @@ def test_hits_found_within_one_record_are_those_that_were_made_one_by_one(tmp_pa
         assert abs(int(np.argmax(hit.force)) - round((0.02 + WIDTH / 2) * RATE)) <= 3
         at = int(np.flatnonzero(np.isclose(force, hit.force[0], atol=1e-7))[0])
         assert abs(at - begin) <= 3
-    facts = {fact.name: (fact.value, fact.origin) for fact in look(path).facts}
+    facts = {fact.name: (fact.value, fact.origin) for fact in inspect_file(path).facts}
     assert facts["hits"][0].startswith("3 in one record")
     frf = read_frf(path)
     assert frf.n_averages == 3
@@ -88,23 +98,23 @@ def test_a_hit_before_the_structure_is_at_rest_is_none_of_its_own(tmp_path: Path
 def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> None:
     time, force, response = tapped([0.3], 1.2)
     path = put(tmp_path / "a.txt", "time_s\tforce_V\tacc_mV", time, 2.25e-3 * force, 1e3 * 10e-3 / 9.80665 * response)
-    assert 'sensitivity of each of force [V], acc [mV], in their order (--sensitivity "' in look(path).complaint
-    assert "--sensitivity" in look(path, Description(sensitivity=("2.25 mV/N",))).complaint
+    assert 'sensitivity of each of force [V], acc [mV], in their order (--sensitivity "' in inspect_file(path).problems
+    assert "--sensitivity" in inspect_file(path, Description(sensitivity=("2.25 mV/N",))).problems
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g"))
     (hit,) = read_hits(path, said)
     assert hit.force == pytest.approx(force, abs=1e-5)
     assert hit.acceleration == pytest.approx(response, abs=1e-4)
-    assert ("sensitivity", "option") in [(fact.name, fact.origin) for fact in look(path, said).facts]
+    assert ("sensitivity", "option") in [(fact.name, fact.origin) for fact in inspect_file(path, said).facts]
     for wrong in ("2.25", "2.25 N/mV", "0 mV/N", "2.25 mV/furlong"):
-        text = look(path, Description(sensitivity=(wrong, "10 mV/g"))).complaint
+        text = inspect_file(path, Description(sensitivity=(wrong, "10 mV/g"))).problems
         assert f"--sensitivity {wrong!r}: give volts a unit" in text
     three = put(tmp_path / "c.txt", "time\tx_V\ty_V\tz_V", time, force, response, response)
-    asked = look(three).complaint
+    asked = inspect_file(three).problems
     assert [word in asked for word in ("--sensitivity", "--response", "--rate")] == [True] * 3
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g", "10 mV/g"), response=2, rate=RATE)
-    assert look(three, said).complaint == ""
+    assert inspect_file(three, said).problems == ""
     named = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g", time, force, response)
-    assert "it has no channel in volts" in look(named, said).complaint
+    assert "it has no channel in volts" in inspect_file(named, said).problems
 
 
 @pytest.mark.parametrize(("unit", "order", "factor"), [("mm/s", 1, 1e3), ("um", 2, 1e6)])
@@ -120,7 +130,7 @@ def test_velocity_and_displacement_over_time_give_the_frf_of_that_motion(
     ours, exact = read_frf(path), read_frf(direct)
     near = (exact.frequency > 100) & (exact.frequency < 1500)
     assert ours.receptance[near] == pytest.approx(exact.receptance[near], rel=1e-3)
-    assert "is differentiated" in {fact.name: fact.value for fact in look(path).facts}["note"]
+    assert "is differentiated" in {fact.name: fact.value for fact in inspect_file(path).facts}["note"]
 
 
 def test_a_velocity_that_was_cut_off_is_an_overload(tmp_path: Path) -> None:
@@ -155,13 +165,13 @@ def windowed_uff(path: Path, window: str) -> Path:
 )
 def test_a_window_that_a_file_names_is_known_from_it(tmp_path: Path, make: Callable[..., Path], name: str) -> None:
     said = Description(unit="m/N") if name == "a.mat" else Description()
-    found = look(make(tmp_path / name, "exponential 50 ms"), said).checked()
+    found = inspect_file(make(tmp_path / name, "exponential 50 ms"), said).require_valid()
     assert found.window == pytest.approx(0.05)
     assert ("window", "file") in [(fact.name, fact.origin) for fact in found.facts]
-    assert look(make(tmp_path / name, "none"), said).window is None
+    assert inspect_file(make(tmp_path / name, "none"), said).window is None
     if name != "a.uff":
-        assert look(make(tmp_path / name, "rectangular"), said).window is None
-        assert np.isnan(look(make(tmp_path / name, "Hanning"), said).window or 0.0)
+        assert inspect_file(make(tmp_path / name, "rectangular"), said).window is None
+        assert np.isnan(inspect_file(make(tmp_path / name, "Hanning"), said).window or 0.0)
 
 
 def test_the_window_of_signal_calc_is_seen_before_and_behind_it(tmp_path: Path) -> None:
@@ -171,10 +181,10 @@ def test_the_window_of_signal_calc_is_seen_before_and_behind_it(tmp_path: Path) 
     variables |= {"X2": np.stack([time, response], axis=1), "W1": np.stack([time, force], axis=1)}
     variables["W2"] = np.stack([time, response * window], axis=1)
     scipy.io.savemat(tmp_path / "a.mat", variables)
-    assert look(tmp_path / "a.mat").window == pytest.approx(0.08, rel=1e-3)
+    assert inspect_file(tmp_path / "a.mat").window == pytest.approx(0.08, rel=1e-3)
     variables["W2"] = np.stack([time, response * np.hanning(time.size)], axis=1)
     scipy.io.savemat(tmp_path / "b.mat", variables)
-    assert np.isnan(look(tmp_path / "b.mat").window or 0.0)
+    assert np.isnan(inspect_file(tmp_path / "b.mat").window or 0.0)
 
 
 @pytest.mark.parametrize("with_frf", [True, False])
@@ -185,11 +195,11 @@ def test_the_last_hit_of_signal_calc_is_taken_before_the_window(tmp_path: Path, 
     variables["W2"] = np.stack([time, response * np.exp(-time / 0.08)], axis=1)
     scipy.io.savemat(tmp_path / "a.mat", variables | {"Unit": np.array(["N", "m/s^2"], dtype=object)})
     said = Description(columns=("time=X1:1", "force=X1:2", "acceleration=X2:2") if with_frf else ())
-    recording = look(tmp_path / "a.mat", said).checked()
+    recording = inspect_file(tmp_path / "a.mat", said).require_valid()
     assert recording.hits[0].acceleration == pytest.approx(response)
     assert recording.hits[0].force == pytest.approx(force)
     assert recording.window is None
-    whole = look(tmp_path / "a.mat", Description(columns=("force=X1", "acceleration=X2:2"), rate=RATE)).complaint
+    whole = inspect_file(tmp_path / "a.mat", Description(columns=("force=X1", "acceleration=X2:2"), rate=RATE)).problems
     assert "2 columns are called 'X1'" in whole
 
 
@@ -198,10 +208,10 @@ def test_two_machines_in_one_file_are_refused(tmp_path: Path) -> None:
     convert(path, tmp_path / "a.uff", Description())
     text = (tmp_path / "a.uff").read_text()
     (tmp_path / "two.uff").write_text(text + text.replace("a.csv", "mill 4"))
-    assert "it holds a.csv, mill 4, not one machine" in look(tmp_path / "two.uff").complaint
+    assert "it holds a.csv, mill 4, not one machine" in inspect_file(tmp_path / "two.uff").problems
     text = path.read_text()
     path.write_text(f"# machine: mill 3\n# machine: mill 4\n{text}")
-    assert "it holds mill 3, mill 4, not one machine" in look(path).complaint
+    assert "it holds mill 3, mill 4, not one machine" in inspect_file(path).problems
 
 
 def test_records_of_two_directions_or_machines_are_not_averaged(tmp_path: Path) -> None:
@@ -210,7 +220,7 @@ def test_records_of_two_directions_or_machines_are_not_averaged(tmp_path: Path) 
         convert(path, tmp_path / f"{direction}.uff", Description(direction=direction), hits=True)
     both = tmp_path / "both.uff"
     both.write_text("".join((tmp_path / f"{one}.uff").read_text() for one in "xx"))
-    assert not look(both).complaint
+    assert not inspect_file(both).problems
     assert len(read_hits(both)) == 2
     both.write_text("".join((tmp_path / f"{one}.uff").read_text() for one in "xy"))
     with pytest.raises(DataError, match=r"which force of 1 x over 1 x .* goes with which response"):
@@ -219,4 +229,4 @@ def test_records_of_two_directions_or_machines_are_not_averaged(tmp_path: Path) 
     text = (tmp_path / "a.json").read_text()
     one, other = text.replace("hit 1", "mill 3"), text.replace("hit 1", "lathe 1")
     (tmp_path / "a.json").write_text(f"{one[:-1]}, {other[1:]}")
-    assert "it holds mill 3, lathe 1, not one machine" in look(tmp_path / "a.json").complaint
+    assert "it holds mill 3, lathe 1, not one machine" in inspect_file(tmp_path / "a.json").problems

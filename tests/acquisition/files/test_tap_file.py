@@ -31,7 +31,7 @@ from acquisition import (
     TapTest,
     Trigger,
     atomic_write,
-    average_good,
+    average_good_hits,
     capture_hits,
     new_tap_id,
     read_frf,
@@ -41,7 +41,7 @@ from acquisition import (
     write_hit,
     write_tap,
 )
-from acquisition.files.tap_file import as_written, read_hit_name
+from acquisition.files.tap_file import read_hit_name, round_as_stored
 
 ABOUT = Circumstances(
     "mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n", "DI-4108"
@@ -55,7 +55,7 @@ def tap(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Chann
     source = SimulatedSource(tapper(double_hits=0.3, overloads=0.2), channels, 25600.0, 120_000)
     hits = tuple(capture_hits(source, Trigger(20.0, 6400, 512)))
     hits = (*hits[:-1], replace(hits[-1], lost_scans=7))
-    frf, flags = average_good(hits)
+    frf, flags = average_good_hits(hits)
     assert frf is not None
     assert 2 < frf.n_averages < len(hits) - 1
     return TapTest(new_tap_id(ABOUT), ABOUT, frf, hits, flags)
@@ -86,10 +86,12 @@ def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> Non
     read = read_tap(path)
     assert (read.id, read.circumstances, read.flags, read.source) == (tap.id, tap.circumstances, tap.flags, None)
     assert all(map(same_hit, read.hits, tap.hits))
-    assert tap.known_frf.coherence is not None
-    assert same_frf(read.known_frf, replace(tap.known_frf, coherence=tap.known_frf.coherence.astype(np.float32)))
-    assert same_frf(read.known_frf, as_written(tap).known_frf)
-    assert same_frf(read_frf(path), as_written(tap).known_frf)
+    assert tap.required_frf.coherence is not None
+    assert same_frf(
+        read.required_frf, replace(tap.required_frf, coherence=tap.required_frf.coherence.astype(np.float32))
+    )
+    assert same_frf(read.required_frf, round_as_stored(tap).required_frf)
+    assert same_frf(read_frf(path), round_as_stored(tap).required_frf)
     assert all(map(same_hit, read_hits(path), tap.hits))
     assert HitFlags.LOST_SCANS in read.flags[-1]
 
@@ -105,10 +107,10 @@ def test_a_file_from_before_overloads_were_reported_is_read(tap: TapTest, tmp_pa
 
 def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path: Path) -> None:
     write_tap(tmp_path / "tap.h5", tap)
-    again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)
+    again, flags = average_good_hits(read_tap(tmp_path / "tap.h5").hits)
     assert flags == tap.flags
     assert again is not None
-    assert same_frf(again, tap.known_frf)
+    assert same_frf(again, tap.required_frf)
 
 
 def test_a_recording_without_codes_keeps_its_samples_and_its_source(tap: TapTest, tmp_path: Path) -> None:
@@ -125,7 +127,7 @@ def test_a_recorded_frf_has_no_hits(tmp_path: Path) -> None:
     write_tap(tmp_path / "tap.h5", TapTest("t", ABOUT, frf))
     read = read_tap(tmp_path / "tap.h5")
     assert (read.hits, read.flags) == ((), ())
-    assert same_frf(read.known_frf, frf)
+    assert same_frf(read.required_frf, frf)
 
 
 def test_the_file_is_plain_hdf5_with_units_and_scales(tap: TapTest, tmp_path: Path) -> None:
@@ -241,7 +243,9 @@ def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
         replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001
 
 
-@pytest.mark.parametrize("beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND, HitFlags.NOT_JUDGED])
+@pytest.mark.parametrize(
+    "beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND, HitFlags.NOT_EVALUATED]
+)
 def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
     tap: TapTest, tmp_path: Path, beyond: HitFlags
 ) -> None:
@@ -280,8 +284,8 @@ def test_the_five_lines_of_the_documentation_read_a_file(tap: TapTest, tmp_path:
     write_tap(tmp_path / "TAP.h5", tap)
     names: dict[str, Any] = {}
     exec(lines.replace("TAP.h5", (tmp_path / "TAP.h5").as_posix()), names)
-    np.testing.assert_array_equal(names["frequency"], tap.known_frf.frequency)
-    np.testing.assert_array_equal(names["receptance"], tap.known_frf.receptance)
+    np.testing.assert_array_equal(names["frequency"], tap.required_frf.frequency)
+    np.testing.assert_array_equal(names["receptance"], tap.required_frf.receptance)
     np.testing.assert_allclose(names["force"], [hit.force for hit in tap.hits], rtol=1e-12)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
-from acquisition import DataError, Description, Fact, look, read_frf, read_hits
+from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
 
 HIT = rows(TIME, FORCE, RESPONSE, form="%.9g", separator=",")
 LEVEL, DEGREES = 20 * np.log10(np.abs(H)), np.degrees(np.angle(H))
@@ -197,16 +197,16 @@ def test_lvm_names_its_separator_behind_that(tmp_path: Path) -> None:
     text = LVM.replace("390", "400") + "".join(f",{f:.9g},{a:.9g}\n" for f, a in zip(FORCE, RESPONSE, strict=True))
     (hit,) = read_hits(put(tmp_path / "a.lvm", text))
     assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-8)
-    assert f"{look(tmp_path / 'a.lvm').created:%Y-%m-%d %H:%M:%S}" == "2026-05-01 09:30:00"
+    assert f"{inspect_file(tmp_path / 'a.lvm').created:%Y-%m-%d %H:%M:%S}" == "2026-05-01 09:30:00"
 
 
 def test_lvm_whose_channels_are_of_several_lengths_is_cut_to_the_shortest(tmp_path: Path) -> None:
     cells = [f"{a:.9g}" for a in RESPONSE[:390]] + [""] * 10
     values = [f",{f:.9g},{cell}\n" for f, cell in zip(FORCE, cells, strict=True)]
     path = put(tmp_path / "a.lvm", LVM + "".join(values))
-    found = look(path).checked()
+    found = inspect_file(path).require_valid()
     assert Fact("rows", "390 of 400, as sensor ends there", "default") in found.facts
     assert found.hits[0].force == pytest.approx(FORCE[:390], abs=1e-7)
     path.write_text(LVM.replace("390", "391") + "".join(values))
     with pytest.raises(DataError, match="390 of 391 samples are there"):
-        look(path)
+        inspect_file(path)

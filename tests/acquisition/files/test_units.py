@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from acquisition.files.contents.units import unit_of
+from acquisition.files.contents.units import parse_unit
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ from acquisition.files.contents.units import unit_of
     ],
 )
 def test_units_in_any_spelling(text: str, quantity: str, factor: float) -> None:
-    found = unit_of(text)
+    found = parse_unit(text)
     assert found is not None
     assert found.factor == pytest.approx(factor, rel=1e-14)
     assert str(found.quantity) == quantity
@@ -45,10 +45,10 @@ def test_units_in_any_spelling(text: str, quantity: str, factor: float) -> None:
 
 @pytest.mark.parametrize("text", ["", "1", "MN", "Volts", "dB", "m/", "((", "m)", "m^999999", "x/N", "N N N N/"])
 def test_what_is_not_known_is_not_guessed(text: str) -> None:
-    assert unit_of(text) is None
+    assert parse_unit(text) is None
 
 
 def test_a_stiffness_is_no_frf() -> None:
-    found = unit_of("N/um")
+    found = parse_unit("N/um")
     assert found is not None
     assert found.quantity == ""

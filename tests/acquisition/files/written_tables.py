@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Description, Frf, look
+from acquisition import Description, Frf, inspect_file
 
 F = np.arange(1.0, 60.0)
 H = 1e-6 / (1 + 0.1j * F)
@@ -32,7 +32,7 @@ def put(path: Path, text: str) -> Path:
 
 
 def complaint(path: Path, **said: object) -> str:
-    return look(path, Description(**said)).complaint  # type: ignore[arg-type]
+    return inspect_file(path, Description(**said)).problems  # type: ignore[arg-type]
 
 
 def is_h(frf: Frf) -> bool:

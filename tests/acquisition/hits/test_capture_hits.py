@@ -10,16 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquisition import (
-    Block,
-    Channel,
-    DataError,
-    HammeredStructure,
-    HitSearch,
-    SimulatedSource,
-    Trigger,
-    capture_hits,
-)
+from acquisition import Block, Channel, DataError, HammeredStructure, HitSearch, SimulatedSource, Trigger, capture_hits
 
 RATE = 1000.0
 UNIT = (Channel("force", 1.0, 32768.0), Channel("acceleration", 1.0, 32768.0))

@@ -17,7 +17,7 @@ def test_a_triangle_reaches_to_5_percent_of_its_peak(half: int) -> None:
     pulse = find_pulse(Hit(force, np.zeros_like(force), 1000.0, pre_trigger=2000))
     assert pulse is not None
     inside = np.flatnonzero(force - 2.0 > 5.0)
-    assert (pulse.top, pulse.start, pulse.end) == (top, inside[0], inside[-1] + 1)
+    assert (pulse.peak_index, pulse.start, pulse.end) == (top, inside[0], inside[-1] + 1)
     assert (pulse.offset, pulse.peak, pulse.baseline_rms) == (2.0, 100.0, 0.0)
     assert pulse.force == pytest.approx(force - 2.0)
 

@@ -14,9 +14,8 @@ from types import SimpleNamespace
 import pytest
 import serial
 
-from acquisition import DeviceError, find_port, usb_identity
-from acquisition.ports.port_hints import explain_open_error
-from acquisition.ports.serial_link import SerialLink
+from acquisition import DeviceError, find_usb_identity, find_usb_port
+from acquisition.ports.serial_ports import SerialLink, explain_open_error
 
 pty = pytest.importorskip("pty", reason="pseudo-terminals are needed")
 
@@ -87,7 +86,7 @@ def test_a_sleeping_consumer_never_blocks_the_reader_and_loses_nothing_below_the
 def test_beyond_the_limit_the_oldest_is_thrown_away_and_counted(
     cable: Cable, link: SerialLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.ports.serial_link.BUFFER_BYTES", 100_000)
+    monkeypatch.setattr("acquisition.ports.serial_ports.MAX_UNREAD_BYTES", 100_000)
     sent = os.urandom(950_000)
     writer = threading.Thread(target=write_all, args=(cable.master, sent))
     writer.start()
@@ -183,12 +182,12 @@ def test_a_device_is_found_wherever_it_is_plugged_in(monkeypatch: pytest.MonkeyP
     ours = SimpleNamespace(device="/dev/ttyACM1", vid=0x0683, serial_number="5C2B")
     ports = [modem, other, ours]
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda **_: ports)
-    identity = usb_identity("/dev/ttyACM1")
+    identity = find_usb_identity("/dev/ttyACM1")
     assert identity == (0x0683, "5C2B")
     ports.remove(ours)
-    assert find_port(*identity) is None
+    assert find_usb_port(*identity) is None
     ports.append(SimpleNamespace(device="/dev/ttyACM4", vid=0x0683, serial_number="5c2b"))
-    assert find_port(*identity) == "/dev/ttyACM4"
+    assert find_usb_port(*identity) == "/dev/ttyACM4"
     ports.append(SimpleNamespace(device="/dev/ttyACM5", vid=0x0683, serial_number=None))
-    assert usb_identity("/dev/ttyACM5") is None  # any other of its kind would be taken for it
-    assert usb_identity("/dev/ttyS0") is usb_identity("/dev/pts/3") is None
+    assert find_usb_identity("/dev/ttyACM5") is None  # any other of its kind would be taken for it
+    assert find_usb_identity("/dev/ttyS0") is find_usb_identity("/dev/pts/3") is None

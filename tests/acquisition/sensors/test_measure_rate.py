@@ -30,9 +30,9 @@ from acquisition import (
     check_rate,
     measure_rate,
 )
+from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import checked_rate, known_rate
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 
 PAIR = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
 
@@ -171,19 +171,19 @@ def accepting(folder: MachineFolder) -> MachineFolder:
 
 
 def check(folder: MachineFolder, stream: Stream) -> float:
-    return checked_rate(folder, stream, clock=stream.clock)
+    return check_device_rate(folder, stream, clock=stream.clock)
 
 
 def test_a_device_is_measured_once(folder: MachineFolder) -> None:
     first, again = Stream(even(25601.0)), Stream(even(25601.0))
-    assert known_rate(folder, first) is None
+    assert find_stored_rate(folder, first) is None
     assert check(folder, first) == 25600.0
     assert first.starts == 1
     written = (folder.path / "daq.json").read_bytes()
     assert check(folder, again) == 25600.0
     assert again.starts == 0
     assert (folder.path / "daq.json").read_bytes() == written
-    known = known_rate(folder, again)
+    known = find_stored_rate(folder, again)
     assert known is not None
     assert known.rate == pytest.approx(25601.0, rel=1e-6)
 
@@ -269,7 +269,7 @@ def test_an_emulated_device_through_a_pseudo_terminal(folder: MachineFolder) -> 
         assert found.rate == pytest.approx(102400, abs=5 * found.std)
         source.sample_rate = 51200.0
         with pytest.raises(DeviceError, match="not 51200: every frequency would be 50"):
-            checked_rate(folder, source, 3.0)
+            check_device_rate(folder, source, 3.0)
 
 
 def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[..., Any]) -> None:
@@ -280,7 +280,7 @@ def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[...
         source.follows_clock = True
         halved = Stream(even(12800.0), identity=source.identity)
         check(accepting(folder), halved)
-        rate = checked_rate(MachineFolder(folder.path), source)
+        rate = check_device_rate(MachineFolder(folder.path), source)
         source.start()
         hit = next(capture_hits(source, Trigger(20.0, 6400, 512)))
         source.stop()
@@ -297,13 +297,13 @@ def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(fo
     assert 0.0007 < measured(busy(25600.0)).std / 25600 < 0.002
     remarks = list[Remark]()
     stream = Stream(busy(25600.0))
-    assert checked_rate(folder, stream, clock=stream.clock, remarks=remarks) == 25600.0
+    assert check_device_rate(folder, stream, clock=stream.clock, remarks=remarks) == 25600.0
     assert stream.starts == 3
     assert [remark.code for remark in remarks] == ["rate-not-sure"]
     assert re.match(r"the DAQ's sample rate is known to ±0\.\d\d% only", remarks[0].text)
     assert not (folder.path / "daq.json").exists()
     quiet = Stream(even(25600.0))
-    assert checked_rate(folder, quiet, clock=quiet.clock, remarks=remarks) == 25600.0
+    assert check_device_rate(folder, quiet, clock=quiet.clock, remarks=remarks) == 25600.0
     assert (quiet.starts, len(remarks)) == (1, 1)
 
 

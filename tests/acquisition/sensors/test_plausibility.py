@@ -15,14 +15,14 @@ from acquisition import (
     Channel,
     Circumstances,
     TapTest,
-    calibration_doubt,
-    channel_doubts,
-    stiffness_doubt,
-    unit_mistake,
+    calibration_remark,
+    channel_remarks,
+    stiffness_remark,
+    unit_mistake_remark,
 )
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring import measure
-from modal import Mode, synthesize
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.measurement import measure
+from modal import Mode, synthesize_frf
 
 HAMMER = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")
 TODAY = date(2026, 11, 1)
@@ -33,7 +33,7 @@ TODAY = date(2026, 11, 1)
     [("force", 0.23e-3), ("force", -11.2e-3), ("force", 22.5e-3), ("acceleration", 1.02e-3), ("acceleration", 0.102)],
 )
 def test_real_sensors_are_believed(quantity: str, sensitivity: float) -> None:
-    assert channel_doubts(Channel(quantity, sensitivity, 5.0)) == ()  # type: ignore[arg-type]
+    assert channel_remarks(Channel(quantity, sensitivity, 5.0)) == ()  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -54,15 +54,15 @@ def test_real_sensors_are_believed(quantity: str, sensitivity: float) -> None:
 def test_a_sensitivity_or_range_that_no_device_has_is_not_believed(
     channel: Channel, code: str, words: str, cure: str
 ) -> None:
-    (doubt,) = channel_doubts(channel)
+    (doubt,) = channel_remarks(channel)
     assert (doubt.code, doubt.about, doubt.cure) == (f"{code}-not-believed", channel.quantity, cure)
     assert words in doubt.text
 
 
 @given(st.floats(0.11, 24), st.sampled_from([1, -1]))
 def test_a_believed_hammer_entered_in_millivolts_is_caught(millivolts: float, sign: int) -> None:
-    assert channel_doubts(Channel("force", sign * millivolts * 1e-3, 5.0)) == ()
-    assert len(channel_doubts(Channel("force", sign * millivolts, 5.0))) == 1
+    assert channel_remarks(Channel("force", sign * millivolts * 1e-3, 5.0)) == ()
+    assert len(channel_remarks(Channel("force", sign * millivolts, 5.0))) == 1
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_believed_hammer_entered_in_millivolts_is_caught(millivolts: float, si
 )
 @given(st.floats(0.9, 1.1))
 def test_a_ratio_near_a_unit_mistake_names_it(factor: float, word: str, off: float) -> None:
-    found = unit_mistake(factor * off)
+    found = unit_mistake_remark(factor * off)
     assert found is not None
     assert found.code == "unit-mistake"
     assert word in found.cure
@@ -86,24 +86,24 @@ def test_a_ratio_near_a_unit_mistake_names_it(factor: float, word: str, off: flo
 
 @given(st.floats(0.3, 3.5))
 def test_a_ratio_far_from_all_names_none(ratio: float) -> None:
-    assert unit_mistake(ratio) is None
+    assert unit_mistake_remark(ratio) is None
 
 
 @pytest.mark.parametrize("stiffness", [1e5, 3.5e7, -3.5e7, 1e10])
 def test_stiffnesses_of_machine_tools_are_believed(stiffness: float) -> None:
-    assert stiffness_doubt(stiffness) is None
+    assert stiffness_remark(stiffness) is None
 
 
 @pytest.mark.parametrize("stiffness", [3.5e4, 3.5e10, -9e4])
 def test_other_stiffnesses_are_not(stiffness: float) -> None:
     shown = f"{stiffness:.0f} N/m" if stiffness < 1e5 else f"{stiffness / 1e6:.0f} N/um"
-    assert f"K = {shown} is outside 0.1 to 10000 N/um" in str(stiffness_doubt(stiffness))
+    assert f"K = {shown} is outside 0.1 to 10000 N/um" in str(stiffness_remark(stiffness))
 
 
 @pytest.mark.parametrize(("stiffness", "noted"), [(3.5e7, False), (3.5e4, True)])
 def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float, noted: bool) -> None:
-    machine = parse_machine(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
-    frf = synthesize([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
+    machine = parse_machine_file(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
+    frf = synthesize_frf([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
     measurement = measure(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
     assert ("stiffness-not-believed" in [remark.code for remark in measurement.remarks]) is noted
 
@@ -122,7 +122,7 @@ def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float,
     ],
 )
 def test_the_date_of_calibration(calibrated: str, today: date, months: float, code: str, words: str) -> None:
-    found = calibration_doubt(replace(HAMMER, calibration_date=calibrated), today, months)
+    found = calibration_remark(replace(HAMMER, calibration_date=calibrated), today, months)
     assert (found.code if found else "") == code
     assert words in str(found or "")
     assert found is None or found.about == "force"

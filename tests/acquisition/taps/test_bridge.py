@@ -20,13 +20,13 @@ from acquisition import (
     DeviceError,
     Event,
     EventKind,
-    Faults,
     HammeredStructure,
     Hammering,
     SensorInput,
     SimulatedSource,
     Structure,
     TapsEmulator,
+    TapsFaults,
     TapsSource,
 )
 from acquisition.dataq import DataqEmulator, DataqFaults, DataqSource
@@ -69,8 +69,10 @@ def test_scans_and_sensors_arrive_unchanged(tapper: Tapper, channels: Pair) -> N
             assert (host.lost_scans, host.dropped_frames) == (0, 0)
 
 
-@pytest.mark.parametrize("faults", [Faults(drop_every=7), Faults(corrupt_every=7), Faults(cut_every=7)])
-def test_what_was_lost_before_the_bridge_is_missing_behind_it(tapper: Tapper, channels: Pair, faults: Faults) -> None:
+@pytest.mark.parametrize("faults", [TapsFaults(drop_every=7), TapsFaults(corrupt_every=7), TapsFaults(cut_every=7)])
+def test_what_was_lost_before_the_bridge_is_missing_behind_it(
+    tapper: Tapper, channels: Pair, faults: TapsFaults
+) -> None:
     expected = np.concatenate(
         [block.codes for block in SimulatedSource(tapper(), channels, RATE, 90 * 512).blocks()], axis=1
     )
@@ -89,7 +91,7 @@ def test_what_was_lost_before_the_bridge_is_missing_behind_it(tapper: Tapper, ch
 
 def test_overload_and_events_go_through(tapper: Tapper, channels: Pair) -> None:
     with (
-        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=Faults(overload=2)) as device,
+        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(overload=2)) as device,
         bridged(lambda: TapsSource(device.port)) as bridge,
         TapsSource(bridge.port) as host,
     ):
@@ -161,7 +163,7 @@ class Fast(SimulatedSource):
 
 
 def test_a_host_that_is_late_is_told_what_it_missed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.bridge.BUFFER_BYTES", 20_000)
+    monkeypatch.setattr("acquisition.taps.bridge.BRIDGE_BUFFER_BYTES", 20_000)
     device = Fast(12, 16)
     with bridged(lambda: device) as bridge, TapsSource(bridge.port) as host:
         assert (host.identity.serial, host.channels[0].adc_bits) == ("no-number", 16)
@@ -199,7 +201,7 @@ def test_a_device_is_stopped_when_its_host_has_gone() -> None:
 
 def test_a_dataq_with_its_sensors_goes_through(structure: Structure, monkeypatch: pytest.MonkeyPatch) -> None:
     """The loss of a packet that it has no word for is found at this end, and told at the other."""
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
     sensors = (
         SensorInput(0, Channel("force", 2.25e-3, 2.0, serial_number="H-1", calibration_date="2026-01-15")),
         SensorInput(5, Channel("acceleration", 1.02e-3, 5.0, direction="y", skew=1e-6)),

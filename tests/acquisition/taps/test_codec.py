@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from acquisition.taps.protocol import (
     MAX_FRAME,
+    DeviceStatus,
     Frame,
     FrameDecoder,
     MessageType,
-    Status,
     decode_data,
     decode_frame,
     encode_data,
@@ -95,8 +95,8 @@ def test_scans_survive_every_word_length(coded: tuple[int, list[tuple[int, int]]
 
 
 def test_status_survives() -> None:
-    status = Status(123456, 123000, 40, 2, -12.34)
-    assert Status.decode(status.encode()) == status
+    status = DeviceStatus(123456, 123000, 40, 2, -12.34)
+    assert DeviceStatus.decode(status.encode()) == status
 
 
 def test_mid_stream_start_discards_up_to_the_first_delimiter() -> None:

@@ -23,11 +23,11 @@ from acquisition import (
     DeviceError,
     Event,
     EventKind,
-    Faults,
     HammeredStructure,
     HitFlags,
     SimulatedSource,
     TapsEmulator,
+    TapsFaults,
     TapsSource,
     Trigger,
     capture_hits,
@@ -35,7 +35,7 @@ from acquisition import (
     read_tap_hits,
     write_hit,
 )
-from acquisition.ports.serial_link import SerialLink
+from acquisition.ports.serial_ports import SerialLink
 from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, decode_data, encode_frame
 
 RATE = 25600.0
@@ -86,16 +86,16 @@ def test_a_device_that_streams_already_is_taken_over(tapper: Tapper, channels: P
 @pytest.mark.parametrize(
     ("fault", "lost_each", "damaged"),
     [
-        (Faults(drop_every=7), 1, False),
-        (Faults(corrupt_every=7), 1, True),
-        (Faults(noise_every=7), 1, True),
-        (Faults(cut_every=7), 2, True),
-        (Faults(duplicate_every=7), 0, True),
+        (TapsFaults(drop_every=7), 1, False),
+        (TapsFaults(corrupt_every=7), 1, True),
+        (TapsFaults(noise_every=7), 1, True),
+        (TapsFaults(cut_every=7), 2, True),
+        (TapsFaults(duplicate_every=7), 0, True),
     ],
     ids=["dropped", "corrupted", "noise", "cut", "duplicated"],
 )
 def test_lost_frames_are_counted_exactly_and_mark_the_hits(
-    fault: Faults, lost_each: int, damaged: bool, tapper: Tapper, channels: Pair
+    fault: TapsFaults, lost_each: int, damaged: bool, tapper: Tapper, channels: Pair
 ) -> None:
     with (
         TapsEmulator(tapper(), channels, RATE, realtime=False, faults=fault) as device,
@@ -129,7 +129,7 @@ def last(blocks: list[Block]) -> int:
 
 def test_unplugging_is_said_in_one_sentence(tapper: Tapper, channels: Pair) -> None:
     with (
-        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=Faults(unplug_after=20_000)) as device,
+        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(unplug_after=20_000)) as device,
         TapsSource(device.port) as source,
     ):
         source.start()
@@ -138,9 +138,9 @@ def test_unplugging_is_said_in_one_sentence(tapper: Tapper, channels: Pair) -> N
 
 
 def test_a_silent_device_is_given_up(tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.source.SILENCE", 0.3)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.3)
     with (
-        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=Faults(stall_after=20_000)) as device,
+        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(stall_after=20_000)) as device,
         TapsSource(device.port) as source,
     ):
         source.start()
@@ -151,8 +151,8 @@ def test_a_silent_device_is_given_up(tapper: Tapper, channels: Pair, monkeypatch
 def test_a_slow_host_loses_scans_and_is_told_how_many(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.taps.emulator.BUFFER_SECONDS", 0.02)
-    monkeypatch.setattr("acquisition.ports.serial_link.BUFFER_BYTES", 40_000)
+    monkeypatch.setattr("acquisition.taps.emulator.TAPS_BUFFER_SECONDS", 0.02)
+    monkeypatch.setattr("acquisition.ports.serial_ports.MAX_UNREAD_BYTES", 40_000)
     with TapsEmulator(tapper(), channels, RATE, realtime=True) as device, TapsSource(device.port) as source:
         source.start()
         threading.Event().wait(1.2)
@@ -185,7 +185,7 @@ def test_a_port_that_does_not_exist_is_refused_with_the_cure(port: str, cure: st
 
 
 def test_something_that_is_no_daq_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.source.ANSWER_TIME", 0.05)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     master, slave = os.openpty()
     try:
         with pytest.raises(DeviceError, match="no TAPS/1 device answers"):
@@ -242,7 +242,7 @@ def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
         formats.add(body[11])
         return decode_data(body)
 
-    monkeypatch.setattr("acquisition.taps.stream.decode_data", look)
+    monkeypatch.setattr("acquisition.taps.source.decode_data", look)
     fine = tuple(replace(channel, adc_bits=bits) for channel in channels)
     with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
         assert source.channels == fine
@@ -306,7 +306,7 @@ def test_an_overload_that_the_device_reports_refuses_the_hit(
             channels[::-1],
             RATE,
             realtime=False,
-            faults=Faults(overload=mask),
+            faults=TapsFaults(overload=mask),
         ) as device,
         TapsSource(device.port) as source,
     ):
@@ -379,17 +379,17 @@ def test_status_is_kept(device: TapsEmulator) -> None:
 @pytest.mark.parametrize(
     "fault",
     [
-        Faults(start_streaming=True),
-        Faults(noise_at_start=True),
-        Faults(cut_infos=1),
-        Faults(start_streaming=True, noise_at_start=True),
+        TapsFaults(start_streaming=True),
+        TapsFaults(noise_at_start=True),
+        TapsFaults(cut_infos=1),
+        TapsFaults(start_streaming=True, noise_at_start=True),
     ],
     ids=["streaming", "noise", "INFO cut", "both"],
 )
 def test_a_bad_beginning_is_overcome(
-    fault: Faults, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+    fault: TapsFaults, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.taps.source.ANSWER_TIME", 0.3)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.3)
     with TapsEmulator(tapper(), channels, RATE, faults=fault) as device, TapsSource(device.port) as source:
         assert source.channels == channels
         source.start()
@@ -400,9 +400,9 @@ def test_a_bad_beginning_is_overcome(
 def test_a_device_whose_info_never_arrives_is_refused(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.taps.source.ANSWER_TIME", 0.05)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     with (
-        TapsEmulator(tapper(), channels, RATE, faults=Faults(cut_infos=99)) as device,
+        TapsEmulator(tapper(), channels, RATE, faults=TapsFaults(cut_infos=99)) as device,
         pytest.raises(DeviceError, match=r"no TAPS/1 device answers .*HELLO, 3 tries"),
     ):
         TapsSource(device.port)
@@ -411,9 +411,9 @@ def test_a_device_whose_info_never_arrives_is_refused(
 def test_a_device_that_begins_anew_by_itself_is_told_from_a_silent_one(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.taps.source.SILENCE", 0.3)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.3)
     with (
-        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=Faults(restart_after=20 * 512)) as device,
+        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(restart_after=20 * 512)) as device,
         TapsSource(device.port) as source,
     ):
         source.start()
@@ -424,7 +424,7 @@ def test_a_device_that_begins_anew_by_itself_is_told_from_a_silent_one(
 
 
 def test_a_slow_consumer_is_no_silent_device(device: TapsEmulator, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.source.SILENCE", 0.1)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.1)
     with TapsSource(device.port) as source:
         source.start()
         for _ in islice(source.blocks(), 3):

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Channel, DeviceError, Event, EventKind, Faults, TapsEmulator, TapsSource
+from acquisition import Channel, DeviceError, Event, EventKind, TapsEmulator, TapsFaults, TapsSource
 from acquisition.channel import Block
 
 RATE = 51_200.0
 MINUTES = 10.0
-FAULTS = Faults(drop_every=97, corrupt_every=89, duplicate_every=83, cut_every=79, noise_every=73, noise_at_start=True)
+FAULTS = TapsFaults(
+    drop_every=97, corrupt_every=89, duplicate_every=83, cut_every=79, noise_every=73, noise_at_start=True
+)
 
 
 def counted(first: int, n: int) -> NDArray[np.float64]:

@@ -9,19 +9,21 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from acquisition import Event, EventKind
-from acquisition.taps.event import EventLog, decode_event, encode_event
-from acquisition.taps.faults import NOISE
+from acquisition.taps.emulator import NOISE_BYTES
 from acquisition.taps.protocol import (
-    LOST_BEFORE,
-    MAX_ENCODED,
+    LOST_BEFORE_FLAG,
+    MAX_ENCODED_FRAME,
     MAX_FRAME,
+    EventLog,
     Frame,
     FrameDecoder,
     MessageType,
+    decode_event,
     encode_data,
+    encode_event,
     encode_frame,
 )
-from acquisition.taps.stream import ScanStream
+from acquisition.taps.source import ScanStream
 
 SCANS = 9
 SESSION = 3
@@ -93,11 +95,15 @@ def test_noise_around_a_frame_gives_nothing_but_that_frame(before: bytes, after:
 def test_a_run_too_long_is_thrown_away_up_to_its_delimiter_and_no_further() -> None:
     longest = Frame(MessageType.DATA, body=bytes(range(1, 256)) * 32 + bytes(MAX_FRAME - 12 - 255 * 32))
     whole = encode_frame(longest)
-    assert len(whole) <= MAX_ENCODED + 1
+    assert len(whole) <= MAX_ENCODED_FRAME + 1
     decoder = FrameDecoder()
     assert decoder.feed(whole) == [longest]
     good = encode_frame(data(0))
-    for piece in (b"\x01" * MAX_ENCODED, b"\x02" * 3 * MAX_ENCODED, good):  # the end of the run looks like a frame
+    for piece in (
+        b"\x01" * MAX_ENCODED_FRAME,
+        b"\x02" * 3 * MAX_ENCODED_FRAME,
+        good,
+    ):  # the end of the run looks like a frame
         assert decoder.feed(piece) == []
     assert decoder.dropped == 1
     assert decoder.feed(good) == [data(0)]
@@ -111,7 +117,7 @@ def test_duplicates_and_late_frames_are_refused_and_counted() -> None:
 
 
 def test_a_jump_of_the_index_is_what_was_lost_flagged_or_not() -> None:
-    for flags in (0, LOST_BEFORE):
+    for flags in (0, LOST_BEFORE_FLAG):
         stream = ScanStream(SESSION, 2)
         stream.accept(data(0))
         block = stream.accept(data(100, flags=flags))
@@ -122,7 +128,7 @@ def test_a_jump_of_the_index_is_what_was_lost_flagged_or_not() -> None:
 def test_a_loss_without_a_jump_still_spoils_the_hit_it_is_in() -> None:
     stream = ScanStream(SESSION, 2)
     stream.accept(data(0))
-    block = stream.accept(data(9, flags=LOST_BEFORE))
+    block = stream.accept(data(9, flags=LOST_BEFORE_FLAG))
     assert block is not None
     assert block.lost_before == 1
 
@@ -167,7 +173,7 @@ def test_an_event_that_comes_twice_happens_once_and_rubbish_is_none() -> None:
     log = EventLog()
     press = Event(EventKind.BUTTON)
     pressed = encode_event(press)
-    for seq, body in [(1, pressed), (1, pressed), (2, pressed), (3, NOISE), (4, b"")]:
+    for seq, body in [(1, pressed), (1, pressed), (2, pressed), (3, NOISE_BYTES), (4, b"")]:
         log.add(Frame(MessageType.EVENT, seq, body, SESSION))
     assert list(log.new) == [press, press]
     assert log.fault({}) == ""

@@ -66,7 +66,7 @@ def study(number: int, wrong: Wrong, tolerance: float) -> Outcome:
         except (StiffnessFitError, ValueError):
             outcome = outcome._replace(misfits=outcome.misfits + 1)
             continue
-        if fit.misfits:
+        if fit.has_misfit:
             outcome = outcome._replace(misfits=outcome.misfits + 1)
             continue
         assert fit.log_covariance is not None

@@ -114,7 +114,7 @@ def test_a_joint_that_no_mode_feels_is_open(seed: int) -> None:
     fit = fit_stiffness(rigid, **exact)
     assert fit.open_groups == {HOLDER, TILTING}
     assert codes(fit) >= {"group-not-felt"}
-    assert not fit.misfits
+    assert not fit.has_misfit
     assert f"stiffness {HOLDER}          open" in str(fit)
     assert fit.factor[0] == pytest.approx(1.0, abs=0.01)
 
@@ -123,7 +123,7 @@ def test_tools_of_two_spindles_do_not_fit_one() -> None:
     *two, _ = tools(np.random.default_rng(4))
     other = scale_groups(two[1], {"bearings": 0.95})
     fit = fit_stiffness(two, **measured([two[0], other]))
-    assert fit.misfits
+    assert fit.has_misfit
     assert "frequencies-misfit" in codes(fit)
 
 
@@ -167,7 +167,7 @@ def study(number: int, seed: int) -> Outcome:
         for name, one in zip(fit.groups, error.tolist(), strict=True):
             if name not in fit.open_groups:
                 found.inside.setdefault(name, []).append(abs(one) < 1.96)
-        compare(found, third, fit.applied_to(scale_groups(third, away)), predict_mode(fit, scale_groups(third, away)))
+        compare(found, third, fit.apply_to(scale_groups(third, away)), predict_mode(fit, scale_groups(third, away)))
     return found
 
 

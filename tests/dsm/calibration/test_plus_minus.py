@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dsm import plus_minus, rounded
+from dsm import format_rounded, format_with_error
 
 
 @pytest.mark.parametrize(
@@ -25,11 +25,11 @@ from dsm import plus_minus, rounded
     ],
 )
 def test_two_digits_of_the_standard_error_decide(value: float, std: float, scale: float, text: str) -> None:
-    assert plus_minus(value, std, scale) == text
-    assert rounded(value, std, scale) == text.partition(" ")[0]
+    assert format_with_error(value, std, scale) == text
+    assert format_rounded(value, std, scale) == text.partition(" ")[0]
 
 
 def test_large_numbers_and_large_errors_have_no_exponent() -> None:
-    assert rounded(1.125e13, None, 1e6) == "11250000"
-    assert plus_minus(1.1e13, math.nan, 1e6, "N/um") == "11000000 N/um"
-    assert plus_minus(2.0, 2.5, percent=True) == "2.0 ± 2.5 (125 %)"
+    assert format_rounded(1.125e13, None, 1e6) == "11250000"
+    assert format_with_error(1.1e13, math.nan, 1e6, "N/um") == "11000000 N/um"
+    assert format_with_error(2.0, 2.5, percent=True) == "2.0 ± 2.5 (125 %)"

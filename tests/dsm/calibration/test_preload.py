@@ -24,8 +24,8 @@ def first(spindle: Spindle) -> float:
 @pytest.mark.parametrize(("factor", "low", "high"), [(0.58, 0.133, 0.182), (1.2, 1.768, 1.965)])
 def test_preload_left_is_the_range_of_the_radial_exponents(factor: float, low: float, high: float) -> None:
     found = calibrate(SPINDLE, first(scaled(factor)))
-    assert found.preload_left == pytest.approx((low, high), abs=1e-3)
-    assert "if the bearings have balls (by stiffness to the power of 3.1 to 3.7)" in str(found.preload_left)
+    assert found.remaining_preload == pytest.approx((low, high), abs=1e-3)
+    assert "if the bearings have balls (by stiffness to the power of 3.1 to 3.7)" in str(found.remaining_preload)
 
 
 def jones(angle: float, deflection: float) -> tuple[float, float, float]:
@@ -56,7 +56,7 @@ def test_radial_exponents_follow_from_the_axial_ones_of_catalogues(
 def test_rollers_say_nothing_of_it() -> None:
     rollers = replace(SPINDLE, bearings=[replace(b, rolling_elements="rollers") for b in SPINDLE.bearings])
     found = calibrate(rollers, first(scaled(0.58)))
-    assert found.preload_left is None
+    assert found.remaining_preload is None
     assert "preload" not in str(found)
     with pytest.raises(ValueError, match="bearing 1: rolling_elements='needles' is none of balls, rollers"):
         replace(SPINDLE, bearings=[replace(b, rolling_elements="needles") for b in SPINDLE.bearings])  # type: ignore[arg-type]
@@ -66,7 +66,7 @@ def test_near_the_limit_of_rigid_bearings_the_stiffness_is_open_and_nothing_is_s
     rigid = float(natural_frequencies(SPINDLE, 1, rigid_bearings=True)[0])
     found = calibrate(SPINDLE, 0.999 * rigid)
     assert [remark.code for remark in found.remarks] == ["bearings-not-felt"]
-    assert found.preload_left is None
+    assert found.remaining_preload is None
     assert calibrate(SPINDLE, first(SPINDLE)).remarks == ()
 
 
@@ -75,4 +75,4 @@ def test_a_joint_that_is_calibrated_says_nothing_of_preload() -> None:
     worn = replace(spindle, joints=[Joint(0.06, 1e8, 1e5, group="holder")])
     found = calibrate(spindle, first(worn), group="holder")
     assert found.factor == pytest.approx(0.5, rel=1e-6)
-    assert found.preload_left is None
+    assert found.remaining_preload is None

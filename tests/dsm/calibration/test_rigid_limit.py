@@ -100,7 +100,7 @@ def test_an_interval_without_an_upper_end_is_open() -> None:
     assert [remark.code for remark in found.remarks] == ["bearings-not-felt"]
     assert "the frequency may as well be that of rigid ones" in str(found.remarks[0])
     assert "N/um to rigid" in str(found)
-    assert found.preload_left is None
+    assert found.remaining_preload is None
 
 
 def test_an_interval_reaches_down_to_no_bearings() -> None:

@@ -15,9 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsm import Bearing, LumpedMass, Segment, Spindle, natural_frequencies
-from dsm.modes.critical_speed import critical_speed
 from dsm.modes.find_modes import find_modes
-from dsm.modes.whirl_map import whirl_map
+from dsm.modes.whirl_map import critical_speed, whirl_map
 
 PLAIN = Spindle([Segment(0.2, 0.05), Segment(0.3, 0.08, 0.02)], [Bearing(0.1, 1e8), Bearing(0.4, 2e8)])
 THICK = replace(PLAIN, theory="timoshenko", masses=[LumpedMass(0.0, 5.0, 0.01, 0.019)])

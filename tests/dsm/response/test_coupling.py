@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, natural_frequencies, receptance
-from dsm.response.couple_tool import couple_tool
-from dsm.response.spindle_side import spindle_side
-from dsm.spindle.change_tool import change_tool
+from dsm.response import couple_tool, spindle_side
+from dsm.spindle.spindle import change_tool
 
 F = np.array([0.0, 0.01, *np.linspace(5.0, 6000.0, 100)])
 THEORIES: tuple[Theory, ...] = ("euler-bernoulli", "timoshenko")

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsm.elements.element_series import element_series
-from dsm.response.linearized_stiffness import linearized_stiffness
+from dsm.response import linearized_stiffness
 
 FIRST = 3.5160152685002
 

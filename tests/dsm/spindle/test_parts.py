@@ -30,7 +30,7 @@ from dsm import (
     receptance,
     static_stiffness,
 )
-from dsm.matrix.assemble import Held
+from dsm.matrix.assemble import HeldDof
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.segment import ring_area, ring_second_moment
 
@@ -66,7 +66,7 @@ def mismatch(cone: Segment, ends: str, theory: Theory, frequency: float) -> floa
     return float(np.linalg.det((end.reshape(4, 2) / scale)[asked[far]]))
 
 
-def held(ends: str) -> list[Held]:
+def held(ends: str) -> list[HeldDof]:
     dofs = {"clamped": [0, 1], "free": [], "pinned": [0]}
     return [(place, dof) for place, end in zip((0.0, LENGTH), ends.split("-"), strict=True) for dof in dofs[end]]
 

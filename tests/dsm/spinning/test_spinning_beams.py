@@ -18,16 +18,19 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dsm.spinning.beam import Dof, SpinningBeam, SpinningSegment, SpinningSpring
+from dsm.spinning.beam import SpinningBeam, SpinningDof, SpinningSegment, SpinningSpring
 from dsm.spinning.frequencies import UnstableSpinError, spinning_frequencies
 
 CANTILEVER = [3.5160152685002, 22.034491564667, 61.697214413549, 120.90191605231]
-CLAMPED: list[tuple[float, Dof]] = [(0.0, "u"), (0.0, "v"), (0.0, "u'"), (0.0, "v'")]
-PINNED: list[tuple[float, Dof]] = [(0.0, "u"), (0.0, "v"), (1.0, "u"), (1.0, "v")]
+CLAMPED: list[tuple[float, SpinningDof]] = [(0.0, "u"), (0.0, "v"), (0.0, "u'"), (0.0, "v'")]
+PINNED: list[tuple[float, SpinningDof]] = [(0.0, "u"), (0.0, "v"), (1.0, "u"), (1.0, "v")]
 
 
 def unit_beam(
-    rigidity_yy: float, held: Sequence[tuple[float, Dof]] = (), springs: Sequence[SpinningSpring] = (), pieces: int = 1
+    rigidity_yy: float,
+    held: Sequence[tuple[float, SpinningDof]] = (),
+    springs: Sequence[SpinningSpring] = (),
+    pieces: int = 1,
 ) -> SpinningBeam:
     """EIxx = m = L = 1."""
     return SpinningBeam([SpinningSegment(1 / pieces, 1.0, rigidity_yy, 1.0)] * pieces, springs, held)
@@ -144,7 +147,7 @@ def test_a_start_that_lacks_a_mode_is_not_believed(left_out: int, monkeypatch: p
         kept = np.delete(np.arange(ratio.size), ratio.size - left_out)
         return ratio[kept], vectors[:, kept]
 
-    monkeypatch.setattr("dsm.spinning.modes.eigh", forgetful)
+    monkeypatch.setattr("dsm.spinning.frequencies.eigh", forgetful)
     with pytest.raises(ArithmeticError, match="cannot be proved"):
         angular(unit_beam(4.0, CLAMPED), 4, 2.0)
 
@@ -160,7 +163,7 @@ def test_a_round_beam_has_sums_and_differences(spin: float, count: int) -> None:
 def test_units_of_a_round_steel_shaft() -> None:
     """f_1 = (pi/2) sqrt(EI / (m L^4)) Hz between pins; at 60 f_1 rpm, its critical speed, one frequency is 0."""
     rigidity, mass, length = 210e9 * math.pi * 0.03**4 / 64, 7850 * math.pi * 0.03**2 / 4, 0.8
-    ends: list[tuple[float, Dof]] = [(0.0, "u"), (0.0, "v"), (length, "u"), (length, "v")]
+    ends: list[tuple[float, SpinningDof]] = [(0.0, "u"), (0.0, "v"), (length, "u"), (length, "v")]
     beam = SpinningBeam([SpinningSegment(length, rigidity, rigidity, mass)], held=ends)
     first = math.pi / 2 * math.sqrt(rigidity / (mass * length**4))
     at_3000 = [first - 50, first + 50, 4 * first - 50, 4 * first + 50]
@@ -218,7 +221,7 @@ def finite_elements(beam: SpinningBeam, spin: float, parts: int) -> tuple[NDArra
     return np.sort(lasting.imag), int(growing)
 
 
-def stepped(springs: Sequence[SpinningSpring] = (), held: Sequence[tuple[float, Dof]] = ()) -> SpinningBeam:
+def stepped(springs: Sequence[SpinningSpring] = (), held: Sequence[tuple[float, SpinningDof]] = ()) -> SpinningBeam:
     segments = [
         SpinningSegment(0.3, 1.0, 2.5, 0.8),
         SpinningSegment(0.5, 3.0, 0.9, 1.7),
@@ -274,7 +277,7 @@ def test_swapping_the_axes_changes_nothing(
     segments: list[SpinningSegment], stiffness_x: float, stiffness_y: float, spin: float
 ) -> None:
     swapped = [SpinningSegment(s.length, s.rigidity_yy, s.rigidity_xx, s.mass_per_length) for s in segments]
-    clamp: list[tuple[float, Dof]] = [(0.0, "u"), (0.0, "v"), (0.0, "u'"), (0.0, "v'")]
+    clamp: list[tuple[float, SpinningDof]] = [(0.0, "u"), (0.0, "v"), (0.0, "u'"), (0.0, "v'")]
     end = math.fsum(segment.length for segment in segments)
     beam = SpinningBeam(segments, [SpinningSpring(end, stiffness_x, stiffness_y)], [*clamp, (end, "u'")])
     mirror = SpinningBeam(swapped, [SpinningSpring(end, stiffness_y, stiffness_x)], [*clamp, (end, "v'")])
@@ -308,7 +311,7 @@ GOOD = SpinningSegment(1.0, 1.0, 2.0, 1.0)
     ],
 )
 def test_refuses_what_is_no_beam(
-    message: str, segments: list[SpinningSegment], springs: list[SpinningSpring], held: list[tuple[float, Dof]]
+    message: str, segments: list[SpinningSegment], springs: list[SpinningSpring], held: list[tuple[float, SpinningDof]]
 ) -> None:
     with pytest.raises(ValueError, match=message):
         SpinningBeam(segments, springs, held)

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsm.elements.element_series import element_series
-from dsm.spinning.element import spinning_element
+from dsm.spinning.beam import spinning_element
 
 RIGIDITY_XX, RIGIDITY_YY, MASS, LENGTH = 1.3, 4.1, 0.7, 0.9
 BEAM = (RIGIDITY_XX, RIGIDITY_YY, MASS, LENGTH)

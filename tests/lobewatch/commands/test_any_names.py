@@ -20,11 +20,11 @@ from hypothesis import strategies as st
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from modal import Mode, synthesize_frf
 
 LINES = np.arange(4.0, 4000.0, 4.0)
-FRF = from_accelerance(LINES, synthesize([Mode(1713.0, 0.029, 3.5e7)], LINES).accelerance)
+FRF = from_accelerance(LINES, synthesize_frf([Mode(1713.0, 0.029, 3.5e7)], LINES).accelerance)
 TEXTS = st.text(st.characters(), min_size=1, max_size=60).filter(str.strip)
 """All characters, halves of them too."""
 

@@ -14,8 +14,8 @@ from acquisition import HammeredStructure, Hammering
 from acquisition.dataq import DataqEmulator, DataqFaults
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.emulated_spindle import emulated_structure
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.emulated_spindle import build_structure
 from lobewatch.tap.session import plan_session
 
 SENSORS = """[daq]
@@ -54,7 +54,7 @@ def test_a_whole_tap_test_through_the_bridge(machines: tuple[MachineFolder, Mach
     pi, office = machines
     spindle = office.machine.spindle
     assert spindle is not None
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
 
     def signal_at(rate: float) -> HammeredStructure:
         return HammeredStructure(structure, rate, np.random.default_rng(1), Hammering(double_hits=0.0, overloads=0.0))

@@ -16,7 +16,7 @@ from acquisition import Circumstances, DataError, Frf, TapTest, new_tap_id
 from dsm import Spindle, modes_at, receptance
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 
 LINES = np.arange(4.0, 6000.0, 4.0)
 LOSS = 0.058

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lobes import Program, program_limit
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.verdicts import Advice, Setting
-from lobewatch.verdicts.ways import ways
+from lobewatch.verdicts.program_samples import cutting_conditions_of
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
@@ -106,7 +106,7 @@ def test_the_numbers_are_those_of_the_limit_in_the_worst_feed(shop: Shop, check:
     machine, newest = shop.folder.machine, shop.logbook.assembly()
     for entry, table in zip(check("--json").json["programs"], machine.program, strict=True):
         program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-        found = program_limit(program, newest.x, newest.y, ways(table, machine, newest))
+        found = program_limit(program, newest.x, newest.y, cutting_conditions_of(table, machine, newest))
         assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
         assert entry["stable"] == found.stable
         assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.feed_angle))
@@ -396,7 +396,7 @@ def test_no_longer_is_said_of_the_same_directions_only(shop: Shop, check: Check,
 def test_a_long_check_says_how_far_it_is(
     shop: Shop, check: Check, no_search: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lobewatch.commands.check.PATIENCE", -1.0)
+    monkeypatch.setattr("lobewatch.commands.check.PROGRESS_DELAY", -1.0)
     shop.tap(0, 1713.0)
     assert check().err.count("0 of 3 programs are checked") == 1
 

@@ -20,9 +20,9 @@ import pytest
 from acquisition import TapsEmulator
 from lobes import read_history
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_lock import PATIENCE, FolderLock
+from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.emulated_spindle import emulated_structure, emulator
+from lobewatch.tap.emulated_spindle import build_structure, make_emulator
 from tests.lobewatch.commands.conftest import Run, refused
 
 
@@ -31,8 +31,8 @@ def device(trial: MachineFolder) -> Iterator[TapsEmulator]:
     """An emulated DAQ on the example spindle."""
     table = trial.machine.spindle
     assert table is not None
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    with emulator(structure, np.random.default_rng(1), realtime=False) as emulated:
+    structure = build_structure(table.build(), table.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(1), realtime=False) as emulated:
         yield emulated
 
 
@@ -66,7 +66,7 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
     from itertools import islice
 
     from acquisition import Circumstances, TapsSource, Trigger, capture_hits, check_hit
-    from lobewatch.tap.in_progress import begin_tap
+    from lobewatch.tap.tap_in_progress import begin_tap
 
     with TapsSource(device.port) as source:
         running = begin_tap(trial, Circumstances("trial", datetime.now(UTC), "reference"))
@@ -117,8 +117,8 @@ def test_a_tap_waits_for_those_who_write_for_a_moment(
 def test_who_must_wait_for_a_tap_test_too_long_is_told_so(run: Run, trial: MachineFolder) -> None:
     table = trial.machine.spindle
     assert table is not None
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    with emulator(structure, np.random.default_rng(1), realtime=True) as slow:
+    structure = build_structure(table.build(), table.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(1), realtime=True) as slow:
         command = [sys.executable, "-c", TAP, "tap", "trial", "--port", slow.port]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
             assert process.stderr is not None
@@ -137,10 +137,10 @@ def test_who_must_wait_for_a_tap_test_too_long_is_told_so(run: Run, trial: Machi
         (0.0, ("history",)),
         (0.0, ("status",)),
         (0.0, ("verify",)),
-        (PATIENCE, ("event", "oiled")),
-        (PATIENCE, ("exclude", "202601", "--reason", "trial")),
-        (PATIENCE, ("observe", "--program", "A", "--speed", "9000", "--depth", "1", "--stable")),
-        (PATIENCE, ("rebuild",)),
+        (LOCK_TIMEOUT, ("event", "oiled")),
+        (LOCK_TIMEOUT, ("exclude", "202601", "--reason", "trial")),
+        (LOCK_TIMEOUT, ("observe", "--program", "A", "--speed", "9000", "--depth", "1", "--stable")),
+        (LOCK_TIMEOUT, ("rebuild",)),
     ],
 )
 def test_only_who_was_asked_to_write_waits(
@@ -148,7 +148,7 @@ def test_only_who_was_asked_to_write_waits(
 ) -> None:
     shop.tap(0, 1713.0)
     shop.tap_both(30)
-    waited, held = [], FolderLock.held
+    waited, held = [], FolderLock.hold
 
     def asked(lock: FolderLock, patience: float) -> AbstractContextManager[None]:
         waited.append(patience)
@@ -428,8 +428,8 @@ def test_the_emulator_command_serves_a_port_and_ends_quietly(
 def test_a_killed_tap_goes_on_at_the_same_hit(trial: MachineFolder, run: Run) -> None:
     table = trial.machine.spindle
     assert table is not None
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    with emulator(structure, np.random.default_rng(1), realtime=True) as slow:
+    structure = build_structure(table.build(), table.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(1), realtime=True) as slow:
         command = [sys.executable, "-m", "lobewatch.cli", "tap", "trial", "--port", slow.port]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
             assert process.stderr is not None

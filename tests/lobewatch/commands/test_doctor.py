@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from acquisition import Answer, DeviceIdentity, PortInfo, PortSurvey, SeenPort
+from acquisition import DeviceAnswer, DeviceIdentity, PortInfo, PortScan, ScannedPort
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.sensors import Finding, examine_computer
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.sensors import Finding, check_computer
 
-EXAMINE = sys.modules["lobewatch.sensors.examine_computer"]
+EXAMINE = sys.modules["lobewatch.sensors.computer_check"]
 NOW = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 
 
@@ -27,8 +27,8 @@ NOW = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 def healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A computer on which nothing is wrong; the folder that stands for /sys."""
     monkeypatch.chdir(tmp_path)
-    answer = Answer("taps", DeviceIdentity("BOARD-1", "7"))
-    survey = PortSurvey((SeenPort(PortInfo("/dev/ttyACM0", 0x2E8A), answer),))
+    answer = DeviceAnswer("taps", DeviceIdentity("BOARD-1", "7"))
+    survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 0x2E8A), answer),))
     monkeypatch.setattr(EXAMINE, "survey_ports", lambda: survey)
     monkeypatch.setattr(EXAMINE, "LATENCY_TIMERS", tmp_path)
     monkeypatch.setattr("webbrowser.get", lambda: SimpleNamespace())
@@ -38,12 +38,12 @@ def healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def worst(machine: MachineFolder | None = None, now: float = NOW) -> list[Finding]:
-    return [finding for finding in examine_computer(machine, now) if finding.state != "fine"]
+    return [finding for finding in check_computer(machine, now) if finding.state != "fine"]
 
 
 def test_nothing_is_said_of_a_healthy_computer(healthy: Path) -> None:
     assert worst() == []
-    text = {finding.subject: finding.text for finding in examine_computer(None, NOW)}
+    text = {finding.subject: finding.text for finding in check_computer(None, NOW)}
     assert text["port /dev/ttyACM0"] == "BOARD-1 answers (taps)"
     assert text["clock"] == "2026-06-01 12:00 UTC"
     assert "mqtt" in text["extras"]
@@ -53,7 +53,7 @@ def break_rights(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
     problem = (
         "port /dev/ttyACM0 cannot be opened (Permission denied); you may not use it: sudo usermod -aG dialout $USER"
     )
-    survey = PortSurvey((SeenPort(PortInfo("/dev/ttyACM0", 1), text="cannot be opened", problem=problem),))
+    survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 1), text="cannot be opened", problem=problem),))
     monkeypatch.setattr(EXAMINE, "survey_ports", lambda: survey)
 
 

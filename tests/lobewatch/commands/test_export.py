@@ -19,7 +19,7 @@ from typer.testing import CliRunner, Result
 from acquisition import Conditions, DataError
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.show.plant.table_files import rounded
+from lobewatch.show.fleet.export_files import round_significant
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -92,10 +92,10 @@ def test_packed_csv_is_the_same_csv(mills: Path) -> None:
 def test_numbers_in_csv_have_the_digits_that_they_are_said_to_have() -> None:
     random = np.random.default_rng(0)
     values = random.normal(size=(500, 2)) * 10.0 ** random.integers(-12, 14, (500, 2))
-    told = rounded(values, np.array([7, 3]))
+    told = round_significant(values, np.array([7, 3]))
     for digits, before, after in zip((7, 3), values.T, told.T, strict=True):
         assert after.tolist() == [float(f"{one:.{digits - 1}e}") for one in before.tolist()]
-    special = rounded(np.array([[0.0, np.nan]]), np.array([7, 3]))
+    special = round_significant(np.array([[0.0, np.nan]]), np.array([7, 3]))
     assert special[0, 0] == 0
     assert np.isnan(special[0, 1])
 

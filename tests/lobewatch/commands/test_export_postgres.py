@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 
 from acquisition import DataError
 from lobewatch.cli import app
-from lobewatch.show.plant import table_postgres
+from lobewatch.show.fleet import export_postgres as table_postgres
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -46,7 +46,7 @@ def mills(shop: Shop, tmp_path: Path) -> Path:
 @pytest.fixture
 def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     """A transaction a machine."""
-    monkeypatch.setattr(table_postgres, "BATCH", 1)
+    monkeypatch.setattr(table_postgres, "POSTGRES_BATCH_TAPS", 1)
 
 
 def export(*arguments: object) -> dict[str, Any]:
@@ -195,9 +195,9 @@ def test_of_exports_at_once_none_writes_twice(server: Server, plant: str, mills:
 def test_another_export_is_waited_for_but_not_for_ever(
     server: Server, plant: str, mills: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_postgres, "PATIENCE", 1)
+    monkeypatch.setattr(table_postgres, "POSTGRES_LOCK_WAIT", 1)
     with psycopg.connect(server.address(plant)) as other:
-        other.execute(table_postgres.LOCK)
+        other.execute(table_postgres.EXPORT_LOCK_QUERY)
         with pytest.raises(DataError, match="another export is writing there; wait until it is done"):
             export(mills, "--to", server.address(plant))
     assert export(mills, "--to", server.address(plant))["written"] == 9

@@ -19,7 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
-from lobewatch.notify.prometheus import FAMILIES
+from lobewatch.notify.prometheus import METRIC_FAMILIES
 
 Server = Any
 """PostgreSQL of conftest.py."""
@@ -122,7 +122,7 @@ def expressions() -> list[str]:
 def test_prometheus_is_asked_for_what_lobewatch_tells() -> None:
     asked = {name for text in expressions() for name in re.findall(r"lobewatch_\w+", text)}
     assert len(asked) >= 6
-    assert asked <= FAMILIES.keys()
+    assert asked <= METRIC_FAMILIES.keys()
 
 
 def test_promtool_takes_every_expression(tmp_path: Path) -> None:

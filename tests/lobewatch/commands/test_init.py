@@ -10,7 +10,7 @@ import pytest
 
 from acquisition import find_driver
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.set_up.questions import QUESTIONS
+from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS
 from lobewatch.tap.emulated_spindle import emulate_machine
 from tests.lobewatch.commands.conftest import Run, refused
 from tests.lobewatch.commands.pty_talk import Terminal
@@ -59,8 +59,8 @@ def test_every_answer_is_an_option_and_stands_in_the_file(run: Run) -> None:
 
 
 def test_the_options_are_the_questions(run: Run) -> None:
-    assert [question.name for question in QUESTIONS] == list(ANSWERS)
-    assert all(f"--{question.name}" in run("init", "--help").out for question in QUESTIONS)
+    assert [question.name for question in SETUP_QUESTIONS] == list(ANSWERS)
+    assert all(f"--{question.name}" in run("init", "--help").out for question in SETUP_QUESTIONS)
 
 
 def test_where_nobody_sits_nothing_is_asked_and_the_template_is_as_it_was(run: Run) -> None:

@@ -12,13 +12,13 @@ import pytest
 import scipy.io.wavfile
 from typer.testing import CliRunner, Result
 
-from acquisition.files.read_sound import read_sound
+from acquisition.files.read_cut import read_cut_recording
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import compare_cuts
-from lobewatch.machine.archive.verify import verify
-from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.machine.verify_files import verify
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -169,7 +169,7 @@ def test_a_tachometer_is_followed_kept_and_contradicted(shop: Shop, tmp_path: Pa
 
 
 def test_a_microphone_is_said_and_kept_as_one(shop: Shop, tmp_path: Path) -> None:
-    values = read_sound(recording(tmp_path / "cut.csv", 1712.3)).acceleration
+    values = read_cut_recording(recording(tmp_path / "cut.csv", 1712.3)).acceleration
     scipy.io.wavfile.write(tmp_path / "cut.wav", int(RATE), (values / 200).astype(np.float32))
     arguments = ("--program", "A", "--speed", 12000, "--file", tmp_path / "cut.wav")
     assert "--full-scale" in str(run(shop, *arguments).exception)
@@ -229,15 +229,15 @@ def test_what_the_tap_tests_predict_at_this_depth_stands_beside_it(shop: Shop, t
     shop.run(("A", 12077, 1.5), more='feed = "x"')
     shop.tap_both()
     logbook = Logbook.open(shop.path)
-    (verdict,), sound = logbook.verdicts(), read_sound(recording(tmp_path / "cut.csv", 1712.3))
+    (verdict,), sound = logbook.verdicts(), read_cut_recording(recording(tmp_path / "cut.csv", 1712.3))
     below, above = (
-        compare_cuts(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)[0]
+        compare_cuts(logbook, find_cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)[0]
         for share in (0.99, 1.01)
     )
     assert below.predicted is not None
     assert above.predicted is not None
     assert (below.predicted.stable, above.predicted.stable) == (True, False)
     assert above.predicted.frequency == pytest.approx(verdict.chatter_frequency, rel=2e-3)
-    turned = [(above.predicted.frequency - sign * 1712.3) % above.tooth_frequency for sign in (1, -1)]
-    apart = min(min(one, above.tooth_frequency - one) for one in turned)
-    assert above.apart == pytest.approx(apart, abs=0.2)
+    turned = [(above.predicted.frequency - sign * 1712.3) % above.tooth_passing_frequency for sign in (1, -1)]
+    apart = min(min(one, above.tooth_passing_frequency - one) for one in turned)
+    assert above.frequency_difference == pytest.approx(apart, abs=0.2)

@@ -15,17 +15,17 @@ from typer.testing import CliRunner
 
 from acquisition import Circumstances, Frf, TapDirection, TapTest, new_tap_id
 from dsm import modes_at, natural_frequencies, receptance
-from lobes import lowest_of, zero_order
+from lobes import lower_envelope, zero_order_lobes
 from lobewatch.cli import app
-from lobewatch.logbook import Logbook, model_picture
+from lobewatch.logbook import Logbook, collect_model_figure
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
-from lobewatch.measuring import model_state
-from lobewatch.show.figures.model_figures import model_figure
+from lobewatch.measurement import build_model_state
+from lobewatch.show.figures.spindle_figures import plot_model
 from lobewatch.tool import speed_grid
-from lobewatch.tool.prediction import predict
-from lobewatch.verdicts import Word
+from lobewatch.tool.prediction import predict_assembly
+from lobewatch.verdicts import Stability
 from modal import Mode
 
 TOOL = "long end mill"
@@ -120,15 +120,15 @@ def test_the_picture_shows_the_shaft_the_curve_and_what_was_measured(folder: Mac
     folder.commit(tapped(folder, 0.6))
     folder.commit(tapped(folder, 0.5, TOOL, day=2))
     logbook = Logbook(folder)
-    state = model_state(folder.machine, logbook.calibrated, tool)
-    picture = model_picture(logbook, state, 4)
+    state = build_model_state(folder.machine, logbook.calibrated_measurement, tool)
+    picture = collect_model_figure(logbook, state, 4)
     assert state.measurement is not None
     stiffness, frequency = picture.points
     assert np.interp(stiffness[-1], *picture.curve) == pytest.approx(frequency[-1], rel=1e-3)
     assert picture.measured_frf is not None
     wanted = receptance(state.spindle, picture.model_frf.frequency, loss_factor=2 * damping(state.measurement.followed))
     assert np.max(np.abs(picture.model_frf.receptance - wanted)) < 2e-4 * np.max(np.abs(wanted))
-    figure = model_figure(picture)
+    figure = plot_model(picture)
     shaft, curve, shapes, whirl, frf = figure.axes
     assert [axes.get_title() for axes in (shaft, whirl)] == ["shaft, to scale", "whirl speeds"]
     assert np.asarray(curve.lines[0].get_ydata()) == pytest.approx(picture.curve[1])
@@ -160,7 +160,7 @@ def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None
     frequency, stiffness = modes_at(worn, 12)
     modes = [Mode(f, 0.029, k) for f, k in zip(frequency, stiffness, strict=True)]
     cuts, speeds = folder.machine.cuts(TOOL)[REFERENCE_CUT], speed_grid(folder.machine)
-    expected = lowest_of([zero_order(modes, modes, cut, speeds) for cut in cuts])
+    expected = lower_envelope([zero_order_lobes(modes, modes, cut, speeds) for cut in cuts])
     assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=0.02)
     assert found["remarks"][0]["code"] == "predicted"
     coupled = said("lobes", folder.path, "--tool", TOOL, "--source", "frf")
@@ -180,10 +180,10 @@ def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> 
     (long,) = Logbook(folder).verdicts()
     assert long.assembly is not None
     assert long.assembly.tap_id.startswith("prediction from ")
-    assert not long.measured
+    assert not long.is_measured
     assert {"predicted", "one-direction"} <= {remark.code for remark in long.remarks}
     assert long.limit == pytest.approx(0.4e-3, rel=0.5)
-    assert long.word is Word.DOUBTFUL
+    assert long.stability is Stability.DOUBTFUL
     shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
     assert re.search(r"doubtful\s+\(predicted\)", shown.stdout)
     assert shown.exit_code == 1
@@ -207,12 +207,12 @@ def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
 
 def test_a_prediction_is_refused_before_the_first_tap(folder: MachineFolder) -> None:
     with pytest.raises(ValueError, match="no tap test has set the bearings of the model yet"):
-        predict(folder.machine, [], TOOL)
+        predict_assembly(folder.machine, [], TOOL)
 
 
 def test_an_unknown_tool_and_a_machine_without_a_model_are_refused(folder: MachineFolder, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'drill' has no model; modelled are 'reference', 'long end mill'"):
-        model_state(folder.machine, None, "drill")
+        build_model_state(folder.machine, None, "drill")
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     with pytest.raises(ValueError, match=r"no model: add a \[spindle\] table"):
-        model_state(MachineFolder(tmp_path / "plain").machine, None)
+        build_model_state(MachineFolder(tmp_path / "plain").machine, None)

@@ -13,18 +13,28 @@ from matplotlib.text import Annotation
 
 from acquisition import Frf, Remark, from_accelerance
 from lobewatch.cli import main
-from lobewatch.measuring import remarks_on_all
-from lobewatch.show.figures.mode_figures import modes_figure
-from lobewatch.show.spindle.describe_modes import mode_lines, mode_table, picked_table, remark_lines
+from lobewatch.measurement import check_modes_together
+from lobewatch.show.figures.spindle_figures import plot_modes
+from lobewatch.show.modes import mode_notes, mode_remark_lines, mode_table, peak_picking_table
 from lobewatch.show.terminal.output import results
-from modal import Mode, candidates, edit_modes, extract, fit_modes, modes_of, parse_edits, pick_peaks, synthesize
+from modal import (
+    Mode,
+    candidate_frequencies,
+    edit_modes,
+    extract_modes,
+    fit_modes,
+    modes_from_extraction,
+    parse_mode_edits,
+    pick_peaks,
+    synthesize_frf,
+)
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 MODES = [Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, -3.5e7)]
 
 
 def noisy() -> Frf:
-    exact = synthesize(MODES, LINES).accelerance
+    exact = synthesize_frf(MODES, LINES).accelerance
     noise = np.random.default_rng(0).normal(size=(2, LINES.size)) * 1e-3 * np.max(np.abs(exact))
     return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])
 
@@ -44,20 +54,23 @@ def test_report_of_a_table_has_percent_correlation_and_remarks(capsys: pytest.Ca
         results.print(mode_table([mode]))
     assert "1722.0 ± 2.0 " in shown.get()
     assert "35.00 ± 0.70 (2 %)" in shown.get()
-    assert mode_lines([mode]) == ["correlation of the errors of zeta and K: -0.80 (1722 Hz)"]
-    assert remark_lines([mode, other], [Remark("whole", "", "all")]) == ["1722 Hz, 900 Hz: a reason; a cure", "all"]
+    assert mode_notes([mode]) == ["correlation of the errors of zeta and K: -0.80 (1722 Hz)"]
+    assert mode_remark_lines([mode, other], [Remark("whole", "", "all")]) == [
+        "1722 Hz, 900 Hz: a reason; a cure",
+        "all",
+    ]
 
 
 def test_every_negative_stiffness_is_a_swapped_sign() -> None:
     both = [Mode(900.0, 0.02, -4e7), Mode(1722.0, 0.03, -3.5e7)]
-    assert [remark.code for remark in remarks_on_all(both)] == ["sign-swapped"]
-    assert remarks_on_all(MODES) == []
+    assert [remark.code for remark in check_modes_together(both)] == ["sign-swapped"]
+    assert check_modes_together(MODES) == []
 
 
 def test_peak_picking_is_held_against_the_fit() -> None:
     frf = noisy()
     with results.capture() as shown:
-        results.print(picked_table([*pick_peaks(frf), Mode(3000.0, 0.01, 1e8)], fit_modes(frf)))
+        results.print(peak_picking_table([*pick_peaks(frf), Mode(3000.0, 0.01, 1e8)], fit_modes(frf)))
     first, second, third = shown.get().splitlines()[1:4]
     assert "zeta" in first
     assert "K" in second
@@ -66,8 +79,8 @@ def test_peak_picking_is_held_against_the_fit() -> None:
 
 def test_figure_draws_fit_residual_poles_and_circles() -> None:
     frf = noisy()
-    state, modes = extract([frf]), fit_modes(frf)
-    figure = modes_figure(state, modes, "x")
+    state, modes = extract_modes([frf]), fit_modes(frf)
+    figure = plot_modes(state, modes, "x")
     top, chart, *circles = figure.axes
     assert len(circles) == len(modes) == 2
     measured, fitted, left = (np.asarray(line.get_ydata()) for line in top.lines[:3])
@@ -90,7 +103,7 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
 @pytest.mark.parametrize("degrees", [-40.0, 25.0])
 def test_figure_writes_and_draws_the_phase_of_a_complex_mode(degrees: float) -> None:
     mode = Mode(1722.0, 0.03, -3.5e7, phase_deg=degrees, phase_deg_std=1.5)
-    circle = modes_figure(extract([synthesize([mode], LINES)]), [mode], "x").axes[2]
+    circle = plot_modes(extract_modes([synthesize_frf([mode], LINES)]), [mode], "x").axes[2]
     assert f"phase {degrees:.1f} ± 1.5°" in circle.get_title()
     (phase,) = (np.asarray(line.get_xydata()) for line in circle.lines if line.get_label() == "phase")
     x, y = phase[1] - phase[0]
@@ -101,7 +114,7 @@ def test_figure_writes_and_draws_the_phase_of_a_complex_mode(degrees: float) -> 
 
 def test_figure_keeps_labels_of_close_modes_apart() -> None:
     close = [Mode(1700.0, 0.01, 4e7), Mode(1704.0, 0.01, 4e7), Mode(1706.0, 0.01, 4e7)]
-    top = modes_figure(extract([noisy()]), close, "x").axes[0]
+    top = plot_modes(extract_modes([noisy()]), close, "x").axes[0]
     places = [label.xy[0] for label in top.texts if isinstance(label, Annotation)]
     assert places[0] == 1700.0
     assert np.all(np.diff(places) >= 0.01 * (LINES[-1] - LINES[0]))
@@ -158,8 +171,8 @@ def test_command_corrects_an_exponential_window_and_draws(
 @pytest.mark.parametrize("skew", [15e-6, -15e-6])
 def test_a_delay_between_the_channels_is_offered_as_skew(skew: float) -> None:
     modes = [Mode(700.0, 0.02, 6e7), Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.02, 9e7)]
-    late = synthesize(modes, LINES).receptance * np.exp(2j * np.pi * LINES * skew)
-    (said,) = remarks_on_all(fit_modes(Frf(LINES, late)))
+    late = synthesize_frf(modes, LINES).receptance * np.exp(2j * np.pi * LINES * skew)
+    (said,) = check_modes_together(fit_modes(Frf(LINES, late)))
     assert said.code == "channel-delay"
     found = re.search(r"sampled (-?[\d.]+) ± ([\d.]+) us late", said.text)
     assert found is not None
@@ -168,11 +181,11 @@ def test_a_delay_between_the_channels_is_offered_as_skew(skew: float) -> None:
 
 def test_figure_names_stable_poles_that_are_no_modes() -> None:
     modes = [*MODES, Mode(2800.0, 0.005, 1e8)]
-    state = edit_modes(extract([synthesize(modes, LINES)]), parse_edits(drop=["2800"]))
-    chart = modes_figure(state, modes_of(state), "x").axes[1]
+    state = edit_modes(extract_modes([synthesize_frf(modes, LINES)]), parse_mode_edits(drop=["2800"]))
+    chart = plot_modes(state, modes_from_extraction(state), "x").axes[1]
     assert "2800" in [text.get_text() for text in chart.texts]
-    assert candidates(state) == pytest.approx([2800.0], rel=1e-3)
+    assert candidate_frequencies(state) == pytest.approx([2800.0], rel=1e-3)
 
 
 def test_poles_that_are_hardly_a_part_of_what_was_measured_are_not_named() -> None:
-    assert candidates(extract([noisy()])).size == 0
+    assert candidate_frequencies(extract_modes([noisy()])).size == 0

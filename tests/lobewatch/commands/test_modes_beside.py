@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modal import Mode, synthesize
+from modal import Mode, synthesize_frf
 from tests.lobewatch.commands.test_modes import command
 
 DATA = Path(__file__).parents[2] / "data"
@@ -24,7 +24,7 @@ def points(tmp_path: Path) -> list[Path]:
     for place, (first, second) in enumerate([(3e7, 3e7), (2e7, 4e7), (-3e7, -5e7)]):
         modes = [Mode(PAIR[0], 0.03, first), Mode(PAIR[1], 0.03, second)]
         own = [Mode(2600.0, 0.02, 8e7)] if place == 2 else []
-        exact = synthesize([*modes, *own], lines).accelerance
+        exact = synthesize_frf([*modes, *own], lines).accelerance
         noise = np.random.default_rng(place).normal(size=(2, lines.size)) * 0.01 * np.max(np.abs(exact))
         noisy = exact + noise[0] + 1j * noise[1]
         files.append(tmp_path / f"point{place + 1}.csv")

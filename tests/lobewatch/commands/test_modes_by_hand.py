@@ -12,8 +12,8 @@ from typer.testing import CliRunner, Result
 
 from acquisition import Circumstances, Remark, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import app
-from lobewatch.show.spindle.describe_modes import in_order
-from modal import Mode, Trust, synthesize, trust_of
+from lobewatch.show.modes import sort_modes
+from modal import Mode, Trust, assess_trust, synthesize_frf
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -41,14 +41,14 @@ def frequencies(shop: Shop) -> list[float]:
 def tapped(shop: Shop) -> str:
     """A tap test of three modes; its identity."""
     about = Circumstances("m", shop.start, "reference", "x", "", shop.folder.toml_text)
-    tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, synthesize(MODES, LINES).accelerance))
+    tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, synthesize_frf(MODES, LINES).accelerance))
     shop.folder.commit(tap)
     return tap.id
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    values = synthesize(MODES, LINES).receptance * 1e6
+    values = synthesize_frf(MODES, LINES).receptance * 1e6
     rows = "".join(f"{f:.6g},{v.real:.9e},{v.imag:.9e}\n" for f, v in zip(LINES, values, strict=True))
     path = tmp_path / "frf.csv"
     path.write_text(f"Freq (Hz),Real (um/N),Imag (um/N)\n{rows}", encoding="utf-8")
@@ -68,8 +68,8 @@ def test_of_a_file_they_are_shown_and_nothing_else(file: Path) -> None:
 
 def test_a_mode_by_hand_is_shown_though_it_is_rejected() -> None:
     mode = Mode(900.0, 0.5, 9e7, remarks=(Remark("by-hand", "900 Hz", "added by hand"),))
-    assert trust_of(mode) is Trust.REJECTED
-    assert in_order([mode, Mode(1000.0, 0.5, 9e7)], rejected=False) == [mode]
+    assert assess_trust(mode) is Trust.REJECTED
+    assert sort_modes([mode, Mode(1000.0, 0.5, 9e7)], rejected=False) == [mode]
 
 
 def test_of_a_tap_test_they_are_kept_in_the_journal_and_hold_for_all_that_follows(shop: Shop) -> None:

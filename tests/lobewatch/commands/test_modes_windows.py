@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from acquisition import Structure, infer_averages
 from lobewatch.cli import main
-from lobewatch.measuring import Window, modes_of_file
-from modal import Mode, Trust, synthesize, trust_of
+from lobewatch.measurement import Window, fit_file_modes
+from modal import Mode, Trust, assess_trust, synthesize_frf
 from tests.modal.test_remarks import MODE, noisy
 
 FREQUENCY, DAMPING, STIFFNESS = 500.0, 0.005, 3e7
@@ -64,22 +64,22 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *ar
 @pytest.mark.parametrize("left", [0.02, 0.05, 0.2])
 def test_modes_of_hits_that_ring_on_hold_the_truth(tmp_path: Path, left: float) -> None:
     file = hit(tmp_path / "hit.csv", -np.log(left) / DECAY)
-    found = modes_of_file(file)
+    found = fit_file_modes(file)
     assert "windowed-here" in codes(found.remarks)
     mode = first(found.fitted)
     assert np.all(distance(mode) < 1)
     assert mode.stiffness == pytest.approx(STIFFNESS, rel=0.02)
-    assert trust_of(mode) is Trust.TRUSTED
+    assert assess_trust(mode) is Trust.TRUSTED
 
 
 def test_ringing_can_be_accepted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file = hit(tmp_path / "hit.csv", np.log(5) / DECAY)
-    as_it_is = modes_of_file(file, accept=["not-decayed"])
+    as_it_is = fit_file_modes(file, accept=["not-decayed"])
     assert codes(as_it_is.remarks) >= {"hits-accepted"}
     assert "windowed-here" not in codes(as_it_is.remarks)
-    assert trust_of(first(as_it_is.fitted)) is Trust.DOUBTFUL
+    assert assess_trust(first(as_it_is.fitted)) is Trust.DOUBTFUL
     code, said = run(monkeypatch, capsys, str(file), "--accept", "not-decayed")
     assert code == 0
     assert "averaged though they were refused" in said
@@ -91,8 +91,8 @@ def test_ringing_can_be_accepted(
 def test_a_window_that_began_before_the_hit_is_taken_out_of_stiffness(tmp_path: Path) -> None:
     tau = -0.01 / np.log(1 / 1.23)
     file = hit(tmp_path / "hit.csv", 0.4, before=0.01, tau=tau, noise=0.02)
-    known = first(modes_of_file(file, window=Window(tau)).fitted)
-    ignored = first(modes_of_file(file, window=Window(tau, start=0.0102)).fitted)
+    known = first(fit_file_modes(file, window=Window(tau)).fitted)
+    ignored = first(fit_file_modes(file, window=Window(tau, start=0.0102)).fitted)
     assert ignored.stiffness / STIFFNESS == pytest.approx(1.23, rel=0.01)
     assert known.stiffness == pytest.approx(STIFFNESS, rel=0.003)
     assert known.damping_ratio == pytest.approx(DAMPING, rel=0.01)
@@ -154,7 +154,7 @@ def test_coherence_of_an_frf_counts_where_its_averages_are_known(
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag, poor], axis=1)
     np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N) Coherence", comments="")
-    inferred = modes_of_file(file)
+    inferred = fit_file_modes(file)
     assert "averages-inferred" in codes(inferred.remarks)
     assert inferred.frf is not None
     assert inferred.frf.n_averages == pytest.approx(10, abs=3)
@@ -210,7 +210,7 @@ def test_a_mode_that_outlasts_the_window_is_left_out_and_said(
     """A line of hum or a clock looks like a mode of hardly any damping; the others have their answer all the same."""
     sharp = Mode(600.0, 0.0002, 3e9)
     lines = np.arange(400.0, 3000.0, 0.25)
-    receptance = synthesize([sharp, MODE], lines).receptance
+    receptance = synthesize_frf([sharp, MODE], lines).receptance
     file = tmp_path / "frf.csv"
     table = np.stack([lines, receptance.real, receptance.imag], axis=1)
     np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
@@ -230,12 +230,12 @@ def stiffness_at(frequency: float, modes: Sequence[Mode]) -> float:
 
 def test_a_window_that_nobody_named_is_said_with_its_time_constant(tmp_path: Path) -> None:
     path = hit(tmp_path / "windowed.csv", 0.5, tau=0.05)
-    silent = modes_of_file(path)
+    silent = fit_file_modes(path)
     (said,) = [remark for remark in silent.remarks if remark.code == "window-suspected"]
     assert "an exponential window of 0.05 s" in said.text
     assert "--window" in said.cure
     assert stiffness_at(FREQUENCY, silent.fitted) / STIFFNESS > 1.2
-    named = modes_of_file(path, window=Window(0.05))
+    named = fit_file_modes(path, window=Window(0.05))
     assert "window-suspected" not in [remark.code for remark in named.remarks]
     assert stiffness_at(FREQUENCY, named.fitted) == pytest.approx(STIFFNESS, rel=0.03)
-    assert "window-suspected" not in [remark.code for remark in modes_of_file(hit(tmp_path / "x.csv", 0.5)).remarks]
+    assert "window-suspected" not in [remark.code for remark in fit_file_modes(hit(tmp_path / "x.csv", 0.5)).remarks]

@@ -17,8 +17,8 @@ import pytest
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from modal import Mode, synthesize_frf
 from tests.lobewatch.commands.conftest import Run
 
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -46,7 +46,7 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def tap(folder: MachineFolder, about: Circumstances) -> None:
-    frf = synthesize([Mode(1713.0, 0.029, 3.5e7)], LINES)
+    frf = synthesize_frf([Mode(1713.0, 0.029, 3.5e7)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 

@@ -17,8 +17,8 @@ import pytest
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
-from lobewatch.notify.message import content_of
-from lobewatch.plant.plant import Plant, find_machines
+from lobewatch.fleet.fleet import Fleet, find_machines
+from lobewatch.notify.publish_status import make_message_content
 from lobewatch.screen.dashboard_server import DashboardServer
 
 Shop = Any
@@ -103,7 +103,7 @@ def check_already(rows: Rows) -> None:
 
 
 def check_messages_and_dashboard(plant: Path, rows: Rows) -> None:
-    messages = {m.key: content_of(m) for m in Plant(find_machines(plant)).standings()}
+    messages = {m.key: make_message_content(m) for m in Fleet(find_machines(plant)).assess_machines()}
     with DashboardServer(plant) as server:
         shown = {row["key"]: row for row in json.loads(get(server, "/machines"))["machines"]}
     for key, row in rows.items():

@@ -24,20 +24,20 @@ from acquisition import (
     MeasuredRate,
     PortInfo,
     TapsSource,
+    explain_no_ports,
     find_driver,
-    list_ports,
-    no_ports_hint,
+    list_serial_ports,
     probe_port,
 )
-from acquisition.devices.built_in import BUILT_IN
-from acquisition.ports.port_hints import explain_open_error
+from acquisition.devices.drivers import BUILT_IN_DRIVERS
+from acquisition.ports.serial_ports import explain_open_error
 from acquisition.taps.protocol import Frame, MessageType, encode_frame
 from lobewatch.cli import main
+from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import use_rate
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.device_connection import open_device
 from lobewatch.tap.emulated_spindle import emulate_machine
-from lobewatch.tap.plug import open_source
 
 CHANNELS = """driver = "dataq"
 
@@ -69,7 +69,7 @@ class Said(NamedTuple):
 def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MachineFolder:
     """The example machine with the sensors of a DATAQ device, in the working directory."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
     make_machine_folder(Path("trial"), "surrogate_machine.toml")
     toml = Path("trial/machine.toml")
     toml.write_text(toml.read_text("utf-8").replace("anti_alias = true ", CHANNELS + "# ", 1), "utf-8")
@@ -100,9 +100,9 @@ def taps_device(folder: MachineFolder) -> Any:
 
 def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, trial: MachineFolder) -> None:
     with dataq_device(trial) as device:
-        with open_source(trial.machine.daq, device.port) as source:
+        with open_device(trial.machine.daq, device.port) as source:
             assert isinstance(source, DataqSource)
-            use_rate(trial, source, MeasuredRate(source.sample_rate, 1.0, 250_000, 5.0))
+            apply_measured_rate(trial, source, MeasuredRate(source.sample_rate, 1.0, 250_000, 5.0))
         said = run("tap", "trial", "--port", device.port, "--details")
     assert said.code == 0, said.err
     assert "DI-4108, 50000 Hz" in said.err
@@ -120,20 +120,20 @@ def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, 
 
 
 def test_the_driver_is_the_one_that_machine_toml_names(trial: MachineFolder, beam: Path) -> None:
-    with dataq_device(trial) as device, open_source(trial.machine.daq, device.port) as source:
+    with dataq_device(trial) as device, open_device(trial.machine.daq, device.port) as source:
         assert isinstance(source, DataqSource)
         assert source.loss_detection == "digital word"
     toml = trial.toml.read_text("utf-8")
     trial.toml.write_text(toml.replace("[[daq", "loss_detection = false\n[[daq", 1), "utf-8")
     silent = MachineFolder("trial").machine.daq
-    with dataq_device(trial) as device, open_source(silent, device.port) as source:
+    with dataq_device(trial) as device, open_device(silent, device.port) as source:
         assert isinstance(source, DataqSource)
         assert source.loss_detection == "none"
     trial.toml.write_text(toml.replace(CHANNELS, ""), "utf-8")
-    with open_source(trial.machine.daq, f"file:{beam}") as source:
+    with open_device(trial.machine.daq, f"file:{beam}") as source:
         assert isinstance(source, FileSource)
         assert source.sample_rate == pytest.approx(50_000, rel=1e-3)
-    with taps_device(trial) as device, open_source(MachineFolder("trial").machine.daq, device.port) as source:
+    with taps_device(trial) as device, open_device(MachineFolder("trial").machine.daq, device.port) as source:
         assert isinstance(source, TapsSource)
 
 
@@ -161,7 +161,7 @@ def test_ports_lists_all_but_asks_only_usb_devices(
             PortInfo(device.port, 0x0683, 0x4108, "5E0ABC12", "DATAQ [CDC]"),
             PortInfo("/dev/ttyNOT_THERE", 0x16C0, 0x0483, "123", "USB Serial"),
         ]
-        monkeypatch.setattr(sys.modules["acquisition.devices.survey_ports"], "list_ports", lambda: listed)
+        monkeypatch.setattr(sys.modules["acquisition.devices.port_scan"], "list_serial_ports", lambda: listed)
         said = run("ports")
     lines = said.out.splitlines()
     assert "not asked: no USB device" in lines[1]
@@ -175,21 +175,21 @@ def test_ports_lists_all_but_asks_only_usb_devices(
 
 
 def test_a_port_in_use_is_said_to_be_so(run: Any, trial: MachineFolder) -> None:
-    with dataq_device(trial) as device, open_source(trial.machine.daq, device.port):
+    with dataq_device(trial) as device, open_device(trial.machine.daq, device.port):
         said = run("ports", "--port", device.port)
     assert "another program uses it: close that program" in said.out
     assert "No DAQ answers." in said.out
 
 
 def test_no_port_at_all_gets_a_sentence_with_the_cure(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["acquisition.devices.survey_ports"], "list_ports", list)
+    monkeypatch.setattr(sys.modules["acquisition.devices.port_scan"], "list_serial_ports", list)
     said = run("ports")
     assert said.code == 0
     assert said.out.startswith("No serial port on this computer: plug the DAQ in")
     assert json.loads(run("ports", "--json").out) == {"ports": [], "remarks": []}
-    assert "dmesg" in no_ports_hint("linux")
-    assert "Device Manager" in no_ports_hint("win32")
-    assert "cu.usbmodem" in no_ports_hint("darwin")
+    assert "dmesg" in explain_no_ports("linux")
+    assert "Device Manager" in explain_no_ports("win32")
+    assert "cu.usbmodem" in explain_no_ports("darwin")
 
 
 @pytest.mark.parametrize(
@@ -228,15 +228,15 @@ def test_the_group_in_the_cure_is_that_of_the_port(tmp_path: Path) -> None:
     ids=["dataq", "other"],
 )
 def test_a_strange_device_hears_one_question_only(monkeypatch: pytest.MonkeyPatch, vendor: int, first: bytes) -> None:
-    monkeypatch.setattr("acquisition.dataq.dialogue.ANSWER_TIME", 0.05)
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
-    monkeypatch.setattr("acquisition.taps.probe.ANSWER_TIME", 0.05)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_ECHO_TIMEOUT", 0.05)
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
+    monkeypatch.setattr("acquisition.taps.source.TAPS_PROBE_TIMEOUT", 0.05)
     master, slave = os.openpty()
     try:
         import tty
 
         tty.setraw(slave)
-        assert probe_port(os.ttyname(slave), BUILT_IN, vendor) is None
+        assert probe_port(os.ttyname(slave), BUILT_IN_DRIVERS, vendor) is None
         heard = os.read(master, 4096)
     finally:
         os.close(master)
@@ -248,7 +248,7 @@ def test_a_device_that_the_wrong_driver_has_talked_to_is_named_all_the_same(tria
     with taps_device(trial) as device:
         handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
         os.write(handle, b"stop\rinfo 0\r")
-        found = probe_port(device.port, BUILT_IN)
+        found = probe_port(device.port, BUILT_IN_DRIVERS)
         os.close(handle)
     assert found is not None
     assert found.driver == "taps"
@@ -268,16 +268,16 @@ def test_a_device_that_talks_nonsense_is_no_answer(monkeypatch: pytest.MonkeyPat
 
         def close(self) -> None: ...
 
-    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.01)
-    monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "SerialLink", Babbler)
-    assert probe_port("COM1", BUILT_IN) is None
+    monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.01)
+    monkeypatch.setattr(sys.modules["acquisition.devices.port_scan"], "SerialLink", Babbler)
+    assert probe_port("COM1", BUILT_IN_DRIVERS) is None
 
 
 def test_old_firmware_is_named_all_the_same(trial: MachineFolder) -> None:
     device = dataq_device(trial)
     device._info[2] = DataqTraits(firmware="1.20").firmware  # noqa: SLF001
     with device:
-        found = probe_port(device.port, BUILT_IN)
+        found = probe_port(device.port, BUILT_IN_DRIVERS)
     assert found is not None
     assert (found.driver, found.identity.firmware) == ("dataq", "1.20")
 
@@ -287,10 +287,10 @@ def test_the_ports_of_the_system_are_listed_by_name(monkeypatch: pytest.MonkeyPa
 
     ports = [ListPortInfo("/dev/ttyACM1"), ListPortInfo("/dev/ttyACM0")]
     ports[0].vid, ports[0].pid, ports[0].serial_number = 0x0683, 0x4108, "5E0ABC12"
-    monkeypatch.setattr(sys.modules["acquisition.ports.list_ports"], "comports", lambda: ports)
-    assert [port.device for port in list_ports()] == ["/dev/ttyACM0", "/dev/ttyACM1"]
-    assert list_ports()[1] == PortInfo("/dev/ttyACM1", 0x0683, 0x4108, "5E0ABC12", "n/a")
-    assert list_ports()[0].vendor is None
+    monkeypatch.setattr(sys.modules["acquisition.ports.serial_ports"], "comports", lambda: ports)
+    assert [port.device for port in list_serial_ports()] == ["/dev/ttyACM0", "/dev/ttyACM1"]
+    assert list_serial_ports()[1] == PortInfo("/dev/ttyACM1", 0x0683, 0x4108, "5E0ABC12", "n/a")
+    assert list_serial_ports()[0].vendor is None
 
 
 def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFolder) -> None:

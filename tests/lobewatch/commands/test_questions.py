@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lobewatch.cli import app
-from lobewatch.decay import Standing
 from lobewatch.logbook import Logbook
+from lobewatch.monitoring import MachineStatus
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.session import outcome_of
-from lobewatch.verdicts.verdict import Word
+from lobewatch.tap.session import build_outcome
+from lobewatch.verdicts.verdict import Stability
 
 SPINDLE = "# The spindle of the example"
 SAFE = """
@@ -55,12 +55,12 @@ def refused(*arguments: object) -> str:
     return str(said.value)
 
 
-def standing(shop: Shop, days: float = 1.0) -> Standing:
-    found: Standing = shop.logbook.standing(shop.start + timedelta(days=days))
+def standing(shop: Shop, days: float = 1.0) -> MachineStatus:
+    found: MachineStatus = shop.logbook.standing(shop.start + timedelta(days=days))
     return found
 
 
-def codes(found: Standing) -> list[str]:
+def codes(found: MachineStatus) -> list[str]:
     return [remark.code for remark in found.remarks]
 
 
@@ -70,10 +70,10 @@ def tap_file(shop: Shop, tap_id: str) -> Path:
 
 
 def newest(logbook: Logbook) -> str:
-    return logbook.newest().id
+    return logbook.newest_tap().id
 
 
-def words(shop: Shop) -> set[Word]:
+def words(shop: Shop) -> set[Stability]:
     return {found.word for found in shop.logbook.verdicts()}
 
 
@@ -85,11 +85,11 @@ def test_a_beam_is_stored_and_never_the_baseline_of_a_mill(shop: Shop, beam: Pat
     shop.edit(SPINDLE, SAFE + SPINDLE)
     shop.tap_both()
     found = standing(shop)
-    assert (found.light, codes(found)) == ("warn", ["no-mode-in-band"])
+    assert (found.status, codes(found)) == ("warn", ["no-mode-in-band"])
     series = found.series_of("reference", "x")
     assert series is not None
-    assert series.is_first
-    assert words(shop) == {Word.STABLE}
+    assert series.is_baseline
+    assert words(shop) == {Stability.STABLE}
 
 
 def test_a_beam_with_a_mode_in_the_band_is_never_silently_the_first_tap(shop: Shop, beam: Path) -> None:
@@ -97,10 +97,10 @@ def test_a_beam_with_a_mode_in_the_band_is_never_silently_the_first_tap(shop: Sh
     assert "question (stiffness-off-model): stiffness 304 N/um is 8.5 times that of the model, 35.9 N/um" in said.stdout
     shop.tap_both()
     found = standing(shop)
-    assert (found.light, codes(found)) == ("warn", ["stiffness-off-model"])
+    assert (found.status, codes(found)) == ("warn", ["stiffness-off-model"])
     series = found.series_of("reference", "x")
     assert series is not None
-    assert series.is_first
+    assert series.is_baseline
 
 
 @pytest.mark.parametrize(("ratio", "asked"), [(1 / 5, True), (1 / 3, False), (3.0, False), (5.0, True)])
@@ -137,25 +137,25 @@ def test_a_gain_that_is_another_is_asked_about_and_a_fall_is_not(
 def test_a_limit_from_a_gain_that_is_another_is_no_stable_program(shop: Shop) -> None:
     shop.edit(SPINDLE, SAFE + SPINDLE)
     shop.tap_both()
-    assert words(shop) == {Word.STABLE}
+    assert words(shop) == {Stability.STABLE}
     for day, direction in ((30.0, "x"), (30.1, "y")):
         shop.tap(day, 1713.0 if direction == "x" else 1690.0, direction, stiffness=2 * 3.5e7)
-    assert words(shop) == {Word.DOUBTFUL}
+    assert words(shop) == {Stability.DOUBTFUL}
     assert "stiffness-jump" in str(run("check", shop.path).output)
 
 
 def test_a_beam_between_the_taps_of_a_mill_is_asked_about(shop: Shop, beam: Path) -> None:
     shop.edit("band_hz", "# band_hz")
     shop.tap_both()
-    assert standing(shop).light == "good"
+    assert standing(shop).status == "good"
     run("replay", shop.path, beam, "--date", "2026-01-20")
     found = standing(shop, 6)
-    assert found.light != "good"
+    assert found.status != "good"
     assert set(codes(found)) & {"frequency-jump", "no-mode-to-follow"}
     shop.tap(10, 1713.0)
     shop.tap(10.1, 1690.0, "y")
     again = standing(shop, 11)
-    assert again.light == "warn"
+    assert again.status == "warn"
     assert "frequency-alarm" not in codes(again)
 
 
@@ -163,7 +163,7 @@ def test_the_lines_of_a_recording_must_cover_the_band(shop: Shop) -> None:
     shop.tap_both()
     shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 5000]")
     found = standing(shop)
-    assert found.light == "warn"
+    assert found.status == "warn"
     assert codes(found).count("other-band") == 1
     assert found.remarks[0].about.startswith("2 tap tests, ")
     assert "4..3996 Hz, do not cover [mode] band_hz 1200..5000 Hz" in found.remarks[0].text
@@ -178,7 +178,7 @@ def test_a_jump_alarms_downwards_and_is_asked_about(shop: Shop, share: float, li
     shop.tap_both()
     shop.tap(30, 1713.0 * share)
     found = standing(shop, 31)
-    assert found.light == light
+    assert found.status == light
     assert ("frequency-jump" in codes(found)) is asked
     assert ("frequency-alarm" in codes(found)) is (light == "alarm")
 
@@ -186,7 +186,7 @@ def test_a_jump_alarms_downwards_and_is_asked_about(shop: Shop, share: float, li
 def test_an_upward_jump_hides_no_alarm(shop: Shop) -> None:
     for days, share in enumerate((1.0, 0.95, 0.89)):
         shop.tap(days, 1713.0 * share)
-    assert standing(shop, 3).light == "alarm"
+    assert standing(shop, 3).status == "alarm"
     shop.tap(3, 1713.0 * 1.1)
     found = standing(shop, 4)
     assert {"frequency-alarm", "frequency-jump"} <= set(codes(found))
@@ -201,12 +201,12 @@ def test_the_outcome_and_the_report_name_the_command_that_answers(shop: Shop) ->
     command = shlex.join(
         ["lobewatch", "replay", str(shop.path), str(tap_file(shop, tap_id)), "--accept", "frequency-jump"]
     )
-    outcome = outcome_of(logbook, logbook.measurement(tap_id))
+    outcome = build_outcome(logbook, logbook.measurement(tap_id))
     assert any(command in text for text in outcome.texts)
     assert "in question" in outcome.texts[0]
     assert command in render_report(logbook, "reference", "x")
     (doubtful,) = logbook.verdicts()
-    assert (doubtful.word, doubtful.decided_by) == (Word.DOUBTFUL, "question")
+    assert (doubtful.word, doubtful.decided_by) == (Stability.DOUBTFUL, "question")
     _, *words_of_it = shlex.split(command)
     assert run(*words_of_it).exit_code == 0
     assert "frequency-jump" not in codes(standing(shop, 31))

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import DataError, Description, Recording, look
+from acquisition import DataError, Description, Recording, inspect_file
 from lobewatch.cli import app
-from lobewatch.logbook.replaying.store import store_recordings
+from lobewatch.logbook.recordings.store_recordings import store_recordings
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -191,8 +191,8 @@ def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> No
     files, said = sorted(tmp_path.glob("*.csv")), Description(date_pattern="%Y-%m-%d")
     with shop.folder.locked():
         stored = store_recordings(shop.folder, files, said, keep_going=True)
-    assert (len(stored.fresh), [*stored.refused]) == (200, [bad])
-    assert "Real holds 'x' in line 3, which is no number" in stored.refused[bad]
+    assert (len(stored.new_tap_ids), [*stored.rejected]) == (200, [bad])
+    assert "Real holds 'x' in line 3, which is no number" in stored.rejected[bad]
     assert len(taps(shop)) == 200
 
 
@@ -203,13 +203,13 @@ def test_a_file_that_changes_while_it_is_read_is_refused(
     growing, wait = folder / "a 20240901.csv", "it changes while it is read; wait until it is written"
 
     def looked(path: Path, said: Description) -> Recording:
-        found = look(path, said)
+        found = inspect_file(path, said)
         if path == growing:
             content = path.read_bytes()
             path.write_bytes(content + b"8,1,1\n" if length > 0 else content[:-1])
         return found
 
-    monkeypatch.setattr("lobewatch.logbook.replaying.read_tap_test.look", looked)
+    monkeypatch.setattr("lobewatch.logbook.recordings.recorded_files.inspect_file", looked)
     with pytest.raises(DataError, match=f"{growing.name}: {wait}"):
         run("replay", shop.path, growing, "--date-pattern", "%Y%m%d")
     with pytest.raises(DataError, match=f"{growing.name}: {wait} .1 of 3 files; the others are stored"):

@@ -24,11 +24,11 @@ from acquisition import (
     TapsEmulator,
     TapsSource,
 )
-from acquisition.emulation.simulated_source import Signal
+from acquisition.emulation.emulated_device import SignalFunction
 from lobewatch.cli import main
+from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import use_rate
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.sensors import list_sensors
 
 RATE = 25600.0
@@ -66,12 +66,16 @@ def sensors(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pyte
     monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
 
     def run(
-        signal: Signal, channels: tuple[Channel, ...], *arguments: object, rate: float = RATE, realtime: bool = False
+        signal: SignalFunction,
+        channels: tuple[Channel, ...],
+        *arguments: object,
+        rate: float = RATE,
+        realtime: bool = False,
     ) -> Said:
         with TapsEmulator(signal, channels, rate, realtime=realtime) as device:
             if not realtime:
                 with TapsSource(device.port) as source:
-                    use_rate(folder, source, MeasuredRate(rate, 0.1, 5, 5.0))
+                    apply_measured_rate(folder, source, MeasuredRate(rate, 0.1, 5, 5.0))
             monkeypatch.setattr(
                 sys, "argv", ["lobewatch", "sensors", str(folder.path), "--port", device.port, *map(str, arguments)]
             )
@@ -88,7 +92,7 @@ def silence(first: int, n: int) -> NDArray[np.float64]:
     return np.zeros((2, n))
 
 
-def hung_mass(mass: float) -> Signal:
+def hung_mass(mass: float) -> SignalFunction:
     """Somebody hits a free mass: accelerance 1/m above its pendulum of 1.2 Hz."""
     pendulum = Structure(np.array([1.2]), np.array([0.3]), np.array([mass * (2 * np.pi * 1.2) ** 2]))
     how = Hammering(interval_range=(0.3, 0.35), response_noise=0.2)

@@ -14,9 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Conditions
-from lobewatch.decay.trend import MONTH, Trend
-from lobewatch.plant.learn_scatter import learn_scatter
-from lobewatch.plant.summarise import summarise
+from lobewatch.fleet.summarize import learn_scatter, summarize_machine
+from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -28,7 +27,7 @@ def tap_series(shop: Shop, percents: NDArray[np.float64], first: int = 0, **said
     """Monthly tests in both directions, alike but for a little; said: a value a test."""
     for month, percent in enumerate(percents, first):
         about = {name: values[month - first] for name, values in said.items()}
-        shop.tap(MONTH * month, FREQUENCY * math.exp(percent / 100), **about)
+        shop.tap(DAYS_PER_MONTH * month, FREQUENCY * math.exp(percent / 100), **about)
 
 
 def trend_of(shop: Shop) -> Trend:
@@ -45,8 +44,8 @@ def test_who_held_the_hammer_counts_in_the_watch(new_shop: type[Shop], tmp_path:
         shop.put("")
     tap_series(unsaid, y)
     tap_series(said, y, operator=names)
-    assert trend_of(unsaid).open_fall is not None
-    assert trend_of(said).open_fall is None
+    assert trend_of(unsaid).open_drop is not None
+    assert trend_of(said).open_drop is None
     assert [point.operator for point in trend_of(said).points] == names
 
 
@@ -65,25 +64,25 @@ def test_running_hours_are_the_time_of_a_forecast(new_shop: type[Shop], tmp_path
     by_hours = shop_with_hours(new_shop(tmp_path / "hours"), USED)
     by_days = shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
     last = by_hours.points[-1].time.timestamp() / 86400
-    truth = last + MONTH * (3.0 - 1.5) / 0.1  # 0.1 % a month at 400 h a month
-    reached = by_hours.reach(-3.0)
+    truth = last + DAYS_PER_MONTH * (3.0 - 1.5) / 0.1  # 0.1 % a month at 400 h a month
+    reached = by_hours.forecast_level(-3.0)
     assert reached.earliest is not None
     assert reached.latest is not None
     assert reached.earliest <= truth <= reached.latest
-    assert by_hours.course is not None
-    assert by_days.course is not None
-    assert by_hours.course.kind == "line"
-    assert by_days.course.kind != "line"
+    assert by_hours.likeliest_shape is not None
+    assert by_days.likeliest_shape is not None
+    assert by_hours.likeliest_shape.kind == "line"
+    assert by_days.likeliest_shape.kind != "line"
     assert by_hours.rate is not None
     assert by_hours.rate.value == pytest.approx(-0.1, abs=0.005)
-    assert by_hours.course.start == pytest.approx(by_hours.points[0].time.timestamp() / 86400, abs=1)
+    assert by_hours.likeliest_shape.start == pytest.approx(by_hours.points[0].time.timestamp() / 86400, abs=1)
 
 
 def test_hours_that_go_back_are_said_and_do_not_count(new_shop: type[Shop], tmp_path: Path) -> None:
     wrong = [*USED[:20], USED[2], *USED[21:]]
     back = new_shop(tmp_path / "back")
     by_wrong, by_days = shop_with_hours(back, wrong), shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
-    assert by_wrong.reach(-3.0) == by_days.reach(-3.0)
+    assert by_wrong.forecast_level(-3.0) == by_days.forecast_level(-3.0)
     remarks = [remark for row in back.logbook.history.rows for remark in row.remarks]
     assert [str(remark.text)[:32] for remark in remarks if remark.code == "hours-went-back"] == [
         "running hours 200 h, 4000 h befo"
@@ -93,8 +92,8 @@ def test_hours_that_go_back_are_said_and_do_not_count(new_shop: type[Shop], tmp_
 def test_a_spindle_that_stood_still_has_decayed_in_no_time(new_shop: type[Shop], tmp_path: Path) -> None:
     hours: list[float | None] = [0.0, 100.0, 100.0, 100.0, *(100.0 * i for i in range(2, 23))]
     trend = shop_with_hours(new_shop(tmp_path / "m"), hours)
-    assert trend.past is not None
-    steps = np.diff(trend.past.dates)
+    assert trend.past_fit is not None
+    steps = np.diff(trend.past_fit.dates)
     assert np.all(steps > 0)
     assert steps[1:3] == pytest.approx([1e-6, 1e-6])
 
@@ -117,7 +116,7 @@ def test_a_young_machine_learns_the_scatter_of_the_others(new_shop: type[Shop], 
         other = new_shop(tmp_path / f"other{number}")
         other.put("")
         tap_series(other, 0.2 * random.normal(size=16))
-        summarise(other.logbook, other.start + timedelta(days=600))
+        summarize_machine(other.logbook, other.start + timedelta(days=600))
     fallen = np.array([0.1, -0.1, 0.05, -1.2, -1.0, -1.1])
     young, alone = new_shop(tmp_path / "young"), new_shop(tmp_path / "far" / "alone")
     for shop in (young, alone):
@@ -130,8 +129,8 @@ def test_a_young_machine_learns_the_scatter_of_the_others(new_shop: type[Shop], 
     (line,) = [line for line in lines if line["kind"] == "scatter"]
     assert line["alone"][0] == pytest.approx(0.2, rel=0.4)
     assert line["series"] == 5
-    assert trend_of(young).open_fall is not None
-    assert trend_of(alone).open_fall is None
+    assert trend_of(young).open_drop is not None
+    assert trend_of(alone).open_drop is None
     assert "scatter" not in (alone.path / "journal.jsonl").read_text("utf-8")
     before = trend_of(young).detection.scores
     for number in range(5):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobewatch.history.history_columns import to_columns
+from lobewatch.history.export_columns import make_export_columns
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -18,7 +18,7 @@ def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: 
     newest = shop.tap(30, 1650.0)
     logbook = shop.logbook
     rulings = logbook.rulings(newest)
-    columns = to_columns(logbook.history, logbook.machine).columns
+    columns = make_export_columns(logbook.history, logbook.machine).columns
     expected = [rulings[name].limit for name in "ABC"]
     assert np.all(np.isfinite(expected))
     assert np.asarray(columns["program_limit"])[1] == pytest.approx(expected)

@@ -15,8 +15,8 @@ from typer.testing import CliRunner, Result
 from acquisition import TapTest
 from lobewatch.cli import app
 from lobewatch.history import History
-from lobewatch.measuring import Measurement, measure
-from lobewatch.measuring.workers.software import SOFTWARE
+from lobewatch.measurement import Measurement, measure
+from lobewatch.measurement.software import CURRENT_SOFTWARE
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -36,7 +36,7 @@ def tapped(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> Shop:
         return replace(found, followed=found.followed.scaled(1 + 100 / found.followed.frequency, 1.0, "older"))
 
     with monkeypatch.context() as patch:
-        patch.setattr("lobewatch.history.history.SOFTWARE", SOFTWARE._replace(lobewatch="0.0.1"))
+        patch.setattr("lobewatch.history.history.CURRENT_SOFTWARE", CURRENT_SOFTWARE._replace(lobewatch="0.0.1"))
         patch.setattr("lobewatch.history.tap_measurements.measure", otherwise)
         assert frequencies(shop.logbook.history) == [1813, 1812, 1811]
     return shop

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
-from lobewatch.history.left_out import left_out
-from lobewatch.machine.additions.correct import exclude
-from modal import Mode, synthesize
+from lobewatch.history.tap_measurements import measure_excluded_taps
+from lobewatch.machine.folder_updates import exclude_entry
+from modal import Mode, synthesize_frf
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -22,12 +22,12 @@ def test_an_excluded_test_is_followed_from_the_one_before_it(shop: Shop) -> None
     shop.tap(0, 1400.0)
     text = shop.folder.toml.read_text("utf-8")
     about = Circumstances("m", shop.start + timedelta(days=10), "reference", "x", "", text)
-    frf = synthesize([Mode(1410.0, 0.03, 3.5e7), Mode(2000.0, 0.03, 3.5e7)], LINES)
+    frf = synthesize_frf([Mode(1410.0, 0.03, 3.5e7), Mode(2000.0, 0.03, 3.5e7)], LINES)
     tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance))
     shop.folder.commit(tap)
     shop.tap(20, 2000.0)
-    exclude(shop.folder, tap.id, "two modes")
+    exclude_entry(shop.folder, tap.id, "two modes")
     logbook = shop.logbook
-    (row,) = left_out(shop.folder, logbook.files.excluded, logbook.history.rows)
+    (row,) = measure_excluded_taps(shop.folder, logbook.files.excluded, logbook.history.rows)
     assert row.tap_id == tap.id
     assert row.frequency.value == pytest.approx(1410.0, rel=1e-3)

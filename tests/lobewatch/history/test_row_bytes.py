@@ -8,17 +8,17 @@ from datetime import UTC, datetime
 import pytest
 
 from acquisition import Circumstances, Conditions, Remark, TapTest, from_accelerance, new_tap_id
-from lobewatch.history import Row
-from lobewatch.history.row_bytes import decode_row, encode_row
+from lobewatch.history import HistoryRow
+from lobewatch.history.row_codec import decode_row, encode_row
 from lobewatch.logbook import Logbook
-from lobewatch.measuring.estimate import Estimate
-from lobewatch.measuring.questions import QUESTIONS
-from lobewatch.verdicts.verdict import Ruling, Word
-from modal import Mode, synthesize
+from lobewatch.measurement.estimate import Estimate
+from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS
+from lobewatch.verdicts.verdict import Stability, StoredVerdict
+from modal import Mode, synthesize_frf
 from tests.lobewatch.conftest import LINES, START, Shop
 
 HASHES = {"A": "of A"}
-ROW = Row(
+ROW = HistoryRow(
     "T",
     START,
     "reference",
@@ -30,17 +30,19 @@ ROW = Row(
     remarks=(Remark("frequency-jump", "1713 Hz", "far off"), Remark("accepted", "clock-ahead", "was right")),
     x=((1690.0, 0.03, 3.4e7, 0.0),),
     y=((1713.0, 0.03, 3.5e7, -12.5),),
-    rulings={"A": Ruling(Word.DOUBTFUL, 2.5e-3)},
+    verdicts={"A": StoredVerdict(Stability.DOUBTFUL, 2.5e-3)},
     baseline=START,
     series="first",
     conditions=Conditions(temperature_c=31.5, state="warm"),
 )
-PLAIN = replace(ROW, remarks=(), conditions=Conditions(), baseline=None, rulings={"A": Ruling(Word.STABLE, 1e-3)})
+PLAIN = replace(
+    ROW, remarks=(), conditions=Conditions(), baseline=None, verdicts={"A": StoredVerdict(Stability.STABLE, 1e-3)}
+)
 
 
 @pytest.mark.parametrize("row", [ROW, PLAIN], ids=["asked about", "without remarks"])
-def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: Row) -> None:
-    names = [one.name for one in fields(Row)] + ["questions", "accepted", "mode", "followed"]
+def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: HistoryRow) -> None:
+    names = [one.name for one in fields(HistoryRow)] + ["questions", "accepted", "mode", "followed"]
     for name in names:
         number, read = decode_row(encode_row(7, row, HASHES), HASHES)
         assert number == 7
@@ -52,7 +54,7 @@ def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: Row) -
     assert (changed.followed, changed.questions, changed.accepted) == (row.followed, row.questions, row.accepted)
 
 
-@pytest.mark.parametrize("code", QUESTIONS)
+@pytest.mark.parametrize("code", RECORDING_QUESTIONS)
 def test_no_question_is_overlooked(code: str) -> None:
     asked = replace(PLAIN, remarks=(Remark("one-direction", "reference", "x alone"), Remark(code, "", "is it?")))
     assert [one.code for one in decode_row(encode_row(0, asked, HASHES), HASHES)[1].questions] == [code]
@@ -90,10 +92,10 @@ def test_rows_that_were_compared_once_are_compared_again_where_another_test_come
 
 def values(logbook: Logbook) -> list[str]:
     """All of each row, to the last digit; there are no programs to say a word on."""
-    return [repr(replace(row, rulings=None)) for row in logbook.history.rows]
+    return [repr(replace(row, verdicts=None)) for row in logbook.history.rows]
 
 
 def commit(logbook: Logbook, shop: Shop, days: int, frequency: float) -> None:
     about = Circumstances("m", datetime.fromtimestamp(START.timestamp() + 86400 * days, UTC), "reference")
-    frf = from_accelerance(LINES, synthesize([Mode(frequency, 0.03, 3.5e7)], LINES).accelerance)
+    frf = from_accelerance(LINES, synthesize_frf([Mode(frequency, 0.03, 3.5e7)], LINES).accelerance)
     logbook.commit(TapTest(new_tap_id(about), about, frf))

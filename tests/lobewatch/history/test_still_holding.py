@@ -10,8 +10,8 @@ import pytest
 
 from acquisition import Conditions
 from lobewatch.logbook import Logbook
-from lobewatch.machine.additions.correct import add_event, exclude, include
-from lobewatch.measuring import measure
+from lobewatch.machine.folder_updates import add_event, exclude_entry, include_entry
+from lobewatch.measurement import measure
 from tests.lobewatch.conftest import START, Shop
 
 Analysed = Callable[[], list[int]]
@@ -49,12 +49,12 @@ def tapped(shop: Shop) -> Shop:
 
 
 def values(logbook: Logbook) -> list[str]:
-    return [repr(replace(row, rulings=None)) for row in logbook.history.rows]
+    return [repr(replace(row, verdicts=None)) for row in logbook.history.rows]
 
 
 def is_as_from_the_start(shop: Shop) -> bool:
     known = values(shop.logbook)
-    shop.folder.history.unlink()
+    shop.folder.history_path.unlink()
     return known == values(shop.logbook)
 
 
@@ -71,12 +71,12 @@ def test_a_backdated_test_alters_those_that_build_on_it(tapped: Shop, analysed: 
 def test_a_test_taken_out_and_back_alters_its_neighbours(tapped: Shop, analysed: Analysed) -> None:
     taken = tapped.logbook.taps[3].id
     analysed()
-    exclude(tapped.folder, taken, "wrong tool")
+    exclude_entry(tapped.folder, taken, "wrong tool")
     assert len(tapped.logbook.history.rows) == 9
     assert analysed() == [20, 50, 60, 70]
     assert is_as_from_the_start(tapped)
     analysed()
-    include(tapped.folder, taken)
+    include_entry(tapped.folder, taken)
     assert len(tapped.logbook.history.rows) == 10
     assert analysed() == [30, 40, 50, 60, 70]
     assert is_as_from_the_start(tapped)

@@ -10,12 +10,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lobewatch.cli import app
+from lobewatch.fleet.fleet import Fleet
 from lobewatch.logbook import Logbook
-from lobewatch.plant.plant import Plant
-from lobewatch.show.plant.plant_rows import plant_rows
+from lobewatch.show.fleet.fleet_status import fleet_rows
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.session import outcome_of
-from lobewatch.verdicts import Word
+from lobewatch.tap.session import build_outcome
+from lobewatch.verdicts import Stability
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -58,9 +58,9 @@ def test_an_old_one_is_left_out_and_said(tapped: Shop) -> None:
     (program,) = logbook.verdicts()
     assert program.limit * 1e3 == pytest.approx(sound[0]["limit_mm"])
     assert bad.name in render_report(logbook, "reference", "x")
-    (row,) = plant_rows(Plant({"m": tapped.path}).standings())
+    (row,) = fleet_rows(Fleet({"m": tapped.path}).assess_machines())
     assert bad.name in row["note"]
-    outcome = outcome_of(logbook, logbook.measurement(logbook.taps[-1].id))
+    outcome = build_outcome(logbook, logbook.measurement(logbook.taps[-1].id))
     assert sum(bad.name in text for text in outcome.texts) == 1
 
 
@@ -68,7 +68,7 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     older = file_of(tapped, -2)
     content = older.read_bytes()
     flip(older)
-    assert [one.word for one in tapped.logbook.verdicts()] == [Word.DOUBTFUL]
+    assert [one.word for one in tapped.logbook.verdicts()] == [Stability.DOUBTFUL]
     older.write_bytes(content)
     bad = file_of(tapped, -1)
     assert run("check", tapped.path).exit_code == 0
@@ -78,10 +78,10 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     assert said.exit_code == 1
     assert "tap again" in said.stdout
     logbook = tapped.logbook
-    assert [one.word for one in logbook.verdicts()] == [Word.DOUBTFUL]
-    assert [one.word for one in logbook.rulings(logbook.taps[-1].id).values()] == [Word.DOUBTFUL]
+    assert [one.word for one in logbook.verdicts()] == [Stability.DOUBTFUL]
+    assert [one.word for one in logbook.rulings(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
     bad.write_bytes(content)
-    assert [one.word for one in tapped.logbook.verdicts()] == [Word.STABLE]
+    assert [one.word for one in tapped.logbook.verdicts()] == [Stability.STABLE]
     flip(bad)
     tapped.tap(60, 1690.0, "y")
     assert run("check", tapped.path).exit_code == 0
@@ -89,11 +89,11 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
 
 def test_one_that_is_found_damaged_late_is_left_out_too(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     tapped.logbook.standing()
-    monkeypatch.setattr("lobewatch.machine.contents.PROVED_BYTES", 0)
+    monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_BYTES", 0)
     bad = file_of(tapped, -1)
     flip(bad)
     logbook = tapped.logbook
-    assert [one.word for one in logbook.verdicts()] == [Word.DOUBTFUL]
+    assert [one.word for one in logbook.verdicts()] == [Stability.DOUBTFUL]
     assert [remark.about for remark in logbook.remarks if remark.code == "tap-damaged"] == [f"taps/{bad.name}"]
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from acquisition import Conditions
-from lobewatch.decay.alarm import Alarm
-from lobewatch.logbook.acknowledge import acknowledge
-from lobewatch.machine.additions.correct import add_event, exclude, include
+from lobewatch.logbook.operator_entries import acknowledge_alarms
+from lobewatch.machine.folder_updates import add_event, exclude_entry, include_entry
+from lobewatch.monitoring.alarm import Alarm
 from tests.lobewatch.commands.conftest import Run, refused, run
 from tests.lobewatch.conftest import START
 
@@ -80,9 +80,9 @@ def test_a_new_baseline_closes_it_and_one_taken_back_opens_it_again(mill: Shop, 
 
 def test_an_alarm_is_the_same_until_it_is_closed(mill: Shop) -> None:
     (first,) = alarms(mill, 18)
-    raised = mill.logbook.taps[[tap.id for tap in mill.logbook.taps].index(first.raised_by)]
+    raised = mill.logbook.taps[[tap.id for tap in mill.logbook.taps].index(first.triggered_by)]
     assert first.id == f"decay:reference:x:{raised.id}"
-    assert first.raised == datetime.fromisoformat(raised.time)
+    assert first.triggered_at == datetime.fromisoformat(raised.time)
     tap_months(mill, falling(24)[18:], 18)
     assert [alarm.id for alarm in alarms(mill, 24)] == [first.id]
 
@@ -117,10 +117,10 @@ def test_acknowledged_is_said_everywhere_and_the_light_stays(mill: Shop, run: Ru
 
 def test_acknowledgement_ends_with_its_date_and_with_the_alarm(mill: Shop) -> None:
     soon = datetime.now(UTC) + timedelta(days=3)
-    acknowledge(mill.logbook, until=soon)
+    acknowledge_alarms(mill.logbook, until=soon)
     (known,) = alarms(mill, 18)
-    assert known.is_quiet(soon - timedelta(hours=1))
-    assert not known.is_quiet(soon + timedelta(hours=1))
+    assert known.is_acknowledged(soon - timedelta(hours=1))
+    assert not known.is_acknowledged(soon + timedelta(hours=1))
     tap_months(mill, [0.0] * 16, 18)
     assert alarms(mill, 34) == []
     tap_months(mill, [3.0] * 8, 34)
@@ -129,18 +129,18 @@ def test_acknowledgement_ends_with_its_date_and_with_the_alarm(mill: Shop) -> No
 
 
 def test_acknowledgement_survives_exclusions(mill: Shop) -> None:
-    acknowledge(mill.logbook, note="known")
+    acknowledge_alarms(mill.logbook, note="known")
     (known,) = alarms(mill, 18)
-    exclude(mill.folder, known.raised_by, "hammer slipped")
+    exclude_entry(mill.folder, known.triggered_by, "hammer slipped")
     (other,) = alarms(mill, 18)
-    assert other.raised_by != known.raised_by
+    assert other.triggered_by != known.triggered_by
     assert other.acknowledgement == known.acknowledgement
-    include(mill.folder, known.raised_by)
+    include_entry(mill.folder, known.triggered_by)
     assert alarms(mill, 18) == [known]
 
 
 def test_an_acknowledgement_of_before_a_new_baseline_counts_no_more(mill: Shop) -> None:
-    acknowledge(mill.logbook)
+    acknowledge_alarms(mill.logbook)
     add_event(mill.folder, "spindle exchanged", at(mill, -0.5), new_baseline=True)
     assert [alarm.acknowledgement for alarm in alarms(mill, 18)] == [None]
 
@@ -152,8 +152,8 @@ def test_fixed_limits_and_programs_ring_too_each_with_the_test_that_raised_it(sh
     ringing = alarms(shop, 5)
     assert {alarm.code for alarm in ringing} == {"frequency-alarm", "program-not-stable"}
     by_code = {alarm.code: alarm for alarm in ringing}
-    assert by_code["frequency-alarm"].raised_by == ids[2]
-    (one,) = acknowledge(shop.logbook, "frequency-alarm")
+    assert by_code["frequency-alarm"].triggered_by == ids[2]
+    (one,) = acknowledge_alarms(shop.logbook, "frequency-alarm")
     assert one.code == "frequency-alarm"
     assert {alarm.code for alarm in alarms(shop, 5) if alarm.acknowledgement} == {"frequency-alarm"}
 
@@ -167,12 +167,12 @@ def test_bad_acknowledgements_are_refused(mill: Shop, run: Run) -> None:
     refused(run("ack", mill.path, "--note", "a\x07b"), "note")
     exclude_all = [tap.id for tap in mill.logbook.taps[12:]]
     for tap_id in exclude_all:
-        exclude(mill.folder, tap_id, "wrong tool")
+        exclude_entry(mill.folder, tap_id, "wrong tool")
     refused(run("ack", mill.path), "nothing rings")
 
 
 def test_journal_lines_of_acknowledgements_outlast_a_rebuild(mill: Shop, run: Run) -> None:
-    acknowledge(mill.logbook, note="known")
+    acknowledge_alarms(mill.logbook, note="known")
     (mill.path / "journal.jsonl").unlink()
     assert run("rebuild", mill.path).code == 0
     (known,) = alarms(mill, 18)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from acquisition import Circumstances, Hit, HitFlags, Structure, TapTest, new_tap_id
 from lobewatch.cli import app
-from lobewatch.logbook.outlook import outlook
+from lobewatch.logbook.machine_forecast import forecast_machine
 from tests.lobewatch.conftest import Shop
 from tests.lobewatch.logbook.test_alarm_life import LONG_AGO, MONTH, WIGGLE, alarms, at, codes, falling, tap_months
 
@@ -60,10 +60,10 @@ def test_alarm_trend_and_forecast_are_those_with_a_hammer(shops: tuple[Shop, Sho
     with_force, without = shops
     assert "decay" in codes(with_force, 18)
     assert codes(without, 18) == codes(with_force, 18)
-    raised = [[(alarm.code, alarm.about, alarm.raised) for alarm in alarms(shop, 18)] for shop in shops]
+    raised = [[(alarm.code, alarm.about, alarm.triggered_at) for alarm in alarms(shop, 18)] for shop in shops]
     assert raised[1] == raised[0] != []
-    known, bare = (outlook(shop.logbook, at(shop, 18)) for shop in shops)
-    falls = [found.standing.series[0].fall for found in (known, bare)]
+    known, bare = (forecast_machine(shop.logbook, at(shop, 18)) for shop in shops)
+    falls = [found.status.series[0].drop for found in (known, bare)]
     assert falls[1].value == pytest.approx(falls[0].value, abs=0.01)  # %
     for percent, reach in known.limits:
         days = [dict(found.limits)[percent].probable for found in (known, bare)]

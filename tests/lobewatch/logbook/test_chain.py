@@ -12,38 +12,44 @@ import pytest
 
 from acquisition import (
     Circumstances,
-    Faults,
     Frf,
     HammeredStructure,
     Hit,
     HitFlags,
     TapDirection,
     TapsEmulator,
+    TapsFaults,
     TapsSource,
     TapTest,
-    average_good,
+    average_good_hits,
     from_accelerance,
     new_tap_id,
     write_hit,
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
-from lobes import SldHistory, lowest_of, zero_order
+from lobes import SldHistory, lower_envelope, zero_order_lobes
 from lobewatch.history import History
-from lobewatch.history.history import Row
-from lobewatch.history.history_columns import row_lobes, to_columns
+from lobewatch.history.export_columns import compute_row_lobes, make_export_columns
+from lobewatch.history.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine
-from lobewatch.measuring import Measurement, measure
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine_file
+from lobewatch.measurement import Measurement, measure
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.emulated_spindle import (
+    EMULATED_CHANNELS,
+    EMULATED_SAMPLE_RATE,
+    build_structure,
+    make_emulator,
+    set_bearing_stiffness,
+)
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapStep
+from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tool.assembly import speed_grid
-from modal import Mode, synthesize
+from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -60,7 +66,7 @@ def about(folder: MachineFolder, days: float = 0.0, direction: TapDirection = "x
 
 
 def recorded(circumstances: Circumstances, *modes: Mode) -> TapTest:
-    frf = synthesize(list(modes), LINES)
+    frf = synthesize_frf(list(modes), LINES)
     return TapTest(new_tap_id(circumstances), circumstances, from_accelerance(LINES, frf.accelerance))
 
 
@@ -69,8 +75,8 @@ def live_tap(
 ) -> Measurement:
     table = folder.machine.spindle
     assert table is not None
-    structure = emulated_structure(with_bearing_stiffness(table.build(), k), table.damping_ratio)
-    with emulator(structure, np.random.default_rng(seed), realtime=False) as device:
+    structure = build_structure(set_bearing_stiffness(table.build(), k), table.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(seed), realtime=False) as device:
         session = TapSession(folder, lambda: TapsSource(device.port), about(folder, days, direction), guided=False)
         session.run()
     return session.measurement
@@ -82,19 +88,19 @@ def up_to_date(folder: MachineFolder) -> tuple[History, list[Measurement]]:
     return logbook.history, [logbook.measurement(tap.id) for tap in logbook.taps]
 
 
-def codes(found: Measurement | Row) -> list[str]:
+def codes(found: Measurement | HistoryRow) -> list[str]:
     return [remark.code for remark in found.remarks]
 
 
 def columns_of(folder: MachineFolder) -> SldHistory:
-    return to_columns(Logbook(folder).history, folder.machine)
+    return make_export_columns(Logbook(folder).history, folder.machine)
 
 
 def test_the_emulated_structure_has_the_receptance_of_the_model() -> None:
-    table = parse_machine(_example()).spindle
+    table = parse_machine_file(_example()).spindle
     assert table is not None
     spindle = table.build()
-    structure = emulated_structure(spindle, 1e-9)
+    structure = build_structure(spindle, 1e-9)
     f = np.array([1.0, 500.0, 1500.0, 2500.0])
     modes = 1 / (structure.stiffness * (1 - (f[:, None] / structure.frequency) ** 2))
     assert modes.sum(axis=1) + structure.residual == pytest.approx(receptance(spindle, f).real, rel=2e-3)
@@ -113,7 +119,7 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     for month, k in enumerate((1.28e9, 0.9e9)):
         found = live_tap(folder, k, 30.0 * month)
         history, _ = up_to_date(folder)
-        (f, *_), (stiffness, *_) = modes_at(with_bearing_stiffness(table.build(), k), 3)
+        (f, *_), (stiffness, *_) = modes_at(set_bearing_stiffness(table.build(), k), 3)
         assert found.followed is not None
         assert found.calibration is not None
         assert found.followed.frequency == pytest.approx(f, rel=5e-4)
@@ -125,7 +131,7 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     again = columns_of(folder)
     followed = found.at_tip
     cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
-    expected = lowest_of([zero_order(followed, followed, cut, again.speed_rpm) for cut in cuts])
+    expected = lower_envelope([zero_order_lobes(followed, followed, cut, again.speed_rpm) for cut in cuts])
     assert np.array_equal(again.depth[REFERENCE_CUT][1], expected.depth)
     assert not list(folder.spool.iterdir())
 
@@ -135,7 +141,7 @@ def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: Ma
         live_tap(folder, k, 30.0 * month)
     history, _ = up_to_date(folder)
     columns = columns_of(folder).columns
-    for spoil in (folder.history.unlink, lambda: folder.history.write_bytes(b"rubbish")):
+    for spoil in (folder.history_path.unlink, lambda: folder.history_path.write_bytes(b"rubbish")):
         spoil()
         up_to_date(folder)
         again = columns_of(folder).columns
@@ -152,9 +158,11 @@ def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: Ma
 def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     table = folder.machine.spindle
     assert table is not None
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    signal = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(1))
-    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, faults=Faults(unplug_after=100_000)) as device:
+    structure = build_structure(table.build(), table.damping_ratio)
+    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, np.random.default_rng(1))
+    with TapsEmulator(
+        signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=False, faults=TapsFaults(unplug_after=100_000)
+    ) as device:
         session = TapSession(folder, lambda: TapsSource(device.port), about(folder), sleep=lambda _: session.stop())
         with pytest.raises(TapStopped):
             session.run()
@@ -168,7 +176,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     assert begin_tap(folder, about(folder, days=0.1, direction="y")).hits == []
     assert begin_tap(folder, about(folder, days=2.0)).hits == []
     assert begin_tap(folder, about(folder), resume=False).hits == []
-    with TapsEmulator(signal, CHANNELS, 2 * SAMPLE_RATE, realtime=False) as other:
+    with TapsEmulator(signal, EMULATED_CHANNELS, 2 * EMULATED_SAMPLE_RATE, realtime=False) as other:
         again = TapSession(folder, lambda: TapsSource(other.port), about(folder, days=0.1))
         with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with --new"):
             again.run()
@@ -193,8 +201,8 @@ def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFo
     cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
     speeds = speed_grid(folder.machine)
     for row, normal in ((alone, x), (both, y), (late, later)):
-        expected = lowest_of([zero_order([x], [normal], cut, speeds) for cut in cuts]).depth
-        assert row_lobes(row, folder.machine)[REFERENCE_CUT].depth == pytest.approx(expected, rel=1e-3)
+        expected = lower_envelope([zero_order_lobes([x], [normal], cut, speeds) for cut in cuts]).depth
+        assert compute_row_lobes(row, folder.machine)[REFERENCE_CUT].depth == pytest.approx(expected, rel=1e-3)
     assert [codes(row) for row in (alone, both, late)] == [["one-direction"], [], ["older-direction"]]
     assert "direction x is that of 2026-01-15, 300 days older" in str(late.remarks[0])
 
@@ -205,7 +213,7 @@ def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder:
     alone, _ = up_to_date(folder)
     folder.commit(recorded(about(folder, 0.5, "y"), y))
     kept_up, _ = up_to_date(folder)
-    folder.history.unlink()
+    folder.history_path.unlink()
     made_again, _ = up_to_date(folder)
     assert [row.direction for row in kept_up.rows] == ["y", "x"]
     assert kept_up.rows[1].x == made_again.rows[1].x
@@ -224,7 +232,7 @@ def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder
     folder.toml.write_text(text)
     folder.commit(tap)
     history, _ = up_to_date(folder)
-    assert not row_lobes(history.rows[0], folder.machine)
+    assert not compute_row_lobes(history.rows[0], folder.machine)
     assert np.isnan(columns_of(folder).depth[REFERENCE_CUT]).all()
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "not a driving point" in html
@@ -249,7 +257,7 @@ def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: Mac
 def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothing(folder: MachineFolder) -> None:
     good = recorded(about(folder, 30.0), Mode(1700.0, 0.03, 3.5e7))
     first = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
-    folder.commit(replace(first, frf=Frf(LINES, first.known_frf.receptance.conj())))
+    folder.commit(replace(first, frf=Frf(LINES, first.required_frf.receptance.conj())))
     folder.commit(good)
     _, (conjugated, fine) = up_to_date(folder)
     assert codes(conjugated) == ["no-modes", "no-mode-in-band"]
@@ -278,7 +286,7 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
     history, measurements = up_to_date(folder)
     assert any("no model" in remark.text for remark in measurements[0].remarks)
-    assert REFERENCE_CUT in row_lobes(history.rows[0], folder.machine)
+    assert REFERENCE_CUT in compute_row_lobes(history.rows[0], folder.machine)
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "natural frequency" in html
     assert "Bearing stiffness" not in html
@@ -301,11 +309,11 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
     live_tap(folder, 1.28e9)
     (entry,) = folder.taps()
     tap = folder.read(entry)
-    assert isinstance(tap.known_frf, Frf)
+    assert isinstance(tap.required_frf, Frf)
     assert len(tap.accepted) == folder.machine.tap.hits
-    again, flags = average_good(tap.hits)
+    again, flags = average_good_hits(tap.hits)
     assert again is not None
-    assert np.array_equal(again.receptance, tap.known_frf.receptance)
+    assert np.array_equal(again.receptance, tap.required_frf.receptance)
     assert replace(tap, flags=flags).accepted == tap.accepted
 
 
@@ -327,7 +335,7 @@ def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: Ma
     history, measurements = up_to_date(folder)
     assert [row.frequency.value for row in history.rows] == pytest.approx([1700, 1680, 1660, 1640], abs=0.5)
     assert not any({"large-change", "rival-mode"} & set(codes(found)) for found in measurements)
-    folder.history.unlink()
+    folder.history_path.unlink()
     again, _ = up_to_date(folder)
     assert [row.frequency for row in again.rows] == [row.frequency for row in history.rows]
 

@@ -10,20 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobes import lowest_of, program_limit, read_history, write_history, zero_order
-from lobewatch.history.history import Row, empty_history
-from lobewatch.history.history_columns import to_columns
-from lobewatch.history.row_bytes import decode_row, encode_row
+from lobes import lower_envelope, program_limit, read_history, write_history, zero_order_lobes
+from lobewatch.history.export_columns import make_export_columns
+from lobewatch.history.history import HistoryRow, make_empty_history
+from lobewatch.history.row_codec import decode_row, encode_row
 from lobewatch.machine import Machine
-from lobewatch.measuring.estimate import Estimate
+from lobewatch.measurement.estimate import Estimate
 from lobewatch.tool import Assembly
-from lobewatch.tool.prediction import predict
-from lobewatch.tool.series import FollowedMode, scatter_of
-from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.draws import as_program, middle_row
-from lobewatch.verdicts.judgement import QUANTILES
-from lobewatch.verdicts.limit_band import DRAWS, limit_band
-from lobewatch.verdicts.verdict import judge
+from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.tap_series import FollowedMode, compute_scatter
+from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, N_BAND_SAMPLES, compute_limit_band
+from lobewatch.verdicts.program_samples import build_median_row, build_program
+from lobewatch.verdicts.uncertainty import uncertainty_of
+from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 
 Shop = Any
@@ -65,9 +64,9 @@ def machine(shop: Shop) -> Machine:
 def test_draws_have_the_joint_covariance_of_the_tap_test(machine: Machine) -> None:
     mode, (table,) = turned(-25.0, 1.5), machine.program
     assembly = of([mode])
-    middle = middle_row(as_program(table, machine), assembly)
-    doubt = doubt_of(assembly, table, machine)
-    rows = doubt.draw(middle, 20000)
+    middle = build_median_row(build_program(table, machine), assembly)
+    doubt = uncertainty_of(assembly, table, machine)
+    rows = doubt.sample(middle, 20000)
     values = rows.frequency / (2 * np.pi), rows.damping_ratio, rows.stiffness, np.degrees(rows.phase)
     error = np.sqrt(np.diag(mode.joint_covariance))
     for axis in (0, 1):
@@ -75,14 +74,14 @@ def test_draws_have_the_joint_covariance_of_the_tap_test(machine: Machine) -> No
         assert np.corrcoef(drawn) == pytest.approx(mode.joint_covariance / np.outer(error, error), abs=0.03)
         assert np.std(drawn, axis=1) == pytest.approx(mode.quantile() / np.sqrt(3) * error, rel=0.03)
         assert np.mean(drawn[3]) == pytest.approx(-25.0, abs=0.1)
-    known = doubt.draw(middle, 10, without="tap")
+    known = doubt.sample(middle, 10, without="tap")
     assert known.phase == pytest.approx(np.full((10, 2), np.radians(-25.0)), rel=1e-12)
 
 
 def test_errors_of_modes_whose_phase_was_not_fitted_are_drawn_apart(machine: Machine) -> None:
     (table,) = machine.program
-    middle = middle_row(as_program(table, machine), of([turned(0.0)]))
-    rows = doubt_of(of([turned(0.0)]), table, machine).draw(middle, 20000)
+    middle = build_median_row(build_program(table, machine), of([turned(0.0)]))
+    rows = uncertainty_of(of([turned(0.0)]), table, machine).sample(middle, 20000)
     assert not np.any(rows.phase)
     assert np.corrcoef(rows.frequency[:, 0], rows.stiffness[:, 0])[0, 1] == pytest.approx(0.0, abs=0.03)
 
@@ -91,10 +90,10 @@ def test_the_verdict_is_that_of_the_complex_modes(machine: Machine) -> None:
     (table,) = machine.program
     limits = {}
     for phase in (-30.0, 0.0, 30.0):
-        found = judge(table, of([turned(phase)]), machine)
-        program = as_program(table, machine)
-        assert found.draws is not None
-        assert found.limit == program_limit(program, [turned(phase)], [turned(phase)], found.draws.cuts).limit
+        found = evaluate_program(table, of([turned(phase)]), machine)
+        program = build_program(table, machine)
+        assert found.samples is not None
+        assert found.limit == program_limit(program, [turned(phase)], [turned(phase)], found.samples.cuts).limit
         assert 0.97 * found.limit < found.limit_low < found.limit < found.limit_high < 1.03 * found.limit
         limits[phase] = found.limit
     assert limits[-30.0] < 0.9 * limits[0.0] < 0.7 * limits[30.0]
@@ -103,15 +102,17 @@ def test_the_verdict_is_that_of_the_complex_modes(machine: Machine) -> None:
 def test_the_band_is_that_of_the_drawn_complex_modes(machine: Machine) -> None:
     (table,), cuts = machine.program, machine.cuts("reference")["A"]
     assembly, speeds = of([turned(20.0, 4.0)]), np.linspace(8000.0, 14000.0, 12)
-    line = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts])
-    band = limit_band(line, "A", assembly, machine)
-    rows = doubt_of(assembly, table, machine).draw(middle_row(as_program(table, machine), assembly), DRAWS)
+    line = lower_envelope([zero_order_lobes(assembly.x, assembly.y, cut, speeds) for cut in cuts])
+    band = compute_limit_band(line, "A", assembly, machine)
+    rows = uncertainty_of(assembly, table, machine).sample(
+        build_median_row(build_program(table, machine), assembly), N_BAND_SAMPLES
+    )
     limits = []
-    for i in range(DRAWS):
+    for i in range(N_BAND_SAMPLES):
         drawn = rows.frequency[i] / (2 * np.pi), rows.damping_ratio[i], rows.stiffness[i], np.degrees(rows.phase[i])
         x, y = ([Mode(f, zeta, k, phase_deg=phase)] for f, zeta, k, phase in np.transpose(drawn).tolist())
-        limits.append(lowest_of([zero_order(x, y, cut, speeds) for cut in cuts]).depth)
-    low, high = np.quantile(limits, QUANTILES, axis=0)
+        limits.append(lower_envelope([zero_order_lobes(x, y, cut, speeds) for cut in cuts]).depth)
+    low, high = np.quantile(limits, LIMIT_QUANTILES, axis=0)
     assert band.low == pytest.approx(np.minimum(low, line.depth), rel=0.04)
     assert band.high == pytest.approx(np.maximum(high, line.depth), rel=0.04)
     assert np.median(band.high / band.low) > 1.06
@@ -119,7 +120,7 @@ def test_the_band_is_that_of_the_drawn_complex_modes(machine: Machine) -> None:
 
 def test_history_keeps_the_phase(shop: Shop) -> None:
     machine = shop.folder.machine
-    row = Row(
+    row = HistoryRow(
         "T",
         START,
         "reference",
@@ -128,7 +129,7 @@ def test_history_keeps_the_phase(shop: Shop) -> None:
         modes=((1713.0, 0.03, 3.5e7, -12.5), (2900.0, 0.02, 9e7, 8.0)),
     )
     path = shop.path / "history.h5"
-    write_history(path, to_columns(replace(empty_history(machine), rows=(row,)), machine))
+    write_history(path, make_export_columns(replace(make_empty_history(machine), rows=(row,)), machine))
     stored = read_history(path)
     number, read = decode_row(encode_row(3, row, {}), {})
     assert number == 3
@@ -144,7 +145,7 @@ def test_a_series_tells_the_scatter_of_its_phases() -> None:
     series = [
         FollowedMode(START + timedelta(days=i), 1713.0, 0.03, 3.5e7, phase) for i, phase in enumerate(phases.tolist())
     ]
-    scatter = scatter_of(series)
+    scatter = compute_scatter(series)
     assert scatter is not None
     assert scatter[:3] == (0.0, 0.0, 0.0)
     assert scatter.phase_deg == pytest.approx(1.97 * 2.0, rel=0.15)
@@ -155,9 +156,9 @@ def test_the_softest_mode_of_a_predicted_tool_has_the_phase_of_the_mode_followed
     logbook = shop.logbook
     measured = logbook.measurement(logbook.taps[0].id)
     followed = replace(measured.followed, phase_deg=-20.0)
-    assembly = predict(logbook.machine, [replace(measured, followed=followed)], "reference")
+    assembly = predict_assembly(logbook.machine, [replace(measured, followed=followed)], "reference")
     softest, *others = sorted(assembly.x or (), key=lambda mode: mode.stiffness)
     assert (softest.phase_deg, {mode.phase_deg for mode in others} <= {0.0}) == (-20.0, True)
     (table, *_) = logbook.machine.program
-    widths = doubt_of(assembly, table, logbook.machine).modes["prediction"]
+    widths = uncertainty_of(assembly, table, logbook.machine).modes["prediction"]
     assert np.max(widths[:, 3]) == pytest.approx(np.radians(20.0))

@@ -20,8 +20,8 @@ from acquisition import DataError, TapTest
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
-from lobewatch.machine.additions.correct import add_event, exclude, include, withdraw_event
-from lobewatch.measuring import Measurement, measure
+from lobewatch.machine.folder_updates import add_event, exclude_entry, include_entry, withdraw_event
+from lobewatch.measurement import Measurement, measure
 from lobewatch.show.report.report import render_report
 
 Shop = Any
@@ -101,10 +101,10 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
         if entry.id != out:
             other.commit(shop.folder.read(entry))
     before = shop.logbook.standing(day(shop, 61))
-    exclude(shop.folder, out, "wrong tool")
+    exclude_entry(shop.folder, out, "wrong tool")
     mine, never = shop.logbook, Logbook(other)
     at = day(shop, 61)
-    assert mine.standing(at) == never.standing(at) != before
+    assert mine.standing(at) == never.status(at) != before
     columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "rulings", "remarks")
     for row, same in zip(mine.history.rows, never.history.rows, strict=True):
         assert [getattr(row, name) for name in columns] == [getattr(same, name) for name in columns]
@@ -112,7 +112,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     shown = rf"<h2>(What was done|Natural frequency|Bearing stiffness).*?(?=<h2>)|{drawn}"
     pages = [re.sub(shown, "", render_report(one, "reference", "x"), flags=re.DOTALL) for one in (mine, never)]
     assert pages[0].split() == pages[1].split()
-    include(shop.folder, out)
+    include_entry(shop.folder, out)
     assert shop.logbook.standing(at) == before
 
 
@@ -123,7 +123,7 @@ def test_only_rows_after_an_exclusion_or_a_baseline_are_analysed_anew(
         shop.tap(30 * month, 1713.0 - month)
     ids = [tap.id for tap in shop.logbook.taps]
     assert analysed(shop, monkeypatch) == ids
-    exclude(shop.folder, ids[1], "hit the holder")
+    exclude_entry(shop.folder, ids[1], "hit the holder")
     assert analysed(shop, monkeypatch) == [ids[2]]  # the mode followed in it is the same, so ids[3] holds
     add_event(shop.folder, "belt changed", day(shop, 80))
     assert analysed(shop, monkeypatch) == []
@@ -177,7 +177,7 @@ def test_the_report_tells_and_draws_events_and_tests_that_do_not_count(shop: Sho
     for month, frequency in enumerate((1713.0, 1650.0, 1300.0, 1712.0)):
         shop.tap(30 * month, frequency)
     for tap in shop.folder.taps()[1:3]:
-        exclude(shop.folder, tap.id, "not clamped")
+        exclude_entry(shop.folder, tap.id, "not clamped")
     add_event(shop.folder, "belt changed", day(shop, 40))
     add_event(shop.folder, "door mended", day(shop, -400))
     page = render_report(shop.logbook, "reference", "x")
@@ -196,7 +196,7 @@ def test_the_report_tells_and_draws_events_and_tests_that_do_not_count(shop: Sho
 
 def test_all_taps_excluded(shop: Shop) -> None:
     shop.tap(0, 1713.0)
-    exclude(shop.folder, newest_id(shop), "another machine")
+    exclude_entry(shop.folder, newest_id(shop), "another machine")
     assert codes(shop, 1) == ["never-tapped"]
     with pytest.raises(DataError, match=r"no tap test yet, but 1 excluded; .*lobewatch include .* TAP takes one back"):
         run("report", shop.path)
@@ -205,7 +205,7 @@ def test_all_taps_excluded(shop: Shop) -> None:
 
 def test_an_excluded_recording_is_not_stored_again_but_named(shop: Shop, beam: Path) -> None:
     found = shop.logbook.replay(beam)
-    exclude(shop.folder, found.tap_id, "not this machine")
+    exclude_entry(shop.folder, found.tap_id, "not this machine")
     with pytest.raises(DataError, match=r"stored already, but excluded, for 'not this machine'; .*include"):
         shop.logbook.replay(beam)
     assert len(shop.folder.taps()) == 1

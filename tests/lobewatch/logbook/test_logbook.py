@@ -22,26 +22,26 @@ from numpy.typing import ArrayLike
 from typer.testing import CliRunner, Result
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
-from lobes import Cut, Program, ProgramLimit, program_limit, zero_order
-from lobes.program import Modes
+from lobes import Cut, Program, ProgramLimit, program_limit, zero_order_lobes
+from lobes.cut import DirectionModes
 from lobewatch import Logbook
 from lobewatch.cli import app
+from lobewatch.fleet.fleet import Fleet
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.logbook import compare_lobes
 from lobewatch.machine import MachineFolder, ProgramTable
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.machine.rows import read_rows, write_rows
-from lobewatch.measuring import Measurement, measure
-from lobewatch.plant.plant import Plant
-from lobewatch.show.plant.plant_rows import plant_rows
-from lobewatch.show.programs.describe_verdicts import WORDS
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.row_file import read_rows, write_rows
+from lobewatch.measurement import Measurement, measure
+from lobewatch.show.fleet.fleet_status import fleet_rows
+from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.session import outcome_of
-from lobewatch.tool.charts import Dynamics, Method
-from lobewatch.verdicts import Advice, Verdict, Word
-from lobewatch.verdicts.draws import as_program
-from lobewatch.verdicts.verdict import judge
-from modal import Mode, synthesize
+from lobewatch.tap.session import build_outcome
+from lobewatch.tool.lobe_chart import DynamicsSource, LobeMethod
+from lobewatch.verdicts import Advice, Stability, Verdict
+from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.verdict import evaluate_program
+from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -80,7 +80,7 @@ def add_programs(path: Path, text: str) -> None:
 def tap(path: Path, days: float, frequency: float, direction: TapDirection = "x", tool: str = "reference") -> None:
     folder = MachineFolder(path)
     about = Circumstances("m", START + timedelta(days=days), tool, direction, "", folder.toml.read_text("utf-8"))
-    frf = synthesize([Mode(frequency, 0.029136, 3.48e7)], LINES)
+    frf = synthesize_frf([Mode(frequency, 0.029136, 3.48e7)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 
@@ -122,7 +122,7 @@ def test_no_command_analyses_a_tap_twice(
 
 def test_a_reader_beside_a_writer_reads_on_and_writes_nothing(path: Path) -> None:
     tap(path, 0, 1713.0)
-    Logbook.open(path).standing()
+    Logbook.open(path).status()
     before = (path / "history.rows").read_bytes()
     with MachineFolder(path).locked():
         tap(path, 30, 1690.0)
@@ -168,9 +168,11 @@ UNSURE = DISPUTED.replace('"disputed"', '"unsure"').replace("depth_mm = 4.55", "
 
 
 @pytest.mark.parametrize(
-    ("program", "word", "light"), [(DISPUTED, Word.NOT_STABLE, "alarm"), (UNSURE, Word.DOUBTFUL, "warn")]
+    ("program", "word", "light"), [(DISPUTED, Stability.NOT_STABLE, "alarm"), (UNSURE, Stability.DOUBTFUL, "warn")]
 )
-def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program: str, word: Word, light: str) -> None:
+def test_one_program_has_one_word_in_every_place(
+    shop: Shop, path: Path, program: str, word: Stability, light: str
+) -> None:
     shop.put(program)
     shop.tap(0, 1541.74)
     shop.tap(0.1, 1541.74, "y")
@@ -178,31 +180,33 @@ def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program
     assembly = logbook.assembly()
     (name,) = (table.name for table in logbook.machine.program)
     for cut in logbook.machine.cuts("reference")[name]:
-        assert zero_order(assembly.x, assembly.y, cut, np.array([16000.0])).depth[0] > 4.55e-3
+        assert zero_order_lobes(assembly.x, assembly.y, cut, np.array([16000.0])).depth[0] > 4.55e-3
     (found,) = logbook.verdicts()
-    assert (found.word, found.limit < 4.55e-3) == (word, True)
+    assert (found.stability, found.limit < 4.55e-3) == (word, True)
     (checked,) = json.loads(run("check", path, "--json").stdout)["programs"]
-    assert (checked["name"], checked["verdict"], checked["stable"]) == (name, str(word), word is Word.DOUBTFUL)
+    assert (checked["name"], checked["verdict"], checked["stable"]) == (name, str(word), word is Stability.DOUBTFUL)
     (charted,) = json.loads(run("lobes", path, "--cut", name, "--json").stdout)["programs"]
     assert (charted["verdict"], charted["limit_mm"]) == (checked["verdict"], checked["limit_mm"])
-    (mark,) = compare_lobes(logbook, None, name, Dynamics.MODES, Method.ZERO_ORDER).verdicts
-    assert mark.word is word
-    ruling = (logbook.history.rows[-1].rulings or {})[name]
-    assert ruling.word is word
+    (mark,) = compare_lobes(logbook, None, name, DynamicsSource.MODES, LobeMethod.ZERO_ORDER).verdicts
+    assert mark.stability is word
+    ruling = (logbook.history.rows[-1].verdicts or {})[name]
+    assert ruling.stability is word
     assert ruling.limit == pytest.approx(checked["limit_mm"] / 1e3)
     stored = HistoryCache(logbook.folder).read(logbook.files).rows[-1]
-    assert [one.word for one in (stored.rulings or {}).values()] == [word]
+    assert [one.stability for one in (stored.verdicts or {}).values()] == [word]
     html = render_report(logbook, "reference", "x")
     first = html[: html.index("<h2")]
-    assert re.search(rf'<th scope="row">{name}</th><td class="{WORDS[word].kind}"[^>]*>. {word}</td>', first)
+    assert re.search(
+        rf'<th scope="row">{name}</th><td class="{VERDICT_STYLES[word].css_class}"[^>]*>. {word}</td>', first
+    )
     assert f"<td>{checked['limit_mm']:.2f}" in html
-    assert re.search(rf'<td>{name}</td><td class="{WORDS[word].kind}">. {word}</td>', html)
-    (remark,) = logbook.standing(START).remarks
+    assert re.search(rf'<td>{name}</td><td class="{VERDICT_STYLES[word].css_class}">. {word}</td>', html)
+    (remark,) = logbook.status(START).remarks
     assert (remark.code, remark.about) == (f"program-{word.replace(' ', '-')}", name)
-    outcome = outcome_of(logbook, logbook.measurement(logbook.newest().id))
+    outcome = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
     assert any(f"{name}: {word}." in text for text in outcome.texts)
-    assert (outcome.light, "lobewatch check" in outcome.next_step) == (light, True)
-    (row,) = plant_rows(Plant({"m": path}).standings())
+    assert (outcome.status, "lobewatch check" in outcome.next_step) == (light, True)
+    (row,) = fleet_rows(Fleet({"m": path}).assess_machines())
     assert (f"{name}: {word}" in row["note"], row["light"]) == (True, light)
     (told,) = json.loads(run("check", path, "--json").stdout)["programs"]
     assert told == checked
@@ -216,7 +220,7 @@ def test_an_old_tap_of_the_other_direction_counts(shop: Shop) -> None:
     assembly = logbook.assembly()
     assert [round(modes[0].frequency) for modes in (assembly.x, assembly.y)] == [1560, 1700]
     for found in logbook.verdicts():
-        program = as_program(found.program, logbook.machine)
+        program = build_program(found.program, logbook.machine)
         limit = program_limit(program, assembly.x, assembly.y, found.draws.cuts).limit
         assert found.limit == pytest.approx(limit)
         assert found.remarks[0].code == "older-direction"
@@ -243,40 +247,40 @@ def test_the_light_is_that_of_the_worst_series_not_of_the_newest_tap(path: Path)
     for days, frequency in ((0, 1713.0), (30, 1620.0), (60, 1520.0)):
         tap(path, days, frequency)
     tap(path, 61, 1400.0, tool="another")
-    standing = Logbook.open(path).standing(START + timedelta(days=62))
-    assert standing.light == "alarm"
+    standing = Logbook.open(path).status(START + timedelta(days=62))
+    assert standing.status == "alarm"
     assert standing.remarks[0].code == "frequency-alarm"
     assert standing.remarks[0].about == "reference, x"
     assert [series.name for series in standing.series] == ["reference, x", "another, x"]
-    assert standing.series[0].fall.value == pytest.approx(100 * (1 - 1520 / 1713), abs=0.01)
+    assert standing.series[0].drop.value == pytest.approx(100 * (1 - 1520 / 1713), abs=0.01)
 
 
 def test_light_report_and_history_have_one_formula_for_the_fall(path: Path) -> None:
     tap(path, 0, 1713.0)
     tap(path, 30, 1680.0)
     logbook = Logbook.open(path)
-    (series,) = logbook.standing(START).series
-    assert f"<td>{-series.fall.value:+.2f} %</td>" in render_report(logbook, "reference", "x")
+    (series,) = logbook.status(START).series
+    assert f"<td>{-series.drop.value:+.2f} %</td>" in render_report(logbook, "reference", "x")
 
 
 def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Program] = []
 
     def counting(
-        program: Program, x: Modes, y: Modes, cuts: Sequence[Cut], vectors: ArrayLike | None = None
+        program: Program, x: DirectionModes, y: DirectionModes, cuts: Sequence[Cut], vectors: ArrayLike | None = None
     ) -> ProgramLimit:
         asked.append(program)
         return program_limit(program, x, y, cuts, vectors)
 
-    monkeypatch.setattr("lobewatch.verdicts.draws.program_limit", counting)
+    monkeypatch.setattr("lobewatch.verdicts.program_samples.program_limit", counting)
     for day in range(5):
         tap(path, day, 1713.0 - day)
     tap(path, 4.1, 1690.0, "y")
     rows = Logbook.open(path).history.rows
     assert len(asked) == 3
-    assert [row.rulings is None for row in rows] == [True] * 5 + [False]
+    assert [row.verdicts is None for row in rows] == [True] * 5 + [False]
     asked.clear()
-    assert Logbook.open(path).standing(START + timedelta(days=5)).light == "good"
+    assert Logbook.open(path).status(START + timedelta(days=5)).status == "good"
     assert not asked
 
 
@@ -285,8 +289,8 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
         shop.tap_both(days, share)
     logbook = shop.logbook
     first, last = logbook.taps[1].id, logbook.taps[-1].id
-    assert [ruling.word for ruling in logbook.rulings(first).values()] == [Word.STABLE] * 3
-    assert [ruling.word for ruling in logbook.rulings(last).values()].count(Word.NOT_STABLE) == 2
+    assert [ruling.word for ruling in logbook.rulings(first).values()] == [Stability.STABLE] * 3
+    assert [ruling.word for ruling in logbook.rulings(last).values()].count(Stability.NOT_STABLE) == 2
     kept = [row.rulings is not None for row in shop.logbook.history.rows]
     assert kept == [False, True, False, False, False, True]
 
@@ -296,9 +300,9 @@ def test_a_program_is_judged_once_in_an_opened_logbook(shop: Shop, monkeypatch: 
 
     def counting(table: ProgramTable, *known: Any) -> Verdict:
         asked.append(table.name)
-        return judge(table, *known)
+        return evaluate_program(table, *known)
 
-    monkeypatch.setattr("lobewatch.cuts.learning.at_speed.judge", counting)
+    monkeypatch.setattr("lobewatch.cuts.learning.verdict_at_speed.evaluate_program", counting)
     shop.tap_both()
     logbook = shop.logbook
     words = [found.word for found in logbook.verdicts()]
@@ -315,16 +319,16 @@ def test_reading_again_writes_nothing_with_or_without_programs(path: Path, tmp_p
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     for folder in (path, tmp_path / "plain"):
         tap(folder, 0, 1713.0)
-        Logbook.open(folder).standing()
+        Logbook.open(folder).status()
         before = (folder / "history.rows").stat().st_mtime_ns
-        Logbook.open(folder).standing()
+        Logbook.open(folder).status()
         assert (folder / "history.rows").stat().st_mtime_ns == before
 
 
 def test_rows_are_kept_up_to_the_first_that_differs(path: Path, analysed: list[str]) -> None:
     for day in (0, 10, 20):
         tap(path, day, 1713.0 - day)
-    Logbook.open(path).standing()
+    Logbook.open(path).status()
     analysed.clear()
     tap(path, 15, 1700.0)
     rows = Logbook.open(path).history.rows
@@ -337,14 +341,14 @@ def test_another_depth_analyses_nothing_and_keeps_the_words_on_other_programs(pa
     before = Logbook.open(path).history.rows[0]
     analysed.clear()
     text = (path / "machine.toml").read_text()
-    assert len(before.rulings or ()) == len(Logbook.open(path).machine.program) == 3
+    assert len(before.verdicts or ()) == len(Logbook.open(path).machine.program) == 3
     (path / "machine.toml").write_text(re.sub(r"(?m)^depth_mm = [0-9.]+", "depth_mm = 0.01", text, count=1))
     logbook = Logbook.open(path)
     (kept,) = HistoryCache(logbook.folder).read(logbook.files).rows
     changed, *others = [table.name for table in logbook.machine.program]
-    assert {name: (before.rulings or {})[name] for name in others} == kept.rulings
-    assert logbook.rulings(before.tap_id)[changed].word is not Word.NOT_STABLE
-    assert list(logbook.rulings(before.tap_id)) == [changed, *others]
+    assert {name: (before.verdicts or {})[name] for name in others} == kept.verdicts
+    assert logbook.stored_verdicts(before.tap_id)[changed].stability is not Stability.NOT_STABLE
+    assert list(logbook.stored_verdicts(before.tap_id)) == [changed, *others]
     assert analysed == [before.tap_id]  # to judge the program that has changed
 
 
@@ -397,32 +401,32 @@ def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> Non
     tap(path, 0, 1713.0)
     tap(path, 30, 1541.74)
     logbook = Logbook.open(path)
-    expected = [found.word for found in logbook.verdicts()]
+    expected = [found.stability for found in logbook.verdicts()]
     sound = (path / "taps" / f"{logbook.taps[1].id}.h5").read_bytes()
     (path / "history.rows").unlink()
     damage(path, logbook.taps[1].id)
     rest = Logbook.open(path)
-    assert rest.rulings(rest.taps[0].id) == {one.program.name: one.ruling for one in rest.verdicts()}
-    assert {found.word for found in rest.verdicts()} <= {Word.DOUBTFUL, Word.NOT_STABLE}
-    (row,) = plant_rows(Plant({"m": path}).standings())
+    assert rest.stored_verdicts(rest.taps[0].id) == {one.program.name: one.stored for one in rest.verdicts()}
+    assert {found.stability for found in rest.verdicts()} <= {Stability.DOUBTFUL, Stability.NOT_STABLE}
+    (row,) = fleet_rows(Fleet({"m": path}).assess_machines())
     assert "bytes, not" in row["note"]
     (path / "taps" / f"{logbook.taps[1].id}.h5").write_bytes(sound)
-    assert [ruling.word for ruling in Logbook.open(path).rulings(logbook.taps[1].id).values()] == expected
+    assert [ruling.stability for ruling in Logbook.open(path).stored_verdicts(logbook.taps[1].id).values()] == expected
 
 
 def test_a_machine_that_disappears_does_not_hide_the_others(path: Path, tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "n", "surrogate_machine.toml")
     tap(path, 0, 1713.0)
-    plant = Plant({name: tmp_path / name for name in ("m", "n")})
+    plant = Fleet({name: tmp_path / name for name in ("m", "n")})
     (tmp_path / "n" / "machine.toml").unlink()
-    assert {row["key"]: row["light"] for row in plant_rows(plant.standings())} == {"n": "unknown", "m": "warn"}
+    assert {row["key"]: row["light"] for row in fleet_rows(plant.assess_machines())} == {"n": "unknown", "m": "warn"}
 
 
 def test_a_lost_mode_does_not_hide_an_alarm(path: Path) -> None:
     for days, frequency in ((0, 1713.0), (30, 1620.0), (60, 1520.0), (90, 900.0)):
         tap(path, days, frequency)
-    standing = Logbook.open(path).standing(START + timedelta(days=91))
-    assert standing.light == "alarm"
+    standing = Logbook.open(path).status(START + timedelta(days=91))
+    assert standing.status == "alarm"
     assert {"frequency-alarm", "mode-lost"} <= {remark.code for remark in standing.remarks}
 
 

@@ -16,15 +16,14 @@ from typer.testing import CliRunner, Result
 
 from dsm import calibrate
 from lobewatch.cli import app
-from lobewatch.decay.reach import ALREADY, NOBODY_KNOWS, Reach
-from lobewatch.decay.trend import date, day
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.outlook import outlook
-from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
-from lobewatch.show.trends.describe_trend import dates_rows, reach_text
-from lobewatch.verdicts import Word
-from lobewatch.verdicts.aging import softening, tolerable_decay
-from lobewatch.verdicts.critical import critical_fall
+from lobewatch.logbook.machine_forecast import forecast_machine
+from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ThresholdDates
+from lobewatch.monitoring.trend import date_of_days, days_since_epoch
+from lobewatch.show.measurement import measurement_json, measurement_texts
+from lobewatch.show.trend import forecast_date_rows, reach_text
+from lobewatch.verdicts import Stability
+from lobewatch.verdicts.frequency_drop import find_critical_drop, find_tolerable_drop, model_softening
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -34,9 +33,9 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
 
 
-def dates(reach: Reach) -> list[float]:
+def dates(reach: ThresholdDates) -> list[float]:
     """Earliest, probable, latest, and the last day looked at; infinite where none is in sight."""
-    days = reach.earliest, reach.probable, reach.latest, reach.foretold_to
+    days = reach.earliest, reach.probable, reach.latest, reach.forecast_end
     return [math.inf if one is None else one for one in days]
 
 
@@ -49,48 +48,50 @@ def worn(shop: Shop) -> Shop:
     return shop
 
 
-def words_after(shop: Shop, fall: float) -> dict[str, Word]:
+def words_after(shop: Shop, fall: float) -> dict[str, Stability]:
     """The words with both directions fallen by so much of what they are now."""
     shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
     return {one.program.name: one.word for one in shop.logbook.verdicts()}
 
 
 def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> None:
-    critical = outlook(worn.logbook).critical["A"]
+    critical = forecast_machine(worn.logbook).critical_drops["A"]
     assert 0.0 <= critical.doubtful < critical.not_stable < 0.1
-    assert words_after(worn, critical.not_stable - 0.002)["A"] is Word.DOUBTFUL
+    assert words_after(worn, critical.not_stable - 0.002)["A"] is Stability.DOUBTFUL
     worn.tap_both(170.0, (1 - 0.03 + 0.0003) * (1 - critical.not_stable - 0.002))
-    assert {one.program.name: one.word for one in worn.logbook.verdicts()}["A"] is Word.NOT_STABLE
+    assert {one.program.name: one.word for one in worn.logbook.verdicts()}["A"] is Stability.NOT_STABLE
 
 
 def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
     logbook = worn.logbook
     now = logbook.history.rows[-1].time
-    found = outlook(logbook, now)
-    fate, (x,) = found.programs["A"], [one for one in found.standing.series if one.direction == "x"]
+    found = forecast_machine(logbook, now)
+    fate, (x,) = found.programs["A"], [one for one in found.status.series if one.direction == "x"]
     assert x.trend is not None
     last = x.trend.points[-1]
     a_day = -100 * math.log1p(-0.03) / 150
-    expected = last.time + timedelta(days=-100 * math.log1p(-found.critical["A"].not_stable) / a_day)
+    expected = last.time + timedelta(days=-100 * math.log1p(-found.critical_drops["A"].not_stable) / a_day)
     earliest, probable, latest, _ = dates(fate.not_stable)
     assert earliest < probable < latest
-    assert abs((date(probable) - expected).days) < 40
+    assert abs((date_of_days(probable) - expected).days) < 40
     assert dates(fate.doubtful)[1] < probable
     years_of_five_percent = (-100 * math.log1p(-0.05)) / a_day
-    assert dates(dict(found.limits)[5.0])[1] - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
+    assert dates(dict(found.limits)[5.0])[1] - days_since_epoch(worn.start) == pytest.approx(
+        years_of_five_percent, rel=0.1
+    )
 
 
 def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = outlook(worn.logbook).programs["A"]
+    first = forecast_machine(worn.logbook).programs["A"]
 
     def again(*_: object) -> None:
         raise AssertionError("judged again")
 
-    monkeypatch.setattr("lobewatch.logbook.analysis.judge_at_speed", again)
-    assert outlook(worn.logbook).programs["A"] == first
+    monkeypatch.setattr("lobewatch.logbook.analysis.evaluate_at_speed", again)
+    assert forecast_machine(worn.logbook).programs["A"] == first
     worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
     with pytest.raises(AssertionError, match="judged again"):
-        outlook(worn.logbook)
+        forecast_machine(worn.logbook)
 
 
 def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
@@ -113,9 +114,9 @@ def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
 def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     shop.tap_both()
     shop.run(("A", 12900, 1.5))
-    found = outlook(shop.logbook)
-    assert found.programs["A"].not_stable == NOBODY_KNOWS
-    assert found.limits == ((5.0, NOBODY_KNOWS), (10.0, NOBODY_KNOWS))
+    found = forecast_machine(shop.logbook)
+    assert found.programs["A"].not_stable == NO_FORECAST
+    assert found.limits == ((5.0, NO_FORECAST), (10.0, NO_FORECAST))
     told = run("trend", shop.path)
     assert "nothing to compare it with yet; an alarm can ring from 9 points on" in told.stdout
     assert told.stdout.count("No dates yet: a forecast needs 8 points, there is 1.") == 1
@@ -125,10 +126,10 @@ def test_a_short_history_foretells_nothing(shop: Shop) -> None:
 def test_what_foretells_nothing_hides_no_date(worn: Shop) -> None:
     """A tap test of another tool, and a direction that is too young."""
     now = worn.logbook.history.rows[-1].time
-    before = outlook(worn.logbook, now)
+    before = forecast_machine(worn.logbook, now)
     assert dates(dict(before.limits)[5.0])[2] < math.inf
     worn.tap(150.5, 1500.0, tool="other")
-    after = outlook(worn.logbook, now)
+    after = forecast_machine(worn.logbook, now)
     assert after.limits == before.limits
     assert after.programs == before.programs
 
@@ -139,28 +140,28 @@ def test_a_young_direction_hides_no_date_of_the_other(shop: Shop) -> None:
         shop.tap(15.0 * i, 1713.0 * (1 - 0.003 * i + 0.0003 * (-1) ** i))
     for i in range(3):
         shop.tap(120.1 + 15.0 * i, 1690.0 * (1 - 0.003 * i), "y")
-    found = outlook(shop.logbook, shop.logbook.history.rows[-1].time)
+    found = forecast_machine(shop.logbook, shop.logbook.history.rows[-1].time)
     assert dates(dict(found.limits)[5.0])[2] < math.inf
     assert found.programs["A"].not_stable.latest is not None
 
 
 def test_overdue_is_said_as_overdue_and_never_as_measured(worn: Shop) -> None:
     last = worn.logbook.history.rows[-1].time
-    found, later = (outlook(worn.logbook, last + timedelta(days=days)) for days in (0, 180))
+    found, later = (forecast_machine(worn.logbook, last + timedelta(days=days)) for days in (0, 180))
     assert later.limits == found.limits
     limit = dict(later.limits)[5.0]
     assert not limit.is_measured
     probable = dates(limit)[1]
-    assert day(last) < probable < day(last) + 180
-    assert reach_text(limit, later.standing.time) == f"by now, at this rate (probably {date(probable):%Y-%m-%d})"
+    assert days_since_epoch(last) < probable < days_since_epoch(last) + 180
+    assert reach_text(limit, later.status.time) == f"by now, at this rate (probably {date_of_days(probable):%Y-%m-%d})"
     assert reach_text(limit, last).startswith("between 2026-")
 
 
 def test_already_is_what_tap_tests_show(worn: Shop) -> None:
     worn.tap_both(160.0, 0.9)
-    found = outlook(worn.logbook, worn.logbook.history.rows[-1].time)
-    assert dict(found.limits)[5.0] == ALREADY
-    assert reach_text(ALREADY, found.standing.time) == "already"
+    found = forecast_machine(worn.logbook, worn.logbook.history.rows[-1].time)
+    assert dict(found.limits)[5.0] == ALREADY_REACHED
+    assert reach_text(ALREADY_REACHED, found.status.time) == "already"
 
 
 def test_trend_in_json(worn: Shop) -> None:
@@ -171,7 +172,7 @@ def test_trend_in_json(worn: Shop) -> None:
     assert found["points"][10]["percent"] == pytest.approx(100 * np.log((1 - 0.03 + 0.0003) / 1.0003), abs=0.01)
     assert found["score"] > 3.3
     assert found["alarm"]["kind"] == "slope"
-    assert found["light"] == Logbook.open(worn.path).standing().light
+    assert found["light"] == Logbook.open(worn.path).status().status
     assert told.exit_code == int(found["light"] == "alarm") == 1
     rate = found["rate_percent_per_month"]
     assert rate["low"] < rate["value"] < rate["high"] < 0
@@ -227,7 +228,7 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
 def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
     worn.run(("shallow", 12900, 0.05), tool="long end mill")
     assert run("report", worn.path).exit_code == 0
-    last = f"not before {date(dates(outlook(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
+    last = f"not before {date_of_days(dates(forecast_machine(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
     assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
 
 
@@ -235,12 +236,12 @@ def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothin
     worn.run(("shallow", 12900, 0.05))
     for days in (161.0, 171.0, 181.0):
         worn.tap(days, 1500.0, tool="other")
-    found = outlook(worn.logbook)
+    found = forecast_machine(worn.logbook)
     last = dates(found.programs["shallow"].doubtful)[3]
-    assert date(last) > worn.logbook.history.rows[-1].time
+    assert date_of_days(last) > worn.logbook.history.rows[-1].time
     told = run("trend", worn.path, "--tool", "other").stdout
     (line,) = [line for line in told.splitlines() if line.startswith("shallow")]
-    assert line.count(f"not before {date(last):%Y-%m}") == 2
+    assert line.count(f"not before {date_of_days(last):%Y-%m}") == 2
 
 
 def preload_in_trend(shop: Shop) -> list[float] | None:
@@ -306,18 +307,18 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
     shop.run(("A", 12900, 1.5))
     shop.tap_both()
     (found,) = shop.logbook.verdicts()
-    drawn, (stiffness_at, _) = found.draws, softening(found.assembly)
+    drawn, (stiffness_at, _) = found.draws, model_softening(found.assembly)
     middle, falls = drawn.rows[np.array([0])], []
     for i in range(1, 13):
         one = drawn.rows[np.array([i])]
         rows = replace(middle, damping_ratio=one.damping_ratio, stiffness=one.stiffness)
-        falls.append(tolerable_decay(replace(drawn, rows=rows), 1.5e-3, stiffness_at))
+        falls.append(find_tolerable_drop(replace(drawn, rows=rows), 1.5e-3, stiffness_at))
     assert np.all(np.isfinite(falls))
-    assert critical_fall(found).error == pytest.approx(np.std(falls), rel=0.3)
+    assert find_critical_drop(found).error == pytest.approx(np.std(falls), rel=0.3)
 
 
 def test_a_program_without_a_word_is_not_put_down_to_the_history(worn: Shop) -> None:
     worn.run(("A", 12900, 1.5), tool="D99")
-    rows = {name: cells for name, *cells in dates_rows(outlook(worn.logbook))}
+    rows = {name: cells for name, *cells in forecast_date_rows(forecast_machine(worn.logbook))}
     assert rows["A"] == ["unknown now, see check"] * 2
     assert rows["-10 % (fixed limit)"][1] != "history too short or too old"

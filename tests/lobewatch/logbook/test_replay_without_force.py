@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from acquisition import DataError
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE as RATE
+from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE as RATE
 from tests.lobewatch.conftest import Shop
 from tests.modal.test_uncertainty import TRUTH, tap
 

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
-from lobewatch.measuring.measurement import Measurement, measure
+from lobewatch.measurement.tap_measurement import Measurement, measure
 
 MOST_CHANGES = 7
 """Changes of file between them, at most."""

@@ -14,7 +14,7 @@ import pytest
 from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, new_tap_id
 from lobewatch.machine import BusyError
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 

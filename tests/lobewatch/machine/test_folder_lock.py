@@ -16,8 +16,8 @@ import pytest
 
 from acquisition import DataError
 from lobewatch.machine import BusyError, MachineFolder
-from lobewatch.machine.folder_lock import HOLDER
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME
 
 HOLD = """
 import sys, time
@@ -64,15 +64,15 @@ def test_it_is_waited_for(folder: MachineFolder) -> None:
         process.stdin.write("\n")
         process.stdin.flush()
         with folder.locked():
-            assert (folder.path / HOLDER).exists()
-    assert not (folder.path / HOLDER).exists()
+            assert (folder.path / LOCK_HOLDER_NAME).exists()
+    assert not (folder.path / LOCK_HOLDER_NAME).exists()
 
 
 def test_a_name_that_a_killed_program_has_left_is_not_believed(folder: MachineFolder) -> None:
     with holding(folder) as process:
         process.kill()
         process.wait()
-        assert (folder.path / HOLDER).exists()
+        assert (folder.path / LOCK_HOLDER_NAME).exists()
         with folder.locked(patience=0), pytest.raises(BusyError, match=rf"process {os.getpid()}, since"):
             MachineFolder(folder.path).locked(patience=0).__enter__()
 
@@ -80,9 +80,9 @@ def test_a_name_that_a_killed_program_has_left_is_not_believed(folder: MachineFo
 @pytest.mark.parametrize("content", [None, b"", b'{"command":"lobew', b'{"command":1}', b"\xff"])
 def test_one_that_has_not_said_its_name_holds_it_all_the_same(folder: MachineFolder, content: bytes | None) -> None:
     with holding(folder):
-        (folder.path / HOLDER).unlink()
+        (folder.path / LOCK_HOLDER_NAME).unlink()
         if content is not None:
-            (folder.path / HOLDER).write_bytes(content)
+            (folder.path / LOCK_HOLDER_NAME).write_bytes(content)
         with pytest.raises(BusyError, match=r"m: another lobewatch is writing here; wait until it is done$"):
             folder.locked(patience=0).__enter__()
 
@@ -94,7 +94,7 @@ def test_a_folder_that_is_away_is_not_made_again(folder: MachineFolder) -> None:
     assert not folder.path.exists()
     away.rename(folder.path)
     with folder.locked():
-        assert (folder.path / HOLDER).exists()
+        assert (folder.path / LOCK_HOLDER_NAME).exists()
 
 
 def test_a_folder_that_goes_away_at_any_moment_is_not_made_again(folder: MachineFolder) -> None:
@@ -122,7 +122,7 @@ def test_held_twice_it_is_held_until_the_outer_end(folder: MachineFolder) -> Non
     with folder.locked():
         with folder.locked():
             pass
-        assert (folder.path / HOLDER).exists()
+        assert (folder.path / LOCK_HOLDER_NAME).exists()
         with pytest.raises(BusyError):
             MachineFolder(folder.path).locked(patience=0).__enter__()
     with MachineFolder(folder.path).locked(patience=0):

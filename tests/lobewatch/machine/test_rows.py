@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lobewatch.machine.rows import add_rows, read_rows, write_rows
+from lobewatch.machine.row_file import append_rows, read_rows, write_rows
 
 ROWS = [b"head", b"a" * 300, bytes(range(256)), b"\0"]
 
@@ -21,8 +21,8 @@ def path(tmp_path: Path) -> Path:
 def test_what_is_added_is_read_behind_the_others_and_the_others_are_not_written(path: Path) -> None:
     before, number = path.read_bytes(), path.stat().st_ino
     found = read_rows(path)
-    assert (found.rows, found.size, found.is_damaged) == (tuple(ROWS), len(before), False)
-    size = add_rows(path, found.size, [b"new", b"newer"])
+    assert (found.rows, found.sound_bytes, found.is_damaged) == (tuple(ROWS), len(before), False)
+    size = append_rows(path, found.sound_bytes, [b"new", b"newer"])
     assert path.read_bytes()[: len(before)] == before
     assert (path.stat().st_size, path.stat().st_ino) == (size, number)
     assert read_rows(path).rows == (*ROWS, b"new", b"newer")
@@ -34,7 +34,7 @@ def test_a_row_torn_by_a_crash_counts_for_nothing_and_is_written_over(path: Path
         path.write_bytes(whole[:cut])
         found = read_rows(path)
         assert (found.rows, found.is_damaged) == (tuple(ROWS[:-1]), False)
-        add_rows(path, found.size, [b"again"])
+        append_rows(path, found.sound_bytes, [b"again"])
         assert read_rows(path).rows == (*ROWS[:-1], b"again")
 
 

@@ -12,12 +12,12 @@ import pytest
 import typer
 
 from lobewatch.cli import app
-from lobewatch.decay.light import Light
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.notify.message import message_of
-from lobewatch.notify.prometheus import FAMILIES
-from lobewatch.plant.plant import MachineStanding
-from lobewatch.plant.summary import DatedStanding, Summary
+from lobewatch.fleet.fleet import FleetMachine
+from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.monitoring.status_rules import StatusLevel
+from lobewatch.notify.prometheus import METRIC_FAMILIES
+from lobewatch.notify.publish_status import make_message
 
 PAGE = (Path(__file__).parents[3] / "docs" / "alarms.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
@@ -41,14 +41,14 @@ def test_there_is_a_line_for_cron_and_one_for_systemd() -> None:
 def test_the_table_for_machine_toml_is_taken_with_the_password(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in re.findall(r"export (\w+)=(\S+)", BLOCKS[4][1]):
         monkeypatch.setenv(name, value)
-    broker = parse_machine(f'[machine]\nname = "m"\n{BLOCKS[3][1]}').notify.broker
+    broker = parse_machine_file(f'[machine]\nname = "m"\n{BLOCKS[3][1]}').notify.broker
     assert broker == ("mqtt", "broker.example", 1883, "lobewatch", "...", "plant")
 
 
 def test_each_key_of_a_message_and_each_family_is_explained() -> None:
-    summary = Summary("m", (), "tap")
+    summary = MachineSummary("m", (), "tap")
     now = datetime(2026, 1, 1, tzinfo=UTC)
-    one = MachineStanding("m", Path("m"), summary, DatedStanding(Light.GOOD, (), "tap", None, now))
-    keys = msgspec.json.decode(message_of(one, now))
+    one = FleetMachine("m", Path("m"), summary, DatedStatus(StatusLevel.GOOD, (), "tap", None, now))
+    keys = msgspec.json.decode(make_message(one, now))
     rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
-    assert {*keys, *FAMILIES} <= {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert {*keys, *METRIC_FAMILIES} <= {name for row in rows for name in re.findall(r"`(\w+)`", row)}

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lobewatch.machine.settings.notify_table import broker_of
+from lobewatch.machine.settings.notify_table import parse_broker
 from lobewatch.notify import mqtt
 from tests.lobewatch.notify.conftest import Mosquitto, machine, received, run, started
 from tests.lobewatch.notify.fake_broker import (
@@ -103,7 +103,7 @@ def test_a_plant_of_bad_brokers_is_told_in_parallel_and_the_good_one_too(
 
 
 def test_no_broker_waits_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mqtt, "PATIENCE", 30.0)
+    monkeypatch.setattr(mqtt, "MQTT_TIMEOUT", 30.0)
     together = threading.Barrier(5)
 
     def wait_for_all(broker: FakeBroker, connection: socket.socket) -> None:
@@ -127,7 +127,7 @@ def test_a_name_that_is_looked_up_for_ever_keeps_no_command(tmp_path: Path) -> N
 
 
 def test_what_is_looked_up_too_late_is_not_sent_over_newer_messages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mqtt, "PATIENCE", 0.5)
+    monkeypatch.setattr(mqtt, "MQTT_TIMEOUT", 0.5)
     look_up, is_up = socket.getaddrinfo, threading.Event()
 
     def look_up_late(*arguments: Any, **more: Any) -> Any:
@@ -136,8 +136,10 @@ def test_what_is_looked_up_too_late_is_not_sent_over_newer_messages(monkeypatch:
 
     monkeypatch.setattr(socket, "getaddrinfo", look_up_late)
     with FakeBroker(obey) as broker:
-        target = broker_of(broker.address)
-        assert mqtt.send({target: {"a": b"{}"}}) == {target: f"{broker.address}: cannot be reached within 0.5 s"}
+        target = parse_broker(broker.address)
+        assert mqtt.send_messages({target: {"a": b"{}"}}) == {
+            target: f"{broker.address}: cannot be reached within 0.5 s"
+        }
         sending = next(thread for thread in threading.enumerate() if thread.name == f"to {broker.address}")
         is_up.set()
         sending.join()
@@ -148,7 +150,7 @@ def test_a_message_left_over_does_not_go_with_a_newer_one_of_its_machine(tmp_pat
     with FakeBroker(obey) as broker:
         machine(tmp_path / "a", f"{broker.address}/one")
         later = machine(tmp_path / "b", f"{broker.address}/two")
-        old = {"topic": "two/b/standing", "message": {}, "broker": broker_of(broker.address)[:3]}
+        old = {"topic": "two/b/standing", "message": {}, "broker": parse_broker(broker.address)[:3]}
         (later / "unsent.json").write_text(json.dumps(old))
         assert "nobody was told" not in run("status", tmp_path, "--notify").stderr
         assert sum(b"two/b/standing" in content for kind, content in broker.received if kind == PUBLISH) == 1
@@ -197,8 +199,8 @@ def parrot() -> Iterator[tuple[Parrot, FakeBroker]]:
 def nothing_but_a_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes, is_taken: bool) -> None:
     talk, broker = parrot
     talk.words = TAKEN * is_taken + words
-    target = broker_of(broker.address)
-    assert mqtt.send({target: {"a": b"{}", "b": b"{}"}})[target].startswith(f"{broker.address}: ")
+    target = parse_broker(broker.address)
+    assert mqtt.send_messages({target: {"a": b"{}", "b": b"{}"}})[target].startswith(f"{broker.address}: ")
 
 
 @given(words=RUBBISH, is_taken=st.booleans())

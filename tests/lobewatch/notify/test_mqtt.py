@@ -15,8 +15,8 @@ import pytest
 
 from acquisition import DataError
 from lobewatch.machine import MachineFolder
-from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.machine.settings.notify_table import broker_of
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.machine.settings.notify_table import parse_broker
 from lobewatch.notify import mqtt
 from tests.lobewatch.notify.conftest import Mosquitto, received, run
 
@@ -94,7 +94,7 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
     )
     subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
-    assert mqtt.send({broker_of(mosquitto.address): {"lobewatch/a/standing": b"{}"}}) == {}
+    assert mqtt.send_messages({parse_broker(mosquitto.address): {"lobewatch/a/standing": b"{}"}}) == {}
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "done"}
 
 
@@ -103,11 +103,11 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
 )
 def test_what_is_no_address_is_refused_without_telling_the_password(address: str) -> None:
     with pytest.raises(DataError, match="is no address of a broker; give mqtt://HOST") as refused:
-        parse_machine(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
+        parse_machine_file(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
     assert "secret" not in str(refused.value)
 
 
 def test_user_password_port_and_prefix_stand_in_the_address() -> None:
-    found = broker_of("mqtts://me:p%40ss@broker.example/hall/")
+    found = parse_broker("mqtts://me:p%40ss@broker.example/hall/")
     assert found == ("mqtts", "broker.example", 8883, "me", "p@ss", "hall")
     assert "p@ss" not in found.address

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lobewatch.machine.settings.notify_table import broker_of
+from lobewatch.machine.settings.notify_table import parse_broker
 from tests.lobewatch.notify.conftest import machine, run
 from tests.lobewatch.notify.fake_broker import CONNECT, FakeBroker, obey, refuse
 
@@ -34,7 +34,7 @@ def test_the_named_host_gets_the_password(
     monkeypatch: pytest.MonkeyPatch, password: str, named: str, address: str
 ) -> None:
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
-    assert (broker_of(address).password, broker_of(address).withheld) == (password, "")
+    assert (parse_broker(address).password, parse_broker(address).password_warning) == (password, "")
 
 
 @pytest.mark.parametrize(
@@ -54,16 +54,16 @@ def test_no_other_host_gets_it_and_what_to_set_is_said(
     monkeypatch: pytest.MonkeyPatch, named: str, address: str, place: str
 ) -> None:
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
-    assert broker_of(address).password == ""
-    assert broker_of(address).withheld == NOT_USED.format(named or "not set", place)
+    assert parse_broker(address).password == ""
+    assert parse_broker(address).password_warning == NOT_USED.format(named or "not set", place)
 
 
 def test_nothing_is_withheld_where_no_password_is_wanted_or_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert broker_of("mqtt://broker.example").withheld == ""
-    own = broker_of("mqtt://me:own@broker.example")
-    assert (own.password, own.withheld) == ("own", "")
+    assert parse_broker("mqtt://broker.example").password_warning == ""
+    own = parse_broker("mqtt://me:own@broker.example")
+    assert (own.password, own.password_warning) == ("own", "")
     monkeypatch.delenv("LOBEWATCH_MQTT_PASSWORD")
-    assert broker_of("mqtt://me@broker.example").withheld == ""
+    assert parse_broker("mqtt://me@broker.example").password_warning == ""
 
 
 @pytest.mark.parametrize("named", ["", "broker.example"])

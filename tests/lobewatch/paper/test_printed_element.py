@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsm import SpinningSegment, spinning_element
-from lobewatch.paper.printed_element import fourth_powers, printed_element
+from lobewatch.paper.element_study import fourth_powers, printed_element
 
 BEAM = SpinningSegment(length=0.9, rigidity_xx=1.3, rigidity_yy=4.1, mass_per_length=0.7)
 

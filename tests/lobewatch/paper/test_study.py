@@ -9,7 +9,7 @@ import pytest
 
 from dsm import natural_frequencies
 from lobewatch.paper import PaperStudy, printed
-from lobewatch.paper.shaft import surrogate
+from lobewatch.paper.shaft_study import surrogate_spindle
 
 MEASURED = {
     "f_1, rigid bearings": 2301.09,
@@ -73,7 +73,7 @@ def test_the_rule_is_k_theo_to_every_digit() -> None:
 def test_the_curve_of_figure_8_is_that_of_the_frequencies(study: PaperStudy) -> None:
     stiffness, frequency = study.plain.curve
     for i in (0, 150, -1):
-        assert natural_frequencies(surrogate(stiffness[i]), 1)[0] == pytest.approx(frequency[i], rel=1e-8)
+        assert natural_frequencies(surrogate_spindle(stiffness[i]), 1)[0] == pytest.approx(frequency[i], rel=1e-8)
 
 
 def test_the_words_on_claims_follow_from_the_numbers(study: PaperStudy) -> None:
@@ -86,7 +86,7 @@ def test_the_words_on_claims_follow_from_the_numbers(study: PaperStudy) -> None:
     assert study.plain.at_speed == pytest.approx((printed.FREQUENCY, printed.FREQUENCY), rel=1e-9)
     assert study.shear.at_speed[0] < printed.FREQUENCY - 10
     assert study.stiffness.modal[1] / study.stiffness.modal[0] > 0.98
-    assert study.lobes.left_in_pocket(study.lobes.by_model) < 0.2
+    assert study.lobes.pocket_limit_ratio(study.lobes.by_model) < 0.2
     assert study.lobes.errors_of_one_mode(study.lobes.one_mode, study.lobes.six_modes)[2] > 0.1
 
 

@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import CutScreenServer, DashboardServer
-from lobewatch.screen.live_test import LiveTest
-from lobewatch.screen.web_thread import WebThread
-from lobewatch.tap.emulated_spindle import emulated_structure, emulator
-from lobewatch.tap.listening.cut_state import CutState, CutStep
-from lobewatch.tap.publisher import Pictures
+from lobewatch.screen.dashboard_server import LiveTest
+from lobewatch.screen.web_server import WebServerThread
+from lobewatch.tap.cut_recording import CutState, CutStep
+from lobewatch.tap.emulated_spindle import build_structure, make_emulator
+from lobewatch.tap.evaluated_hits import StatePublisher
 
 TOKEN, WATCH = "a-token-of-the-test", "another-token-to-watch"
 START = "/machines/mill/start"
@@ -56,7 +56,7 @@ BODIES = {
 }
 
 
-def ask(server: WebThread, method: str, path: str, body: bytes = b"", **changed: str | None) -> tuple[int, Any]:
+def ask(server: WebServerThread, method: str, path: str, body: bytes = b"", **changed: str | None) -> tuple[int, Any]:
     """Status and answer for a request as the page makes it; headers can be changed, or left out by None."""
     host = server.origin.removeprefix("http://")
     headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {TOKEN}"} | changed
@@ -74,12 +74,12 @@ def ask(server: WebThread, method: str, path: str, body: bytes = b"", **changed:
         return answer.status, json.loads(content) if content[:1] == b"{" else content
 
 
-def connected(server: WebThread) -> socket.socket:
+def connected(server: WebServerThread) -> socket.socket:
     """A connection on which nothing is sent yet."""
     return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=10)
 
 
-def head(server: WebThread) -> bytes:
+def head(server: WebServerThread) -> bytes:
     """Head of the request that starts a test, but for its length."""
     origin = server.origin
     lines = (f"POST {START} HTTP/1.1", f"Host: {origin[7:]}", f"Origin: {origin}", f"Authorization: Bearer {TOKEN}", "")
@@ -116,7 +116,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DashboardServer]:
 @pytest.fixture
 def cut() -> Iterator[CutScreenServer]:
     """The screen of a cut that is waited for."""
-    pictures = Pictures(CutState(1, CutStep.LISTENING, "mill-3, A at 12 000 rpm"), lambda: 0.0)
+    pictures = StatePublisher(CutState(1, CutStep.LISTENING, "mill-3, A at 12 000 rpm"), lambda: 0.0)
     with CutScreenServer(pictures, token=TOKEN, watch_token=WATCH) as server:
         yield server
 
@@ -192,8 +192,8 @@ def test_twenty_starts_at_once_begin_one_test(tmp_path: Path) -> None:
     folder = tappable(tmp_path, "/dev/nothing-here")
     spindle = folder.machine.spindle
     assert spindle is not None
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
-    with emulator(structure, np.random.default_rng(1), realtime=True) as device:
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(1), realtime=True) as device:
         toml = folder.toml.read_text("utf-8")
         folder.toml.write_text(toml.replace("/dev/nothing-here", device.port), "utf-8")
         with DashboardServer(tmp_path, token=TOKEN) as server, ThreadPoolExecutor(20) as pool:
@@ -215,7 +215,7 @@ def test_twenty_starts_at_once_after_a_failure_begin_one_test(tmp_path: Path, mo
             super().__init__(*args, **options)
 
     monkeypatch.setattr("lobewatch.screen.dashboard_server.LiveTest", Counted)
-    monkeypatch.setattr("lobewatch.screen.live_test.return_memory", lambda: time.sleep(1.0))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(1.0))
     with DashboardServer(tmp_path, token=TOKEN) as server, ThreadPoolExecutor(20) as pool:
         assert ask(server, "POST", START, X)[0] == 200
         while begun[0].running:

@@ -12,8 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen import DashboardServer, board
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.screen import DashboardServer
+from lobewatch.screen import machine_table as board
 from tests.lobewatch.screen.test_dashboard import ask
 
 Shop = Any
@@ -22,7 +23,7 @@ Shop = Any
 
 @pytest.fixture(autouse=True)
 def _look_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(board, "LOOK_EVERY", 0.0)
+    monkeypatch.setattr(board, "MACHINE_POLL_INTERVAL", 0.0)
 
 
 def make(folder: Path) -> None:

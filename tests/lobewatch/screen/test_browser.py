@@ -13,9 +13,9 @@ from selenium.webdriver.common.keys import Keys
 
 from acquisition import Circumstances, HammeredStructure, HitFlags, TapsEmulator, TapsSource
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer, ScreenServer
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapStep
 
@@ -110,7 +110,7 @@ def test_a_lost_server_is_said_and_found_again(opened: Browser, session: Session
 
 
 def test_a_silent_server_is_no_connection(opened: Browser, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lobewatch.screen.feed.SIGN_OF_LIFE", 1e9)
+    monkeypatch.setattr("lobewatch.screen.live_feed.HEARTBEAT_INTERVAL", 1e9)
     session.show(TapStep.TAP)
     with ScreenServer(session) as server:
         opened.open(server.url)
@@ -133,7 +133,7 @@ def test_the_last_picture_stays_when_lobewatch_has_ended(opened: Browser, sessio
 def test_a_test_is_started_and_watched_from_the_dashboard(
     browser: Browser, tmp_path: Path, tapper: Callable[..., HammeredStructure]
 ) -> None:
-    with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=True) as device:
+    with TapsEmulator(tapper(), EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=True) as device:
         toml = make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
         text = toml.read_text("utf-8").replace("hits = 10", "hits = 1000")
         toml.write_text(text.replace("[daq]\n", f'[daq]\nport = "{device.port}"\n'), "utf-8")
@@ -157,7 +157,7 @@ def test_a_real_test_from_the_first_tap_to_the_light(
     make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
     folder = MachineFolder(tmp_path / "mill")
     about = Circumstances("mill", datetime.now(UTC), "reference", "x")
-    with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=False) as device:
+    with TapsEmulator(tapper(), EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=False) as device:
         session = TapSession(folder, lambda: TapsSource(device.port), about)
         with ScreenServer(session) as server:
             browser.open(server.url)

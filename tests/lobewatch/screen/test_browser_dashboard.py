@@ -14,9 +14,10 @@ from selenium.webdriver.common.by import By
 
 from acquisition import Circumstances, Hit, HitFlags, TapDirection, TapTest, from_accelerance, new_tap_id, write_hit
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen import DashboardServer, board
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.screen import DashboardServer
+from lobewatch.screen import machine_table as board
+from modal import Mode, synthesize_frf
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
@@ -29,7 +30,7 @@ LINES = [4.0 * line for line in range(1, 1000)]
 def tap(path: Path, days_ago: float, frequency: float, direction: TapDirection = "x") -> None:
     """A tap test without noise."""
     about = Circumstances("m", datetime.now(UTC) - timedelta(days=days_ago), "reference", direction)
-    frf = synthesize([Mode(frequency, 0.029, 3.5e7)], LINES)
+    frf = synthesize_frf([Mode(frequency, 0.029, 3.5e7)], LINES)
     MachineFolder(path).commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 
@@ -187,7 +188,7 @@ def test_a_line_opens_with_all_reasons_and_stays_open(browser: Browser, dashboar
 def test_lines_change_go_and_come_and_the_others_stay_as_they_are(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(board, "LOOK_EVERY", 0.0)
+    monkeypatch.setattr(board, "MACHINE_POLL_INTERVAL", 0.0)
     for name in ("a", "b", "c"):
         machine(tmp_path / name)
     with DashboardServer(tmp_path) as server:

@@ -16,7 +16,7 @@ from acquisition.emulation import Passage
 from lobewatch.cli import main
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder, make_machine_folder
-from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.tap.emulated_cut import emulate_cut
 
 Browser = Any
@@ -90,7 +90,7 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
     kind: str,
     text: str,
 ) -> None:
-    setting = cut_setting(folder.machine, PROGRAM, SPEED, depth_mm)
+    setting = find_cut_setting(folder.machine, PROGRAM, SPEED, depth_mm)
     emulated = emulate_cut(folder, find_driver("taps"), setting, passage=PASSAGE)
     told: list[str] = []
     with emulated.device as device:

@@ -11,7 +11,7 @@ from selenium.webdriver.common.by import By
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
 
 Browser = Any

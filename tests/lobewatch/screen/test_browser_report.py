@@ -17,12 +17,11 @@ from selenium.webdriver.common.keys import Keys
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
-from lobewatch.plant.plant import Plant, find_machines
+from lobewatch.fleet.fleet import Fleet, find_machines
 from lobewatch.screen import DashboardServer
-from lobewatch.show.plant.plant_rows import plant_rows
-from lobewatch.show.report.fleet import render_fleet
-from lobewatch.show.report.report import render_report
-from lobewatch.show.terminal.csv_text import csv_text
+from lobewatch.show.fleet.fleet_status import fleet_rows
+from lobewatch.show.report.report import render_fleet, render_report
+from lobewatch.show.terminal.output import format_csv
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
@@ -173,7 +172,7 @@ def reports(new_shop: Callable[[Path], Shop], tmp_path_factory: pytest.TempPathF
     now = shop.start + timedelta(days=150)
     one, fleet = path / "report.html", path / "fleet.html"
     one.write_text(render_report(shop.logbook, "reference", "x", now), "utf-8")
-    rows = plant_rows(Plant(find_machines(path)).standings(now))
+    rows = fleet_rows(Fleet(find_machines(path)).assess_machines(now))
     fleet.write_text(render_fleet(rows, "plant", now), "utf-8")
     return [one, fleet]
 
@@ -250,7 +249,7 @@ def test_on_a_phone_each_row_is_a_card_that_names_its_cells(browser: Browser, re
 
 def test_ten_machines_stand_on_one_screen(browser: Browser, reports: list[Path], tmp_path: Path) -> None:
     """Ten that each have much to say, the path to a machine among it; all of it is there where a line has the focus."""
-    worn, fresh = plant_rows(Plant(find_machines(reports[0].parent)).standings())
+    worn, fresh = fleet_rows(Fleet(find_machines(reports[0].parent)).assess_machines())
     page = tmp_path / "fleet.html"
     rows = [{**worn, "key": f"mill-{number}", "name": f"DMG HSC 75 number {number}"} for number in range(9)]
     page.write_text(render_fleet([*rows, fresh], "plant", datetime.now(UTC)), "utf-8")
@@ -282,11 +281,11 @@ def test_what_the_buttons_save_does_not_run_in_a_spreadsheet(
     browser: Browser, reports: list[Path], tmp_path: Path
 ) -> None:
     """Cell by cell as the commands write it."""
-    (row, _) = plant_rows(Plant(find_machines(reports[0].parent)).standings())
+    (row, _) = fleet_rows(Fleet(find_machines(reports[0].parent)).assess_machines())
     page = tmp_path / "fleet.html"
     page.write_text(render_fleet([{**row, "name": name} for name in NAMES], "plant", datetime.now(UTC)), "utf-8")
     browser.open(page.as_uri())
     (saved,) = browser.driver.execute_async_script(SAVED)
     shown = [line["name"] for line in csv.DictReader(io.StringIO(saved, newline=""))]
-    assert shown == [cell for (cell,) in csv.reader(io.StringIO(csv_text([[name] for name in NAMES]), newline=""))]
+    assert shown == [cell for (cell,) in csv.reader(io.StringIO(format_csv([[name] for name in NAMES]), newline=""))]
     assert shown[0] == f"'{NAMES[0]}"

@@ -18,22 +18,13 @@ import aiohttp
 import numpy as np
 import pytest
 
-from acquisition import (
-    Circumstances,
-    DataError,
-    Hit,
-    HitFlags,
-    TapDirection,
-    TapsEmulator,
-    TapsSource,
-    write_hit,
-)
+from acquisition import Circumstances, DataError, Hit, HitFlags, TapDirection, TapsEmulator, TapsSource, write_hit
 from lobewatch.cli import main
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.emulated_spindle import build_structure, make_emulator, set_bearing_stiffness
 from lobewatch.tap.session import TapSession
 
 DAY = datetime(2026, 5, 4, 9, tzinfo=UTC)
@@ -54,8 +45,8 @@ def hammered(folder: MachineFolder, stiffness: float = NEW, realtime: bool = Fal
     """Somebody taps its spindle with these bearings (N/m)."""
     spindle = folder.machine.spindle
     assert spindle is not None
-    structure = emulated_structure(with_bearing_stiffness(spindle.build(), stiffness), spindle.damping_ratio)
-    with emulator(structure, np.random.default_rng(1), realtime=realtime) as device:
+    structure = build_structure(set_bearing_stiffness(spindle.build(), stiffness), spindle.damping_ratio)
+    with make_emulator(structure, np.random.default_rng(1), realtime=realtime) as device:
         yield device
 
 
@@ -91,35 +82,35 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_worn_machine_says_how_far_its_frequency_has_fallen(shop: Path) -> None:
-    found = Logbook.open(shop / "b-worn").standing(DAY)
+    found = Logbook.open(shop / "b-worn").status(DAY)
     (series,) = found.series
-    assert series.fall.value == pytest.approx(10.0, abs=0.01)
-    assert 0 < series.fall.std < 0.01
-    assert (found.light, series.name) == ("alarm", "reference, x")
+    assert series.drop.value == pytest.approx(10.0, abs=0.01)
+    assert 0 < series.drop.std < 0.01
+    assert (found.status, series.name) == ("alarm", "reference, x")
     assert found.days_left == pytest.approx(-10)
     assert any("slot at 12 600 rpm" in remark.about for remark in found.remarks)
     assert "overdue" in [remark.code for remark in found.remarks]
 
 
 def test_a_machine_tapped_once_has_nothing_to_compare_with(shop: Path) -> None:
-    found = Logbook.open(shop / "a-new").standing(DAY)
+    found = Logbook.open(shop / "a-new").status(DAY)
     (series,) = found.series
-    assert (series.fall, series.is_first) == ((0.0, 0.0), True)
+    assert (series.drop, series.is_baseline) == ((0.0, 0.0), True)
     assert found.days_left == pytest.approx(20)
 
 
 def test_one_direction_warns_of_programs_by_name_and_both_are_good(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
-    alone = Logbook.open(folder.path).standing(DAY)
+    alone = Logbook.open(folder.path).status(DAY)
     codes = [remark.code for remark in alone.remarks]
-    assert (alone.light, codes) == ("warn", ["program-doubtful"] * 3 + ["one-direction"])
+    assert (alone.status, codes) == ("warn", ["program-doubtful"] * 3 + ["one-direction"])
     with DashboardServer(folder.path) as server:
         (row,) = ask(server, "GET", "/machines")[1]["machines"]
     assert re.search(r"A: slot at .*, B: slot at .*, C: slot at .* rpm: doubtful; reference: tapped in", row["note"])
     assert alone.next_step.startswith("Tap direction y of the same tool too")
     tap(folder, NEW, DAY + timedelta(hours=1), "y")
-    assert Logbook.open(folder.path).standing(DAY).light == "good"
+    assert Logbook.open(folder.path).status(DAY).status == "good"
 
 
 def test_what_is_damaged_is_found_in_the_background(tmp_path: Path) -> None:
@@ -160,8 +151,8 @@ def test_an_interrupted_test_is_gone_on_with_or_begun_anew(tmp_path: Path) -> No
 
 
 def test_overdue_is_never_good(shop: Path) -> None:
-    found = Logbook.open(shop / "a-new").standing(DAY + timedelta(days=21))
-    assert found.light == "warn"
+    found = Logbook.open(shop / "a-new").status(DAY + timedelta(days=21))
+    assert found.status == "warn"
     assert found.remarks[0].code == "overdue"
     assert "overdue by 1 day" in found.remarks[0].text
     assert found.next_step == "Take the tap test that is due."
@@ -170,11 +161,11 @@ def test_overdue_is_never_good(shop: Path) -> None:
 def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
-    assert "mode-lost" not in [remark.code for remark in Logbook.open(folder.path).standing(DAY).remarks]
+    assert "mode-lost" not in [remark.code for remark in Logbook.open(folder.path).status(DAY).remarks]
     text = folder.toml.read_text("utf-8")
     folder.toml.write_text(text.replace("band_hz = [1200, 2200]", "band_hz = [3900, 3950]"), "utf-8")
-    found = Logbook.open(folder.path).standing(DAY)
-    assert (found.light, found.remarks[0].code) == ("warn", "mode-lost")
+    found = Logbook.open(folder.path).status(DAY)
+    assert (found.status, found.remarks[0].code) == ("warn", "mode-lost")
 
 
 def test_the_list_is_worst_first_and_nothing_is_listed_without_the_token(shop: Path) -> None:
@@ -266,7 +257,7 @@ def test_a_page_that_has_watched_a_test_to_its_end_sees_the_next(
 ) -> None:
     """Also where START is pressed before the thread of the failed test has ended."""
     machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
-    monkeypatch.setattr("lobewatch.screen.live_test.return_memory", lambda: time.sleep(0.3))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(0.3))
 
     async def titles(server: DashboardServer) -> list[str]:
         found: list[str] = []

@@ -23,9 +23,10 @@ import pytest
 
 from acquisition import Circumstances, TapsSource, TapTest
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen import ScreenServer, door
-from lobewatch.tap.emulated_spindle import emulated_structure, emulator
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.screen import ScreenServer
+from lobewatch.screen import access_control as door
+from lobewatch.tap.emulated_spindle import build_structure, make_emulator
 from lobewatch.tap.session import TapSession
 
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -101,10 +102,10 @@ def test_of_three_hundred_half_sent_requests_eight_are_held_and_a_page_is_answer
     with ScreenServer(session) as server, contextlib.ExitStack() as opened:
         for i in range(300):
             opened.enter_context(knock(server))
-            assert server.door.connections <= door.STRANGERS + 1  # the page
+            assert server.limiter.connection_count <= door.MAX_ANONYMOUS_PER_NETWORK + 1  # the page
             if i % 100 == 50:
                 assert is_answered(server)
-        wait(lambda: server.door.connections == door.STRANGERS)
+        wait(lambda: server.limiter.connection_count == door.MAX_ANONYMOUS_PER_NETWORK)
 
 
 def test_from_many_addresses_sixty_four_are_held_and_no_page_that_is_known_must_go(session: Session) -> None:
@@ -113,8 +114,8 @@ def test_from_many_addresses_sixty_four_are_held_and_no_page_that_is_known_must_
             assert not (await next_state(feed))["checks"]
             for i in range(100):
                 opened.enter_context(knock(server, f"127.0.1.{i // 5}"))
-                assert server.door.connections <= door.MOST
-            await asyncio.to_thread(wait, lambda: server.door.connections == door.MOST)
+                assert server.limiter.connection_count <= door.MAX_CONNECTIONS
+            await asyncio.to_thread(wait, lambda: server.limiter.connection_count == door.MAX_CONNECTIONS)
             session.check()
             assert (await next_state(feed))["checks"]
 
@@ -126,7 +127,7 @@ def test_from_many_addresses_sixty_four_are_held_and_no_page_that_is_known_must_
 def test_who_sends_no_request_in_time_is_hung_up(
     session: Session, monkeypatch: pytest.MonkeyPatch, sent: bytes
 ) -> None:
-    monkeypatch.setattr(door, "HEAD_TIME", 0.2)
+    monkeypatch.setattr(door, "REQUEST_HEAD_TIMEOUT", 0.2)
     with ScreenServer(session) as server, knock(server, send=sent) as connection:
         if sent.endswith(b"\r\n\r\n"):
             assert b"200" in connection.recv(15)
@@ -134,13 +135,13 @@ def test_who_sends_no_request_in_time_is_hung_up(
         while not is_hung_up(connection):
             pass
         assert time.monotonic() - begun < 5
-        assert server.door.connections == 0
+        assert server.limiter.connection_count == 0
 
 
 def test_strangers_are_answered_slowly_and_those_with_the_token_at_once(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(door, "PACE", 0.05)
+    monkeypatch.setattr(door, "ACCEPT_INTERVAL", 0.05)
     with ScreenServer(session) as server:
         connection = http.client.HTTPConnection("127.0.0.1", port_of(server), timeout=10)
         with contextlib.closing(connection):
@@ -156,8 +157,8 @@ def test_strangers_are_answered_slowly_and_those_with_the_token_at_once(
 
 
 def test_a_feed_is_not_hung_up_for_its_silence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(door, "HEAD_TIME", 0.1)
-    monkeypatch.setattr(door, "IDLE_TIME", 0.1)
+    monkeypatch.setattr(door, "REQUEST_HEAD_TIMEOUT", 0.1)
+    monkeypatch.setattr(door, "IDLE_TIMEOUT", 0.1)
 
     async def talk(server: ScreenServer) -> None:
         async with feed_of(server) as feed:
@@ -176,7 +177,7 @@ def test_descriptors_are_held_back_for_the_disk(session: Session, tmp_path: Path
         assert is_answered(server)
         with (tmp_path / "next").open("w") as file:
             lowest = file.fileno()
-        resource.setrlimit(resource.RLIMIT_NOFILE, (lowest + 1 + door.HELD_BACK, hard))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (lowest + 1 + door.RESERVED_DESCRIPTORS, hard))
         try:
             with knock(server) as connection:
                 assert is_hung_up(connection)
@@ -190,7 +191,7 @@ def test_descriptors_are_held_back_for_the_disk(session: Session, tmp_path: Path
     [("192.0.2.7", "192.0.2.7"), ("2001:db8::7", "2001:db8::/64"), ("fe80::1%eth0", "fe80::/64")],
 )
 def test_one_computer_is_one_place(host: str, place: str) -> None:
-    assert door.place_of(host) == place
+    assert door.get_client_network(host) == place
 
 
 @contextlib.contextmanager
@@ -220,10 +221,10 @@ def tapped(path: Path, hits: int, held: int, realtime: bool = True) -> tuple[Tap
     folder = MachineFolder(path)
     spindle = folder.machine.spindle
     assert spindle is not None
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
     about = Circumstances("mill", datetime.now(UTC), "reference", "x")
     done: list[TapTest] = []
-    with emulator(structure, np.random.default_rng(1), realtime=realtime) as device:
+    with make_emulator(structure, np.random.default_rng(1), realtime=realtime) as device:
         session = TapSession(folder, lambda: TapsSource(device.port), about)
         running = threading.Thread(target=lambda: done.append(session.run()))
         with ScreenServer(session) as server, knocking_at(server, held) as count:
@@ -232,7 +233,7 @@ def tapped(path: Path, hits: int, held: int, realtime: bool = True) -> tuple[Tap
             begun, first = time.monotonic(), session.state.good
             wait(lambda: session.state.good == hits or not running.is_alive(), patience=100)
             rate = (session.state.good - first) / (time.monotonic() - begun)
-            assert server.door.connections <= door.STRANGERS
+            assert server.limiter.connection_count <= door.MAX_ANONYMOUS_PER_NETWORK
             running.join()
     return done[0], rate, max(count, default=0)
 

@@ -20,19 +20,19 @@ import pytest
 
 from acquisition import Circumstances, DeviceError, HammeredStructure, HitFlags, TapsEmulator, TapsSource
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import ScreenServer
-from lobewatch.screen.web_thread import WebThread
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
+from lobewatch.screen.web_server import WebServerThread
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import Plots, TapState, TapStep
+from lobewatch.tap.state import LiveCurves, TapState, TapStep
 
 TOKEN = "a-token-of-the-test"
 Session = Any
 """ScriptedSession of conftest.py."""
 
 
-def ask(server: WebThread, method: str, path: str, body: str = "", **changed: str | None) -> tuple[int, Any, Any]:
+def ask(server: WebServerThread, method: str, path: str, body: str = "", **changed: str | None) -> tuple[int, Any, Any]:
     """Status, content and headers for a request as the page makes it; headers can be changed, or left out by None."""
     host = server.origin.removeprefix("http://")
     headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {server.token}"} | changed
@@ -53,7 +53,7 @@ def ask(server: WebThread, method: str, path: str, body: str = "", **changed: st
 Received = Callable[[aiohttp.ClientWebSocketResponse], Coroutine[Any, Any, None]]
 
 
-def follow(server: WebThread, talk: Received, path: str = "/feed", token: str = TOKEN, **headers: str) -> None:
+def follow(server: WebServerThread, talk: Received, path: str = "/feed", token: str = TOKEN, **headers: str) -> None:
     """Open the feed as the page does."""
 
     async def run() -> None:
@@ -94,7 +94,7 @@ def test_the_page_needs_no_token_and_tells_nothing(session: Session) -> None:
 
 
 def test_every_token_is_another() -> None:
-    servers = [WebThread("127.0.0.1", 0, None) for _ in range(20)]
+    servers = [WebServerThread("127.0.0.1", 0, None) for _ in range(20)]
     tokens = {token for server in servers for token in (server.token, server.watch_token)}
     assert len(tokens) == 40
     assert min(map(len, tokens)) >= 32
@@ -277,7 +277,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
 
 def test_the_curves_arrive_as_they_were(session: Session) -> None:
     session.hit()
-    plots: Plots = session.state.plots
+    plots: LiveCurves = session.state.plots
     found: dict[str, Any] = {}
 
     async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
@@ -410,7 +410,7 @@ def test_a_real_test_through_an_emulated_device(tmp_path: Path, tapper: Callable
             shown.append(await next_state(feed))
         running.join()
 
-    with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=False) as device:
+    with TapsEmulator(tapper(), EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=False) as device:
         folder = MachineFolder(tmp_path / "mill")
         session = TapSession(folder, lambda: TapsSource(device.port), about)
         with ScreenServer(session, token=TOKEN) as server:

@@ -14,7 +14,7 @@ import pytest
 
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen import DashboardServer
-from lobewatch.screen.live_test import LiveTest
+from lobewatch.screen.dashboard_server import LiveTest
 from tests.lobewatch.screen.test_dashboard import ask, hammered, machine
 
 WINDOW = 20

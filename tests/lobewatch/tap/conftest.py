@@ -13,7 +13,7 @@ import pytest
 
 from acquisition import Block, Channel, Circumstances, DeviceError, HammeredStructure, SimulatedSource
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
 
@@ -73,7 +73,7 @@ def simulated() -> type[Simulated]:
 
 @pytest.fixture
 def session_of() -> Callable[..., TapSession]:
-    """Makes a session whose every new state is handed to `watch`, through the clock that it asks after each."""
+    """Makes a session whose every new state is handed to `monitor_drops`, through the clock that it asks after each."""
 
     def make(
         folder: MachineFolder,

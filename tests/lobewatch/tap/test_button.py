@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Event, EventKind, HammeredStructure, HitFlags, TapsEmulator, TapsSource, TapTest
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.connection import Button
+from lobewatch.tap.device_connection import Button
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
@@ -88,7 +88,7 @@ def test_what_the_button_did_before_the_stream_counts_for_nothing(
 def test_presses_are_told_from_bouncing_by_the_clock_of_the_device(scans: tuple[int, ...], presses: int) -> None:
     button = Button(1000.0)
     events = deque(Event(EventKind.BUTTON, scan=scan) for scan in scans)
-    assert button.presses(events) == presses
+    assert button.count_presses(events) == presses
     assert not events
 
 
@@ -98,4 +98,4 @@ def test_a_button_let_go_is_not_pressed_and_bounces_then_too() -> None:
 
     button = Button(1000.0)
     moves = ((0, True), (2000, False), (2001, True), (2002, False), (2400, True))
-    assert [button.presses(moved(*move)) for move in moves] == [1, 0, 0, 0, 1]
+    assert [button.count_presses(moved(*move)) for move in moves] == [1, 0, 0, 0, 1]

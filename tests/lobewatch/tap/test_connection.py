@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from acquisition import Channel, DataError, DeviceError, Faults, HammeredStructure, TapsEmulator, TapsSource
+from acquisition import Channel, DataError, DeviceError, HammeredStructure, TapsEmulator, TapsFaults, TapsSource
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.plug import Plug
+from lobewatch.tap.device_connection import DeviceOpener
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
 
@@ -68,7 +68,7 @@ def test_a_cable_pulled_from_a_real_port(
     folder: MachineFolder, tapper: Tapper, channels: Pair, session_of: OpenSession
 ) -> None:
     with (
-        TapsEmulator(tapper(1), channels, RATE, realtime=False, faults=Faults(unplug_after=100_000)) as first,
+        TapsEmulator(tapper(1), channels, RATE, realtime=False, faults=TapsFaults(unplug_after=100_000)) as first,
         TapsEmulator(tapper(2), channels, RATE, realtime=False) as second,
     ):
         ports = iter((first.port, second.port))
@@ -99,7 +99,7 @@ def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_
         return TapsSource(port, sample_rate)
 
     with (
-        TapsEmulator(tapper(1), channels, RATE, realtime=False, faults=Faults(unplug_after=100_000)) as first,
+        TapsEmulator(tapper(1), channels, RATE, realtime=False, faults=TapsFaults(unplug_after=100_000)) as first,
         TapsEmulator(tapper(2), channels, RATE, realtime=False) as second,
     ):
         ports = [SimpleNamespace(device=first.port, vid=0x16C0, serial_number="5C2B")]
@@ -112,7 +112,7 @@ def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_
 
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda **_: ports)
         monkeypatch.setattr("acquisition.taps.TapsSource", open_taps)
-        tap = session_of(folder, Plug(folder.machine.daq, first.port).open, plug).run()
+        tap = session_of(folder, DeviceOpener(folder.machine.daq, first.port).open, plug).run()
     assert opened == [first.port, second.port]
     assert len(tap.accepted) == 10
 
@@ -168,4 +168,4 @@ def test_samples_that_end_with_the_last_hit_are_enough(
     session: TapSession = session_of(
         folder, lambda: simulated(tapper(), channels, ended=lambda: session.state.good == 10)
     )
-    assert session.run().known_frf.n_averages == 10
+    assert session.run().required_frf.n_averages == 10

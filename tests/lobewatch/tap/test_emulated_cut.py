@@ -17,9 +17,9 @@ from acquisition.emulation import Passage
 from lobes import Cut
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.machine.settings.cut_setting import cut_setting
-from lobewatch.tap.emulated_cut import EmulatedCut, emulate_cut, hidden_truth, runout_of
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tap.emulated_cut import EmulatedCut, draw_hidden_truth, draw_runout, emulate_cut
 
 RATE = 25600.0
 PASSAGE = Passage(before=0.2, ramp=0.05, steady=0.5, after=0.1)
@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> MachineFolder:
 
 
 def emulated(folder: MachineFolder, depth_mm: float, speed_rpm: float | None = None, **options: Any) -> EmulatedCut:
-    setting = cut_setting(folder.machine, PROGRAM, speed_rpm, depth_mm)
+    setting = find_cut_setting(folder.machine, PROGRAM, speed_rpm, depth_mm)
     return emulate_cut(folder, find_driver("taps"), setting, realtime=False, **{"passage": PASSAGE} | options)
 
 
@@ -90,14 +90,14 @@ def test_before_the_cut_there_is_air_and_then_it_is_repeated(folder: MachineFold
 
 def test_the_truth_is_that_of_the_seed_whatever_is_cut(folder: MachineFolder) -> None:
     one, other = emulated(folder, 1.0, passage=SHORT), emulated(folder, 2.0, 9000.0, passage=SHORT)
-    assert one.truth == other.truth == hidden_truth(1)
+    assert one.truth == other.truth == draw_hidden_truth(1)
     assert emulated(folder, 1.0, seed=2, passage=SHORT).truth != one.truth
     assert one.speed_rpm / 12600 == pytest.approx(other.speed_rpm / 9000)
     assert 0 < abs(one.speed_rpm / 12600 - 1) <= 0.015
 
 
 def test_truths_scatter_as_spindles_at_speed_may() -> None:
-    truths = [hidden_truth(seed).factors for seed in range(400)]
+    truths = [draw_hidden_truth(seed).factors for seed in range(400)]
     middle = {name: float(np.mean([truth[name] for truth in truths])) for name in truths[0]}
     spread = {name: float(np.std([truth[name] for truth in truths])) / middle[name] for name in middle}
     for side in "xy":
@@ -111,7 +111,7 @@ def test_truths_scatter_as_spindles_at_speed_may() -> None:
 
 
 def test_an_eccentric_tool_has_teeth_on_a_circle() -> None:
-    runout = np.array(runout_of(Cut(4, 1.0, "down", 1e9, 3e8), np.random.default_rng(1)))
+    runout = np.array(draw_runout(Cut(4, 1.0, "down", 1e9, 3e8), np.random.default_rng(1)))
     assert np.max(np.abs(runout)) <= 20e-6
     assert runout[0] == pytest.approx(-runout[2])
 
@@ -124,7 +124,7 @@ def test_a_machine_without_a_model_is_refused(folder: MachineFolder, tmp_path: P
 
 
 def test_a_driver_that_cannot_be_emulated_is_refused(folder: MachineFolder) -> None:
-    setting = cut_setting(folder.machine, PROGRAM, None, None)
+    setting = find_cut_setting(folder.machine, PROGRAM, None, None)
     with pytest.raises(DataError, match="cannot be emulated"):
         emulate_cut(folder, replace(find_driver("taps"), emulate=None), setting)
 

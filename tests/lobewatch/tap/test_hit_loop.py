@@ -20,17 +20,17 @@ from acquisition import (
     Structure,
     TapsEmulator,
     TapsSource,
-    cross_spectra,
+    compute_cross_spectra,
     estimate_frf,
-    judge_hit,
+    evaluate_hit,
     read_hits,
     read_tap,
     write_hit,
 )
-from acquisition.estimation.estimate_frf import frf_of_spectra
-from acquisition.verdicts.by_spectrum import by_spectrum
+from acquisition.estimation.estimate_frf import estimate_frf_from_spectra
+from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.plots import plots_of
+from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
 
@@ -60,7 +60,7 @@ def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
     assert undone == [2, 3, 12]
     assert [hit.number for hit in session.state.hits if hit.undone] == undone
     assert len(tap.accepted) == 10
-    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.accepted).receptance)
+    assert np.array_equal(tap.required_frf.receptance, estimate_frf(tap.accepted).receptance)
     path = folder.path / "taps" / f"{tap.id}.h5"
     assert read_tap(path).flags == tap.flags
     assert len(read_hits(path)) == 10
@@ -103,7 +103,7 @@ def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
     told = next(state for state in states if state.verdict == "inconsistent")
     assert (told.good, len(told.hits), told.word) == (3, 4, TapStep.WAIT)
     assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
-    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+    assert np.array_equal(tap.required_frf.receptance, estimate_frf(tap.hits[1:]).receptance)
 
 
 def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
@@ -120,7 +120,7 @@ def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
         shown.append((session.state.word, session.state.verdict, session.state.good))
         write_hit(*arguments)
 
-    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", keep)
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.write_hit", keep)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     session.run()
     assert shown == [(TapStep.GOOD, "good", good) for good in range(10)]
@@ -146,11 +146,11 @@ def test_a_hit_on_which_the_judging_fails_is_refused_and_kept_and_the_test_goes_
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    monkeypatch.setattr("lobewatch.tap.judged_hits.judge_hit", failing_at({3}, judge_hit))
+    monkeypatch.setattr("lobewatch.tap.evaluated_hits.evaluate_hit", failing_at({3}, evaluate_hit))
     states: list[TapState] = []
     session = session_of(folder, lambda: simulated(tapper(), channels), states.append)
     tap = session.run()
-    assert tap.flags == (HitFlags.OK, HitFlags.OK, HitFlags.NOT_JUDGED, *[HitFlags.OK] * 8)
+    assert tap.flags == (HitFlags.OK, HitFlags.OK, HitFlags.NOT_EVALUATED, *[HitFlags.OK] * 8)
     refused = next(state for state in states if state.word is TapStep.REFUSED)
     assert (refused.shown_word, refused.reason) == (
         "NOT JUDGED",
@@ -171,10 +171,10 @@ def test_a_first_hit_that_cannot_be_compared_with_the_others_counts_no_more(
     session_of: OpenSession,
 ) -> None:
     monkeypatch.setattr(
-        "lobewatch.tap.judged_hits.by_spectrum", failing_at({2}, by_spectrum)
+        "lobewatch.tap.evaluated_hits.evaluate_spectrum", failing_at({2}, evaluate_spectrum)
     )  # the 2nd, looked back at
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
-    assert tap.flags == (HitFlags.OK, HitFlags.NOT_JUDGED, *[HitFlags.OK] * 9)
+    assert tap.flags == (HitFlags.OK, HitFlags.NOT_EVALUATED, *[HitFlags.OK] * 9)
 
 
 def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
@@ -185,12 +185,12 @@ def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    module = "acquisition.estimation.running_mean.frf_of_spectra"
-    monkeypatch.setattr(module, failing_at({4}, frf_of_spectra))
+    module = "acquisition.estimation.estimate_frf.estimate_frf_from_spectra"
+    monkeypatch.setattr(module, failing_at({4}, estimate_frf_from_spectra))
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
     assert [i for i, flags in enumerate(tap.flags, 1) if flags] == [4]
-    assert tap.flags[3] == HitFlags.NOT_JUDGED
-    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.accepted).receptance)
+    assert tap.flags[3] == HitFlags.NOT_EVALUATED
+    assert np.array_equal(tap.required_frf.receptance, estimate_frf(tap.accepted).receptance)
 
 
 def test_curves_that_cannot_be_drawn_end_no_test(
@@ -201,7 +201,7 @@ def test_curves_that_cannot_be_drawn_end_no_test(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    monkeypatch.setattr("lobewatch.tap.hit_loop.plots_of", failing_at({2, 10}, plots_of))
+    monkeypatch.setattr("lobewatch.tap.hit_loop.build_curves", failing_at({2, 10}, build_curves))
     session = session_of(folder, lambda: simulated(tapper(), channels))
     assert len(session.run().hits) == 10
     assert session.state.plots is None
@@ -213,7 +213,7 @@ def test_a_test_on_a_coarse_converter_takes_its_hits_though_some_lines_have_no_f
     coarse = Channel("force", 2.25e-3, 4.5, 12), Channel("acceleration", 1.02e-3, 5.0, 12)
     tapping = tapper(force_range=(200.0, 200.0), force_noise=0.0)
     tap = session_of(folder, lambda: simulated(tapping, coarse)).run()
-    powers = [cross_spectra([hit])[0] for hit in tap.hits]
+    powers = [compute_cross_spectra([hit])[0] for hit in tap.hits]
     assert any(power.min() < 1e-32 * power.max() for power in powers)
     assert tap.flags == (HitFlags.OK,) * 10
 
@@ -232,8 +232,8 @@ def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(
 
         return late
 
-    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", slow(write_hit))
-    monkeypatch.setattr("lobewatch.tap.hit_loop.plots_of", slow(plots_of))
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.write_hit", slow(write_hit))
+    monkeypatch.setattr("lobewatch.tap.hit_loop.build_curves", slow(build_curves))
     lost: list[int] = []
 
     class Counting(TapsSource):

@@ -14,10 +14,10 @@ from fake_libraries import Volts, Wiring, fake_daqhats, fake_ljm, fake_nidaqmx, 
 
 from acquisition import HammeredStructure, Hammering, MeasuredRate, Structure
 from lobewatch.cli import main
+from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import use_rate
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.plug import open_source
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.device_connection import open_device
 
 PORTS = {
     "audio": "audio:485B39",
@@ -88,8 +88,8 @@ def test_a_whole_tap_test(
     folder = machine_with(driver)
     for name, module in libraries(Wiring(hammered(folder, structure))).items():
         monkeypatch.setitem(sys.modules, name, module)
-    with open_source(folder.machine.daq, PORTS[driver]) as device:
-        use_rate(folder, device, MeasuredRate(device.sample_rate, 1.0, 250_000, 5.0))
+    with open_device(folder.machine.daq, PORTS[driver]) as device:
+        apply_measured_rate(folder, device, MeasuredRate(device.sample_rate, 1.0, 250_000, 5.0))
     monkeypatch.setattr(sys, "argv", ["lobewatch", "tap", "trial", "--direction", "x", "--json"])
     with pytest.raises(SystemExit) as end:
         main()

@@ -25,15 +25,15 @@ from acquisition import (
     from_accelerance,
     new_tap_id,
 )
-from lobewatch.decay.series_history import series_history
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.measuring import Estimate
-from lobewatch.tap.plots import plots_of
-from lobewatch.tap.session import outcome_of
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.measurement import Estimate
+from lobewatch.monitoring.series_history import build_series_history
+from lobewatch.tap.live_curves import build_curves
+from lobewatch.tap.session import build_outcome
 from lobewatch.tap.state import Outcome
-from modal import Mode, synthesize
+from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -54,24 +54,24 @@ def tapped(
     folder: MachineFolder, days: float, frequency: float, direction: TapDirection = "x", stiffness: float = 3e8
 ) -> Outcome:
     about = Circumstances("m", START + timedelta(days=days), "reference", direction)
-    frf = synthesize([Mode(frequency, 0.03, stiffness)], LINES)
+    frf = synthesize_frf([Mode(frequency, 0.03, stiffness)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
     logbook = Logbook(folder)
-    return outcome_of(logbook, logbook.measurement(logbook.newest().id))
+    return build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
 
 
 def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> None:
     first = tapped(folder, 0, 1720.0)
-    assert first.light == "warn"
+    assert first.status == "warn"
     assert "1720" in first.texts[0]
     assert "first test of this tool and direction" in first.texts[0]
     assert first.next_step.startswith("Tap direction y of the same tool too")
     (doubtful,) = (text for text in first.texts if "doubtful" in text)
     assert all(f"{letter}: slot at" in doubtful for letter in "ABC")
     both = tapped(folder, 0.1, 1700.0, "y")
-    assert (both.light, both.next_step) == ("good", "All is well: tap again by 2026-02-14.")
+    assert (both.status, both.next_step) == ("good", "All is well: tap again by 2026-02-14.")
     assert not [text for text in both.texts if "doubtful" in text or "stable" in text]
-    lights = [tapped(folder, 30 * month, 1720 * share).light for month, share in enumerate((0.96, 0.94, 0.89), 1)]
+    lights = [tapped(folder, 30 * month, 1720 * share).status for month, share in enumerate((0.96, 0.94, 0.89), 1)]
     assert lights == ["good", "warn", "alarm"]
     worn = tapped(folder, 120, 0.88 * 1720)
     assert "-12 % against the first test" in worn.texts[0]
@@ -85,7 +85,7 @@ def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFold
     first, last = Logbook(folder).history.rows
     first = replace(first, frequency=Estimate(first.frequency.value, 1.72))
     last = replace(last, frequency=Estimate(last.frequency.value, 0.96 * 1.72))
-    change = series_history([first, last]).frequency.change
+    change = build_series_history([first, last]).frequency.change
     assert change.value == pytest.approx(-4.0, abs=0.01)
     assert change.std == pytest.approx(0.136, abs=0.001)
 
@@ -93,20 +93,20 @@ def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFold
 def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: MachineFolder) -> None:
     tapped(folder, 0, 1720.0)
     tapped(folder, 30, 0.94 * 1720)
-    assert tapped(folder, 60, 0.88 * 1720).light == "alarm"
+    assert tapped(folder, 60, 0.88 * 1720).status == "alarm"
     other = tapped(folder, 60.1, 1700.0, "y")
-    assert other.light == "alarm"
+    assert other.status == "alarm"
     assert any("reference, x: frequency fallen by 12.0 %" in text for text in other.texts)
     assert other.next_step.startswith("Before the next part")
 
 
 def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
     soft = tapped(folder, 0, 1720.0, stiffness=3e6)
-    assert soft.light == "alarm"
+    assert soft.status == "alarm"
     assert any("A: slot at 12 600 rpm" in text and text.endswith(": not stable.") for text in soft.texts)
     assert soft.next_step.startswith("Do not run these programs. Tap direction y of the same tool too")
     both = tapped(folder, 0.1, 1700.0, "y", stiffness=3e6)
-    assert both.light == "alarm"
+    assert both.status == "alarm"
     assert "lobewatch check names a safe speed and depth" in both.next_step
 
 
@@ -114,8 +114,8 @@ def test_a_doubtful_program_warns_and_says_where_to_ask(shop: Any) -> None:
     shop.run(("sure", 8700, 0.4), ("unsure", 12900, 3))
     shop.tap_both()
     logbook = shop.logbook
-    found = outcome_of(logbook, logbook.measurement(logbook.newest().id))
-    assert found.light == "warn"
+    found = build_outcome(logbook, logbook.measurement(logbook.newest().id))
+    assert found.status == "warn"
     assert "unsure: doubtful." in found.texts
     assert not any("sure: stable" in text for text in found.texts)
     assert found.next_step == "See with lobewatch check what would settle it, and where to go until then."
@@ -123,7 +123,7 @@ def test_a_doubtful_program_warns_and_says_where_to_ask(shop: Any) -> None:
 
 def test_a_test_without_the_mode_asks_for_another(folder: MachineFolder) -> None:
     lost = tapped(folder, 0, 900.0)
-    assert lost.light == "warn"
+    assert lost.status == "warn"
     assert any("no mode to follow" in text for text in lost.texts)
     assert lost.next_step.startswith("Tap again")
 
@@ -138,7 +138,7 @@ def test_curves_are_thinned_and_keep_every_extreme(hits: list[Hit]) -> None:
     mean = RunningMean()
     for hit in hits[:3]:
         mean.add(hit)
-    plots = plots_of(hits[2], mean)
+    plots = build_curves(hits[2], mean)
     assert plots.time.size < 2600
     assert plots.frequency.size < 2000
     assert plots.force is not None
@@ -160,7 +160,7 @@ def test_curves_are_thinned_and_keep_every_extreme(hits: list[Hit]) -> None:
 
 def test_what_is_not_known_yet_is_not_shown(hits: list[Hit]) -> None:
     mean = RunningMean()
-    before = plots_of(hits[0], mean)
+    before = build_curves(hits[0], mean)
     assert before.mean is None
     assert before.last is not None
     assert before.coherence is None
@@ -170,9 +170,9 @@ def test_what_is_not_known_yet_is_not_shown(hits: list[Hit]) -> None:
     assert edge == pytest.approx(-20.0, abs=2.0)
     mean.add(hits[0])
     mean.add(hits[1])
-    assert plots_of(hits[1], mean).coherence is None
+    assert build_curves(hits[1], mean).coherence is None
     silent = Hit(np.zeros(1000), np.zeros(1000), 25600.0)
-    nothing = plots_of(silent, RunningMean())
+    nothing = build_curves(silent, RunningMean())
     assert nothing.last is None
     assert nothing.force_spectrum is None
     assert nothing.usable_band is None

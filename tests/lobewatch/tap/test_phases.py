@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acquisition import Channel, HammeredStructure, Hit, HitFlags, check_hit, ring_down
+from acquisition import Channel, HammeredStructure, Hit, HitFlags, check_hit, estimate_decay_time
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
@@ -57,7 +57,7 @@ def test_a_trial_hit_on_which_the_judging_fails_is_asked_for_again(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    function = {"check_hit": check_hit, "ring_down": ring_down}[failing]
+    function = {"check_hit": check_hit, "ring_down": estimate_decay_time}[failing]
     failures = iter([ZeroDivisionError("no lines")])
 
     def once(hit: Hit) -> object:
@@ -85,7 +85,7 @@ def test_a_self_check_that_fails_warns_and_ends_no_test(
     def failing(*_: object) -> None:
         raise ZeroDivisionError("no lines")
 
-    monkeypatch.setattr("lobewatch.tap.phases.self_check", failing)
+    monkeypatch.setattr("lobewatch.tap.hit_loop.run_self_check", failing)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     assert len(session.run().hits) == 10
     check = session.state.checks[0]

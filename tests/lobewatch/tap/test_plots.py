@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition import Hit
-from acquisition.estimation.running_mean import RunningMean
-from lobewatch.tap.plots import plots_of
+from acquisition.estimation.estimate_frf import RunningMean
+from lobewatch.tap.live_curves import build_curves
 
 RATE = 25600.0
 
@@ -18,7 +18,7 @@ def test_the_force_spectrum_of_a_half_sine_is_that_of_the_closed_form() -> None:
     time = np.arange(4096) / RATE - 0.01
     force = np.where((time > 0) & (time < duration), 200 * np.sin(np.pi * time / duration), 0.0)
     acceleration = np.where(time > 0, np.exp(-30 * time) * np.sin(2 * np.pi * 900 * time), 0.0)
-    plots = plots_of(Hit(force, acceleration, RATE), RunningMean())
+    plots = build_curves(Hit(force, acceleration, RATE), RunningMean())
     assert plots.force_spectrum is not None
     low = plots.frequency < 1.2 / duration
     turns = plots.frequency[low] * duration

@@ -12,13 +12,13 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import STANDARD_GRAVITY, HammeredStructure, Hammering, MeasuredRate, Structure
-from acquisition.emulation import Signal
-from acquisition.lines import LinesEmulator
+from acquisition.emulation import SignalFunction
+from acquisition.text_boards import TextBoardEmulator
 from lobewatch.cli import main
+from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import use_rate
-from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.tap.plug import open_source
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.device_connection import open_device
 
 RATE = 10_000.0
 FORCE, ACCELERATION = "sensitivity_mv_per_n = 2.25\nrange_v = 5", "sensitivity_mv_per_g = 10\nrange_v = 5"
@@ -55,11 +55,11 @@ def test_a_whole_tap_test(
     toml.write_text(text if force else text.replace("[tap]\n", '[tap]\nhammer = "none"\n'), "utf-8")
     folder = MachineFolder("trial")
     hammered = HammeredStructure(structure, RATE, np.random.default_rng(1), Hammering())
-    signal: Signal = hammered if force else lambda first, count: hammered(first, count)[1:]
+    signal: SignalFunction = hammered if force else lambda first, count: hammered(first, count)[1:]
     sensitivities = (PER_N, PER_ACCELERATION) if force else (PER_ACCELERATION,)
-    with LinesEmulator(signal, sensitivities, 5.0, RATE, realtime=False) as board:
-        with open_source(folder.machine.daq, board.port) as device:
-            use_rate(folder, device, MeasuredRate(RATE, 1.0, 50_000, 5.0))
+    with TextBoardEmulator(signal, sensitivities, 5.0, RATE, realtime=False) as board:
+        with open_device(folder.machine.daq, board.port) as device:
+            apply_measured_rate(folder, device, MeasuredRate(RATE, 1.0, 50_000, 5.0))
         monkeypatch.setattr(
             sys, "argv", ["lobewatch", "tap", "trial", "--direction", "x", "--port", board.port, "--json"]
         )
@@ -91,9 +91,9 @@ def test_a_digital_sensor_of_five_dollars(
         return np.asarray(np.round((hammered(first, count)[1:] + STANDARD_GRAVITY) / step) * step)
 
     folder = MachineFolder("trial")
-    with LinesEmulator(signal, (0.1 / STANDARD_GRAVITY,), 1.6, rate, realtime=False) as board:
-        with open_source(folder.machine.daq, board.port) as device:
-            use_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
+    with TextBoardEmulator(signal, (0.1 / STANDARD_GRAVITY,), 1.6, rate, realtime=False) as board:
+        with open_device(folder.machine.daq, board.port) as device:
+            apply_measured_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
         monkeypatch.setattr(sys, "argv", ["lobewatch", "tap", "trial", "--port", board.port, "--json"])
         with pytest.raises(SystemExit) as end:
             main()
@@ -129,9 +129,9 @@ def test_of_three_axes_that_of_the_direction_is_read(
         return np.stack([axis(first, count)[1] for axis in axes])
 
     folder = MachineFolder("trial")
-    with LinesEmulator(signal, (0.1 / STANDARD_GRAVITY,) * 3, 1.6, rate, realtime=False) as board:
-        with open_source(folder.machine.daq, board.port) as device:
-            use_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
+    with TextBoardEmulator(signal, (0.1 / STANDARD_GRAVITY,) * 3, 1.6, rate, realtime=False) as board:
+        with open_device(folder.machine.daq, board.port) as device:
+            apply_measured_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
         words = ["lobewatch", "tap", "trial", "--port", board.port, "--direction", direction, "--json"]
         monkeypatch.setattr(sys, "argv", words)
         with pytest.raises(SystemExit) as end:

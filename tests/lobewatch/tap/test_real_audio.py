@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 from acquisition import Device, DeviceIdentity, HammeredStructure, Hammering, MeasuredRate, Structure
+from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import use_rate
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
 
 RATE = 48000
 FULL_SCALE = 5.0
@@ -72,7 +72,9 @@ def test_a_whole_tap_test_through_a_sound_server(cable: dict[str, str], structur
     daq = f'[daq]\ndriver = "audio"\nport = "audio:wire"\n{force}{acceleration}\n'
     toml.write_text(toml.read_text("utf-8").replace("[daq]\n", daq, 1), "utf-8")
     known = SimpleNamespace(identity=DeviceIdentity("wire", "wire"), sample_rate=float(RATE), follows_clock=True)
-    use_rate(MachineFolder(toml.parent), cast("Device", known), MeasuredRate(float(RATE), 1.0, 5 * RATE, 5.0))
+    apply_measured_rate(
+        MachineFolder(toml.parent), cast("Device", known), MeasuredRate(float(RATE), 1.0, 5 * RATE, 5.0)
+    )
     lobewatch = [sys.executable, "-m", "lobewatch.cli"]
     listed = subprocess.run([*lobewatch, "ports", "--json"], env=cable, capture_output=True, text=True, check=True)
     assert "audio:wire" in [port["device"] for port in json.loads(listed.stdout)["ports"]]

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, Hit
-from lobewatch.tap.live_signal import resting_rms
-from lobewatch.tap.self_check import quiet_stretch, self_check
+from lobewatch.tap.device_connection import estimate_resting_rms
+from lobewatch.tap.self_check import find_quiet_part, run_self_check
 from lobewatch.tap.state import Check
 
 RATE = 25600.0
@@ -29,17 +29,17 @@ def record(channels: Pair, force: Signal = 0.0, response: Signal = 0.0, lost: in
 
 
 def failed(hit: Hit, level: float | None = 20.0, free: int = 10**10) -> dict[str, str]:
-    return {check.name: check.text for check in self_check(hit, level, free) if not check.passed}
+    return {check.name: check.text for check in run_self_check(hit, level, free) if not check.passed}
 
 
 def test_a_quiet_machine_passes(channels: Pair) -> None:
-    checks = self_check(record(channels), 20.0, 78 * 10**9)
+    checks = run_self_check(record(channels), 20.0, 78 * 10**9)
     assert all(check.passed for check in checks)
     texts = {check.name: check.text for check in checks}
     assert texts["force noise"] == "0.2 N rms, trigger at 20 N"
     assert texts["response noise"] == "2 m/s^2 rms"
     assert texts["disk"] == "78.0 GB free"
-    assert Check("force noise", True, "0.2 N rms") in self_check(record(channels), None, 10**10)
+    assert Check("force noise", True, "0.2 N rms") in run_self_check(record(channels), None, 10**10)
 
 
 @pytest.mark.parametrize(("mains", "harmonic"), [(50.0, 1), (60.0, 1), (50.0, 3)])
@@ -89,7 +89,7 @@ def test_the_longest_stretch_without_hits_is_looked_at(channels: Pair) -> None:
         force[start : start + 20] = 200.0
         ringing = np.arange(TIME.size - start) / RATE
         response[start:] += 500 * np.exp(-ringing / 0.02) * np.sin(2 * np.pi * 900 * ringing)
-    quiet = quiet_stretch(record(channels, force, response))
+    quiet = find_quiet_part(record(channels, force, response))
     assert 0.3 < quiet.force.size / RATE < 0.5
     assert np.max(quiet.force) < 2
     assert np.std(quiet.acceleration) == pytest.approx(2.0, rel=0.2)
@@ -97,10 +97,10 @@ def test_the_longest_stretch_without_hits_is_looked_at(channels: Pair) -> None:
 
 
 def test_the_resting_level_is_that_of_short_stretches(channels: Pair) -> None:
-    assert resting_rms(record(channels), 512) == pytest.approx(2.0, rel=0.03)
-    assert resting_rms(record(channels, response=100.0), 512) == pytest.approx(2.0, rel=0.03)
+    assert estimate_resting_rms(record(channels), 512) == pytest.approx(2.0, rel=0.03)
+    assert estimate_resting_rms(record(channels, response=100.0), 512) == pytest.approx(2.0, rel=0.03)
 
 
 def test_a_record_without_codes_is_refused() -> None:
     with pytest.raises(ValueError, match="needs a record with converter codes"):
-        self_check(Hit(np.zeros(100), np.zeros(100), 100.0), 1.0, 10**10)
+        run_self_check(Hit(np.zeros(100), np.zeros(100), 100.0), 1.0, 10**10)

@@ -19,7 +19,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
-from modal import Mode, synthesize
+from modal import Mode, synthesize_frf
 
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]
@@ -34,7 +34,7 @@ def test_the_words_of_a_test_and_its_result(
     states: list[TapState] = []
     session = session_of(folder, lambda: simulated(tapper(), channels), states.append)
     tap = session.run()
-    assert tap.known_frf.n_averages == 10
+    assert tap.required_frf.n_averages == 10
     words = [word for word, _ in groupby(state.word for state in states)]
     assert words[0] is TapStep.CHECKING
     assert words[-1] is TapStep.DONE
@@ -45,7 +45,7 @@ def test_the_words_of_a_test_and_its_result(
     assert (done.good, len(done.hits)) == (10, 10)
     assert [check.name for check in done.checks if not check.passed] == ["calibration"]
     assert done.outcome is not None
-    assert done.outcome.light == "warn"
+    assert done.outcome.status == "warn"
     assert done.outcome.next_step.startswith("Tap direction y")
     assert "tool reference, direction x" in done.title
     assert done.plots is not None
@@ -127,7 +127,7 @@ def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
             raise failure
         write_hit(*arguments)
 
-    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", failing)
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.write_hit", failing)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     with pytest.raises(told, match="the hits so far are kept: the same command goes on with them") as raised:
         session.run()
@@ -151,7 +151,7 @@ def test_a_full_disk_is_told_before_the_first_hit(
     class Usage:
         free = 1_000_000
 
-    monkeypatch.setattr("lobewatch.machine.reserve.shutil.disk_usage", lambda _: Usage)
+    monkeypatch.setattr("lobewatch.machine.folder_lock.shutil.disk_usage", lambda _: Usage)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     with pytest.raises(DataError, match="1 MB free on this disk; a tap test needs 50 MB: make room"):
         session.run()
@@ -175,7 +175,7 @@ def test_a_disk_that_fills_up_meanwhile_does_not_end_the_test(
             raise OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5")
         write_hit(*arguments)
 
-    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", filled_by_others)
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.write_hit", filled_by_others)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     assert len(session.run().hits) == 10
     assert held[0] >= 50_000_000
@@ -219,7 +219,7 @@ def test_a_clock_behind_the_newest_test_is_asked_about_and_accepted(
 ) -> None:
     about = Circumstances("m", datetime.now(UTC) + timedelta(hours=1), "reference")
     folder.commit(
-        TapTest(new_tap_id(about), about, synthesize([Mode(1713.0, 0.03, 3.5e7)], np.arange(4.0, 4000.0, 4.0)))
+        TapTest(new_tap_id(about), about, synthesize_frf([Mode(1713.0, 0.03, 3.5e7)], np.arange(4.0, 4000.0, 4.0)))
     )
     session = session_of(folder, lambda: simulated(tapper(), channels), accept=["clock-behind", "other-band"])
     tap = session.run()

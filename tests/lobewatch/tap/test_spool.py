@@ -18,15 +18,15 @@ from acquisition import (
     Hit,
     HitFlags,
     HitVerdict,
-    judge_hit,
+    evaluate_hit,
     read_tap,
     read_tap_hits,
 )
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.in_progress import TapInProgress, begin_tap
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
+from lobewatch.tap.tap_in_progress import TapInProgress, begin_tap
 
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]
@@ -137,7 +137,7 @@ def test_a_hit_taken_back_after_another_was_set_aside_is_that_hit(
     interrupted: Path, open_folder: MachineFolder
 ) -> None:
     damage(interrupted / "0000.h5")
-    begun_again(open_folder).take_out(1, HitFlags.UNDONE, "")
+    begun_again(open_folder).exclude(1, HitFlags.UNDONE, "")
     again = begun_again(open_folder)
     assert again.flags == [HitFlags.OK, HitFlags.UNDONE, HitFlags.OK]
     assert again.numbers == [1, 2, 3]
@@ -158,7 +158,7 @@ def test_a_disk_that_cannot_be_read_is_no_damaged_hit(
     def fail(path: Path, *_: object) -> bytes:
         raise OSError(5, "Input/output error", str(path))
 
-    monkeypatch.setattr("lobewatch.tap.spool.read_regular", fail)
+    monkeypatch.setattr("lobewatch.tap.spool.read_regular_file", fail)
     with pytest.raises(OSError, match="Input/output error"):
         begun_again(open_folder)
     assert (interrupted / "0000.h5").is_file()
@@ -172,11 +172,11 @@ def test_a_spooled_hit_on_which_the_judging_fails_counts_no_more_and_the_others_
     def once(hit: Hit) -> HitVerdict:
         for failure in failures:
             raise failure
-        return judge_hit(hit)
+        return evaluate_hit(hit)
 
-    monkeypatch.setattr("lobewatch.tap.in_progress.judge_hit", once)
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.evaluate_hit", once)
     tap = begun_again(open_folder)
-    assert tap.flags == [HitFlags.NOT_JUDGED, HitFlags.OK, HitFlags.OK, HitFlags.OK]
+    assert tap.flags == [HitFlags.NOT_EVALUATED, HitFlags.OK, HitFlags.OK, HitFlags.OK]
     assert tap.reasons[0].startswith("Judging it failed (ZeroDivisionError: no lines): hit again;")
 
 
@@ -213,10 +213,10 @@ def test_other_interrupted_tests_are_told_and_kept(
     for about in (Circumstances("m", later, "reference"), Circumstances("m", datetime.now(UTC), "reference", "y")):
         tap = begin_tap(open_folder, about)
         assert tap.hits == []
-        assert len(tap.left) == 1
-        assert f"is still in {interrupted}" in tap.left[0]
+        assert len(tap.not_resumed) == 1
+        assert f"is still in {interrupted}" in tap.not_resumed[0]
     anew = begin_tap(open_folder, Circumstances("m", datetime.now(UTC), "reference"), resume=False)
-    assert (anew.hits, len(anew.left)) == ([], 1)
+    assert (anew.hits, len(anew.not_resumed)) == ([], 1)
     assert len(list(interrupted.glob("*.h5"))) == 4
 
 

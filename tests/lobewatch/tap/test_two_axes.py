@@ -22,7 +22,7 @@ from acquisition import (
     TapsSource,
     TapTest,
 )
-from acquisition.emulation import Signal
+from acquisition.emulation import SignalFunction
 from lobewatch.logbook import Logbook
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
@@ -45,12 +45,16 @@ def shown(hit: int, seen: int) -> Structure:
     return Structure(FREQUENCY, DAMPING, STIFFNESS / (AXES[:, hit] * AXES[:, seen]))
 
 
-def felt(hit: int, seed: int = 1, hammering: Hammering = CAREFUL) -> Signal:
+def felt(hit: int, seed: int = 1, hammering: Hammering = CAREFUL) -> SignalFunction:
     """Force and what each of SENSORS feels of hits along an axis."""
-    return HammeredStructure(shown(hit, Y), RATE, np.random.default_rng(seed), hammering, beside=(shown(hit, X),))
+    return HammeredStructure(
+        shown(hit, Y), RATE, np.random.default_rng(seed), hammering, cross_structures=(shown(hit, X),)
+    )
 
 
-def changed(signal: Signal, row: int, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Signal:
+def changed(
+    signal: SignalFunction, row: int, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> SignalFunction:
     def other(first: int, count: int) -> NDArray[np.float64]:
         signals = signal(first, count)
         signals[row] = change(signals[row])
@@ -70,7 +74,7 @@ def short(shop: Shop) -> Shop:
 class Bench(SimulatedSource):
     """The sensors on a device without a cable."""
 
-    def __init__(self, signal: Signal, sensors: tuple[Channel, ...] = SENSORS) -> None:
+    def __init__(self, signal: SignalFunction, sensors: tuple[Channel, ...] = SENSORS) -> None:
         super().__init__(signal, sensors, RATE, round(60 * RATE))
 
     fault = ""
@@ -111,14 +115,14 @@ def test_after_x_and_y_it_is_known_to_which_side_modes_lie_as_if_tapped_across_b
     tap(short, lambda: Bench(felt(X)))
     assert tap(short, lambda: Bench(felt(Y, seed=2)), "y").across is None
     tool = short.logbook.assembly("reference")
-    (vectors,) = tool.axes.patterns
+    (vectors,) = tool.principal_directions.sign_patterns
     assert vectors is not None
     first = int(np.argmin([mode.frequency for mode in tool.x or ()]))
     assert vectors[first] == pytest.approx(AXES[0], abs=0.02)
     by_hand = tap(short, lambda: Bench(felt(X)), "xy")
     assert by_hand.across is None
     ours, theirs = (short.folder.read(entry) for entry in short.logbook.series("reference", "xy"))
-    np.testing.assert_allclose(ours.known_frf.receptance, theirs.known_frf.receptance, rtol=1e-9)
+    np.testing.assert_allclose(ours.required_frf.receptance, theirs.required_frf.receptance, rtol=1e-9)
 
 
 def still(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,9 +15,9 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap import session
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.session import TapSession, outcome_of
+from lobewatch.tap.session import TapSession, build_outcome
 from lobewatch.tap.state import Outcome, TapState, TapStep
-from lobewatch.tap.visit import TapVisit, first_direction
+from lobewatch.tap.visit import TapVisit, choose_first_direction
 
 
 class Visit:
@@ -113,7 +113,7 @@ def test_a_sensor_that_feels_both_axes_is_not_moved(
     sensors = [channels[0], *(replace(channels[1], direction=direction) for direction in "xy")]
 
     def felt() -> HammeredStructure:
-        return replace(tapper(), beside=[tapper().structure])
+        return replace(tapper(), cross_structures=[tapper().structure])
 
     person = Visit(MachineFolder(folder.path), simulated, felt, tuple(sensors))
     moved = person.wait(lambda state: state.choices)
@@ -136,9 +136,9 @@ def test_a_tap_across_is_offered_where_it_would_settle_something(
     visit: Callable[..., Visit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def asks(*about: Any) -> Outcome:
-        return replace(outcome_of(*about), asks_across=True)
+        return replace(build_outcome(*about), needs_cross_tap=True)
 
-    monkeypatch.setattr(session, "outcome_of", asks)
+    monkeypatch.setattr(session, "build_outcome", asks)
     person = visit()
     person.wait(lambda state: state.choices)
     person.visit.choose("y")
@@ -177,12 +177,12 @@ def test_stop_ends_a_visit_between_two_tests_and_a_test_that_runs(visit: Callabl
 
 
 def test_a_visit_that_was_broken_off_in_y_begins_in_y(visit: Callable[..., Visit], folder: MachineFolder) -> None:
-    assert first_direction(folder, "reference") == "x"
+    assert choose_first_direction(folder, "reference") == "x"
     person = visit()
     person.wait(lambda state: state.choices)
     person.visit.choose("y")
     person.wait(lambda state: state.word is not TapStep.MOVE and 0 < state.good < 3)
     person.visit.stop()
     person.end()
-    assert first_direction(folder, "reference") == "y"
-    assert first_direction(folder, "drill 8") == "x"
+    assert choose_first_direction(folder, "reference") == "y"
+    assert choose_first_direction(folder, "drill 8") == "x"

@@ -13,10 +13,16 @@ from typer.testing import CliRunner
 
 from acquisition import Channel, DataError, HammeredStructure, Hammering, SensorInput
 from lobewatch.cli import app
-from lobewatch.history.history import Row
+from lobewatch.history.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, device_in_step, emulated_structure, felt_by
+from lobewatch.tap.emulated_spindle import (
+    EMULATED_CHANNELS,
+    EMULATED_SAMPLE_RATE,
+    build_structure,
+    map_signal_to_inputs,
+    open_synchronized_device,
+)
 from lobewatch.tap.session import TapSession, plan_session
 from lobewatch.tap.state import TapState
 
@@ -28,8 +34,8 @@ Simulate = Callable[..., Any]
 def truth(folder: MachineFolder) -> HammeredStructure:
     spindle = folder.machine.spindle
     assert spindle is not None
-    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
-    return HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(1), Hammering())
+    structure = build_structure(spindle.build(), spindle.damping_ratio)
+    return HammeredStructure(structure, EMULATED_SAMPLE_RATE, np.random.default_rng(1), Hammering())
 
 
 @pytest.fixture
@@ -42,7 +48,7 @@ def without_force(folder: MachineFolder) -> MachineFolder:
 @pytest.fixture
 def tapped(without_force: MachineFolder, simulated: Simulate, session_of: OpenSession) -> TapSession:
     """A finished test of an accelerometer that feels gravity, its hits at times too hard or double."""
-    spindle, channel = truth(without_force), CHANNELS[1]
+    spindle, channel = truth(without_force), EMULATED_CHANNELS[1]
     states: list[TapState] = []
     session = session_of(
         without_force,
@@ -53,7 +59,7 @@ def tapped(without_force: MachineFolder, simulated: Simulate, session_of: OpenSe
     return session
 
 
-def last_row(folder: MachineFolder) -> Row:
+def last_row(folder: MachineFolder) -> HistoryRow:
     return Logbook.open(folder.path).history.rows[-1]
 
 
@@ -89,7 +95,7 @@ def test_what_a_test_without_force_stores_holds_no_stiffness(tapped: TapSession,
     assert tap.frf is None
     assert all(hit.codes is not None and hit.codes.shape[0] == 1 and not hit.force.size for hit in tap.hits)
     with pytest.raises(DataError, match="no force was measured"):
-        _ = tap.known_frf
+        _ = tap.required_frf
     run = CliRunner().invoke(app, ["history", str(without_force.path), "--json"])
     assert json.loads(run.stdout)["taps"][0]["stiffness_n_per_m"] is None
 
@@ -121,12 +127,12 @@ def test_a_cross_tap_without_force_is_refused(without_force: MachineFolder) -> N
 
 def test_a_series_goes_on_from_a_hammer_to_none(folder: MachineFolder, session_of: OpenSession) -> None:
     structure = truth(folder).structure
-    with device_in_step(structure, np.random.default_rng(2)) as open_device:
+    with open_synchronized_device(structure, np.random.default_rng(2)) as open_device:
         session_of(folder, open_device, guided=False).run()
     text = re.sub(r"^trigger_n .*\n", "", folder.toml.read_text("utf-8"), flags=re.MULTILINE)
     folder.toml.write_text(text.replace("[tap]\n", '[tap]\nhammer = "none"\n'), "utf-8")
     folder = MachineFolder(folder.path)
-    with device_in_step(structure, np.random.default_rng(3)) as open_device:
+    with open_synchronized_device(structure, np.random.default_rng(3)) as open_device:
         session_of(folder, open_device, guided=False).run()
     before, after = Logbook.open(folder.path).history.rows
     assert after.series == before.series
@@ -137,5 +143,5 @@ def test_a_series_goes_on_from_a_hammer_to_none(folder: MachineFolder, session_o
 
 def test_one_channel_is_felt_alone() -> None:
     channel = Channel("acceleration", 1.0, 5.0)
-    signal = felt_by([SensorInput(0, channel)], lambda _, n: np.array([[1.0] * n, [2.0] * n]))
+    signal = map_signal_to_inputs([SensorInput(0, channel)], lambda _, n: np.array([[1.0] * n, [2.0] * n]))
     assert signal(0, 3).tolist() == [[2.0, 2.0, 2.0]]

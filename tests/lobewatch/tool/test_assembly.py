@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from acquisition import Remark
-from lobewatch.measuring.measurement import Measurement
+from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool.assembly import Assembly, assemble
 from modal import Mode
 
@@ -39,11 +39,11 @@ def with_x(x: Measurement | None = None) -> Assembly:
 def test_a_direction_that_was_tapped_in_vain_is_not_said_to_be_untapped(code: str, gap: tuple[str, str]) -> None:
     tool = with_x(measurement("x", code=code))
     assert tool.directions == ("y",)
-    assert tool.gap == gap
+    assert tool.missing_direction == gap
     (remark,) = [remark for remark in tool.remarks if remark.code == "one-direction"]
     assert remark.text == f"modes in the y direction alone, x taken like y; {gap[0].removeprefix('direction ')}"
     assert remark.cure == gap[1]
 
 
 def test_a_direction_that_was_not_tapped_is_said_to_be_so() -> None:
-    assert with_x().gap == ("direction x was not tapped", "tap direction x of tool 'T' too")
+    assert with_x().missing_direction == ("direction x was not tapped", "tap direction x of tool 'T' too")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobes import shown_modes
-from lobewatch.tool.axes import HIDDEN, mode_axes
+from lobes import project_modes
+from lobewatch.tool.principal_directions import HIDDEN_PEAK_RATIO, find_principal_directions
 from modal import Mode
 
 PAIR = [Mode(1500.0, 0.03, 20e6), Mode(1575.0, 0.028, 22e6)]
@@ -27,12 +27,12 @@ def residues(vectors: NDArray[np.float64], modes: list[Mode], near: float) -> ND
 @pytest.mark.parametrize("angle", [10.0, 45.0, -70.0])
 def test_two_peaks_in_both_are_two_modes_askew_and_one_sign_is_open(angle: float) -> None:
     vectors = turned_by(angle)
-    shown = shown_modes(PAIR, vectors)
-    axes = mode_axes(shown.x, shown.y)
-    assert (len(axes.pairs), axes.signs, axes.are_open) == (2, 1, True)
+    shown = project_modes(PAIR, vectors)
+    axes = find_principal_directions(shown.x, shown.y)
+    assert (len(axes.pairs), axes.sign_count, axes.are_uncertain) == (2, 1, True)
     modes = [*shown.x, *shown.y]
     errors = []
-    for pattern in axes.patterns:
+    for pattern in axes.sign_patterns:
         assert pattern is not None
         at = [residues(pattern, modes, mode.frequency) for mode in PAIR]
         true = [np.outer(u, u) / mode.stiffness for u, mode in zip(vectors, PAIR, strict=True)]
@@ -44,10 +44,10 @@ def test_two_peaks_in_both_are_two_modes_askew_and_one_sign_is_open(angle: float
 
 @pytest.mark.parametrize("angle", [10.0, 45.0, -70.0])
 def test_a_cross_tap_says_to_which_side(angle: float) -> None:
-    shown = shown_modes(PAIR, turned_by(angle))
-    axes = mode_axes(shown.x, shown.y, shown.cross)
-    assert not axes.are_open
-    (pattern,) = axes.patterns
+    shown = project_modes(PAIR, turned_by(angle))
+    axes = find_principal_directions(shown.x, shown.y, shown.cross)
+    assert not axes.are_uncertain
+    (pattern,) = axes.sign_patterns
     assert pattern is not None
     for u, mode in zip(turned_by(angle), PAIR, strict=True):
         wanted = np.outer(u, u) / mode.stiffness
@@ -56,15 +56,15 @@ def test_a_cross_tap_says_to_which_side(angle: float) -> None:
 
 
 def test_a_cross_tap_that_shows_nothing_leaves_modes_along_x_and_y() -> None:
-    shown = shown_modes(PAIR, turned_by(45))
-    assert mode_axes(shown.x, shown.y, []).patterns == [None]
+    shown = project_modes(PAIR, turned_by(45))
+    assert find_principal_directions(shown.x, shown.y, []).sign_patterns == [None]
 
 
 def test_one_peak_in_each_at_one_frequency_is_a_round_spindle_turned_by_any_angle() -> None:
-    axes = mode_axes([PAIR[0]], [PAIR[0].scaled(1.001, 1.1, "")])
-    assert axes.patterns == [None]
-    assert axes.pairs[0].turn == pytest.approx(np.pi / 2)
-    vectors = axes.draw(500, 3)
+    axes = find_principal_directions([PAIR[0]], [PAIR[0].scaled(1.001, 1.1, "")])
+    assert axes.sign_patterns == [None]
+    assert axes.pairs[0].max_rotation == pytest.approx(np.pi / 2)
+    vectors = axes.sample(500, 3)
     stiffness = np.array([20e6, 22e6])
     shown = np.einsum("cna,cnb,n->cab", vectors, vectors, 1 / stiffness)
     assert shown == pytest.approx(np.broadcast_to(np.diag(1 / stiffness), shown.shape), abs=1e-16)
@@ -72,32 +72,32 @@ def test_one_peak_in_each_at_one_frequency_is_a_round_spindle_turned_by_any_angl
 
 
 def test_peaks_apart_are_turned_as_far_as_the_other_tap_would_not_have_shown() -> None:
-    axes = mode_axes(PAIR[:1], PAIR[1:])
-    share = axes.draw(2000, 1)[:, 0, 1] ** 2 / PAIR[0].stiffness * PAIR[1].stiffness
-    assert np.max(share) == pytest.approx(HIDDEN, rel=0.05)
+    axes = find_principal_directions(PAIR[:1], PAIR[1:])
+    share = axes.sample(2000, 1)[:, 0, 1] ** 2 / PAIR[0].stiffness * PAIR[1].stiffness
+    assert np.max(share) == pytest.approx(HIDDEN_PEAK_RATIO, rel=0.05)
 
 
 def test_a_mode_of_one_direction_alone_leans_by_what_is_hidden() -> None:
-    axes = mode_axes([PAIR[0], Mode(3000.0, 0.02, 60e6)], [PAIR[0].scaled(1.001, 1.0, "")])
-    assert axes.lean == pytest.approx([0, np.sqrt(3 * HIDDEN), 0])
-    assert np.all(np.abs(axes.draw(100, 0)[:, 1, 1]) <= np.sqrt(3 * HIDDEN))
+    axes = find_principal_directions([PAIR[0], Mode(3000.0, 0.02, 60e6)], [PAIR[0].scaled(1.001, 1.0, "")])
+    assert axes.max_cross_share == pytest.approx([0, np.sqrt(3 * HIDDEN_PEAK_RATIO), 0])
+    assert np.all(np.abs(axes.sample(100, 0)[:, 1, 1]) <= np.sqrt(3 * HIDDEN_PEAK_RATIO))
 
 
 def test_two_families_of_modes_far_apart_are_two_round_pairs() -> None:
     x = [PAIR[0], Mode(2400.0, 0.02, 25e6)]
-    axes = mode_axes(x, [mode.scaled(1.002, 1.05, "") for mode in x])
-    assert axes.signs == 0
-    assert axes.patterns == [None]
+    axes = find_principal_directions(x, [mode.scaled(1.002, 1.05, "") for mode in x])
+    assert axes.sign_count == 0
+    assert axes.sign_patterns == [None]
 
 
 def test_a_small_mode_beside_a_large_one_makes_no_pair_askew() -> None:
     x = [PAIR[0], Mode(1650.0, 0.02, 250e6)]
-    assert mode_axes(x, [mode.scaled(1.002, 1.05, "") for mode in x]).signs == 0
+    assert find_principal_directions(x, [mode.scaled(1.002, 1.05, "") for mode in x]).sign_count == 0
 
 
 def test_x_and_y_of_one_mode_3_percent_apart_still_belong_together() -> None:
-    shown = shown_modes(PAIR, turned_by(30))
+    shown = project_modes(PAIR, turned_by(30))
     moved = [mode.scaled(1.03, 1.0, "") for mode in shown.y]
-    axes = mode_axes(shown.x, moved)
+    axes = find_principal_directions(shown.x, moved)
     assert [(pair.x, pair.y) for pair in axes.pairs] == [(0, 2), (1, 3)]
-    assert axes.signs == 1
+    assert axes.sign_count == 1

@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 
 from acquisition import Conditions, DataError, read_tap
 from lobewatch.cli import app
-from lobewatch.history import Row
+from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 
 Shop = Any
@@ -34,21 +34,21 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
 
 
-def rows_of(shop: Shop, *conditions: Conditions) -> tuple[Row, ...]:
+def rows_of(shop: Shop, *conditions: Conditions) -> tuple[HistoryRow, ...]:
     """The history of a spindle whose frequency is another one at each test, 12 % lower each."""
     for number, stated in enumerate(conditions):
         shop.tap(30 * number, 2100.0 * 0.88**number, conditions=stated)
-    rows: tuple[Row, ...] = shop.logbook.history.rows
+    rows: tuple[HistoryRow, ...] = shop.logbook.history.rows
     return rows
 
 
-def series_of(rows: tuple[Row, ...]) -> list[int]:
+def series_of(rows: tuple[HistoryRow, ...]) -> list[int]:
     """Number of the first test of the series of each."""
     ids = [row.tap_id for row in rows]
     return [ids.index(row.series) for row in rows]
 
 
-def codes(row: Row) -> set[str]:
+def codes(row: HistoryRow) -> set[str]:
     return {remark.code for remark in row.remarks} & {"new-series", "earlier-series", "drawbar-changed"}
 
 
@@ -126,14 +126,14 @@ def test_conditions_of_command_and_machine_file_reach_file_journal_and_history(s
     options = ("--temperature", "24.5", "--note", "after a crash", "--reclamped")
     result = run("replay", shop.path, beam, *options, "--json")
     wanted = Conditions(24.5, 80.0, 18.0, "warm", True, "after a crash")
-    assert json.loads(result.stdout)["measurements"][0]["conditions"] == wanted.known
+    assert json.loads(result.stdout)["measurements"][0]["conditions"] == wanted.specified
     (entry,) = shop.folder.taps()
     assert shop.folder.read(entry).circumstances.conditions == entry.conditions == wanted
     for _ in range(2):
         (row,) = Logbook.open(shop.path).history.rows
         assert row.conditions == wanted
     (row,) = json.loads(run("history", shop.path, "--json").stdout)["taps"]
-    assert (row["conditions"], row["series"]) == (wanted.known, entry.id)
+    assert (row["conditions"], row["series"]) == (wanted.specified, entry.id)
     (line,) = csv.DictReader(io.StringIO(run("history", shop.path, "--csv").stdout))
     assert (line["temperature_c"], line["state"], line["note"]) == ("24.5", "warm", "after a crash")
     text = run("history", shop.path).stdout
@@ -159,7 +159,7 @@ def test_the_stick_out_is_that_of_one_tool_and_a_tap_file_says_its_own(shop: Sho
 
 def test_of_a_file_of_version_1_nothing_is_known() -> None:
     for file in (Path(__file__).parents[2] / "data" / "version_1" / "machine" / "taps").iterdir():
-        assert read_tap(file).circumstances.conditions.known == {}
+        assert read_tap(file).circumstances.conditions.specified == {}
 
 
 @pytest.mark.parametrize(

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from lobes import Cut, MillingRows, Program
-from lobewatch.verdicts.doubt import CUTS, LearntDraws, doubt_of
-from lobewatch.verdicts.draws import middle_row
+from lobewatch.verdicts.program_samples import build_median_row
+from lobewatch.verdicts.uncertainty import TEST_CUT_CAUSE, LearnedSamples, uncertainty_of
 from modal import Mode
 from tests.lobewatch.conftest import Shop
 
-DRAWS = LearntDraws(
+DRAWS = LearnedSamples(
     frequency=np.array([[0.9, 0.8], [1.1, 1.2]]),
     damping_ratio=np.array([[0.7, 0.6], [1.3, 1.4]]),
     stiffness=np.array([[0.5, 0.4], [1.5, 1.6]]),
-    turned=np.array([[0.1, -0.2], [-0.1, 0.2]]),
-    force=np.array([0.8, 1.2]),
-    direction=np.array([0.9, 1.1]),
+    phase_change=np.array([[0.1, -0.2], [-0.1, 0.2]]),
+    tangential=np.array([0.8, 1.2]),
+    ratio=np.array([0.9, 1.1]),
 )
 
 
@@ -28,25 +28,28 @@ def middle(shop: Shop) -> MillingRows:
     """One mode in x and one in y, a slot."""
     shop.tap_both()
     assembly = replace(shop.logbook.assembly(), x=[Mode(1700.0, 0.03, 3e7)], y=[Mode(1500.0, 0.02, 2e7)])
-    return middle_row(Program(Cut(4, 1.0, "down", 1400e6, 500e6), 12000.0, 1e-3), assembly)
+    return build_median_row(Program(Cut(4, 1.0, "down", 1400e6, 500e6), 12000.0, 1e-3), assembly)
 
 
 def test_each_draw_is_the_middle_times_its_own_factors(middle: MillingRows) -> None:
-    rows = DRAWS.rows(middle, 3, "")
+    rows = DRAWS.build_rows(middle, 3, "")
     of_draw = [0, 1, 0]
     assert rows.frequency == pytest.approx(middle.frequency * DRAWS.frequency[of_draw])
     assert rows.damping_ratio == pytest.approx(middle.damping_ratio * DRAWS.damping_ratio[of_draw])
     assert rows.stiffness == pytest.approx(middle.stiffness * DRAWS.stiffness[of_draw])
-    assert rows.phase == pytest.approx(middle.phase + DRAWS.turned[of_draw])
-    assert rows.tangential == pytest.approx(1400e6 * DRAWS.force[of_draw])
-    assert rows.radial == pytest.approx(500e6 * (DRAWS.force * DRAWS.direction)[of_draw])
+    assert rows.phase == pytest.approx(middle.phase + DRAWS.phase_change[of_draw])
+    assert rows.tangential == pytest.approx(1400e6 * DRAWS.tangential[of_draw])
+    assert rows.radial == pytest.approx(500e6 * (DRAWS.tangential * DRAWS.ratio)[of_draw])
 
 
 def test_what_is_taken_as_known_stays_in_the_middle(middle: MillingRows) -> None:
-    without_cuts, without_coefficients = DRAWS.rows(middle, 2, CUTS), DRAWS.rows(middle, 2, "coefficients")
+    without_cuts, without_coefficients = (
+        DRAWS.build_rows(middle, 2, TEST_CUT_CAUSE),
+        DRAWS.build_rows(middle, 2, "coefficients"),
+    )
     assert without_cuts.frequency == pytest.approx(np.tile(middle.frequency, (2, 1)))
     assert without_cuts.phase == pytest.approx(np.tile(middle.phase, (2, 1)))
-    assert without_cuts.tangential == pytest.approx(1400e6 * DRAWS.force)
+    assert without_cuts.tangential == pytest.approx(1400e6 * DRAWS.tangential)
     assert without_coefficients.stiffness == pytest.approx(middle.stiffness * DRAWS.stiffness)
     assert without_coefficients.tangential == pytest.approx([1400e6, 1400e6])
     assert without_coefficients.radial == pytest.approx([500e6, 500e6])
@@ -58,7 +61,7 @@ def test_a_prediction_is_doubted_as_machine_toml_says(shop: Shop) -> None:
     predicted = replace(
         tapped, x=[Mode(1700.0, 0.03, 3e7, phase_deg=10.0)], y=[Mode(1500.0, 0.02, 2e7)], predicted=True
     )
-    widths = doubt_of(predicted, machine.program[0], machine).modes["prediction"]
+    widths = uncertainty_of(predicted, machine.program[0], machine).modes["prediction"]
     given = machine.doubt
     percents = [given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent]
     assert widths[:, :3] == pytest.approx(np.tile(np.array(percents) / 100, (2, 1)))

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 import numpy as np
 
 from lobewatch.machine import ProgramTable
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.judgement import weigh
-from lobewatch.verdicts.spindle_at_speed import AT_REST
+from lobewatch.verdicts.monte_carlo import run_monte_carlo
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from modal import Mode
 
 DEPTH = 3.6
@@ -24,7 +24,7 @@ def mode(frequency: float, stiffness: float, error: float) -> Mode:
 
 
 def test_draws_that_chatter_in_a_direction_of_much_to_spare_alone_are_seen() -> None:
-    machine, tapped = parse_machine('[machine]\nname = "m"\n'), datetime(2026, 1, 1, tzinfo=UTC)
+    machine, tapped = parse_machine_file('[machine]\nname = "m"\n'), datetime(2026, 1, 1, tzinfo=UTC)
     x, y = [mode(800, 3e7, 0.001)], [mode(990, 5e7, 0.3)]
     tool = Assembly("reference", tapped, "t", x, y, ("x", "y"), None, {}, False, ())
     program = ProgramTable(
@@ -39,11 +39,11 @@ def test_draws_that_chatter_in_a_direction_of_much_to_spare_alone_are_seen() -> 
         speed_rpm=5720,
         depth_mm=DEPTH,
     )
-    judgement = weigh(program, tool, machine, AT_REST)
-    draws, depth = judgement.draws, DEPTH / 1e3
-    assert judgement.middle.stable
+    judgement = run_monte_carlo(program, tool, machine, NO_TEST_CUTS)
+    draws, depth = judgement.samples, DEPTH / 1e3
+    assert judgement.median.stable
     assert judgement.low > 1.05 * depth
-    assert not np.any(draws.fed(0.0).growth(depth) >= 0)
+    assert not np.any(draws.with_lowest_cuts(0.0).growth(depth) >= 0)
     expected = draws.growth(depth)[1:, 0] >= 0
     assert 3 <= np.sum(expected) <= 30
     assert judgement.chatters.tolist() == expected.tolist()

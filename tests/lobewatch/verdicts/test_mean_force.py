@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobes import Cut, milling_system, rows_of, shown_modes, zero_order
-from lobes.floquet import largest_multipliers, piece_numbers
-from lobewatch.cuts.listening.fold_frequency import fold_frequency
-from lobewatch.verdicts.mean_force import MeanForce, is_constant
+from lobes import Cut, build_milling_system, project_modes, rows_at_speeds, zero_order_lobes
+from lobes.floquet import count_pieces, largest_multipliers
+from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 from modal import Mode
 
 X = [Mode(1713.0, 0.029, 3.5e7), Mode(2400.0, 0.02, 9e7, phase_deg=20.0)]
@@ -29,11 +29,11 @@ SPEEDS = np.geomspace(4000, 24000, 60)
 )
 def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
     cut = replace(cut, feed_angle=angle)
-    rows = rows_of(milling_system(X, Y), cut, np.ones(2))
+    rows = rows_at_speeds(build_milling_system(X, Y), cut, np.ones(2))
     rows.tangential[1] *= 2
     rows.radial[1] *= 2
-    depth, chatter = MeanForce.of(rows).limits(SPEEDS)
-    wanted = zero_order(X, Y, cut, SPEEDS)
+    depth, chatter = ZeroOrderBatch.of(rows).limits(SPEEDS)
+    wanted = zero_order_lobes(X, Y, cut, SPEEDS)
     assert depth[0] == pytest.approx(wanted.depth, rel=0.02)
     assert chatter[0] == pytest.approx(wanted.chatter_frequency, rel=2e-3)
     assert depth[1] == pytest.approx(depth[0] / 2)
@@ -42,10 +42,10 @@ def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_limits_of_askew_modes_are_those_of_zero_order(angle: float) -> None:
     cut, vectors = Cut(3, 0.5, "up", 7e8, 1e8, feed_angle=angle), [[0.8, 0.6], [0.3, 0.95], [-0.6, 0.8]]
-    rows = rows_of(milling_system(X, Y, vectors), cut, np.ones(1))
-    shown = shown_modes([*X, *Y], vectors)
-    wanted = zero_order(shown.x, shown.y, cut, SPEEDS, shown.cross)
-    depth, chatter = MeanForce.of(rows).limits(SPEEDS)
+    rows = rows_at_speeds(build_milling_system(X, Y, vectors), cut, np.ones(1))
+    shown = project_modes([*X, *Y], vectors)
+    wanted = zero_order_lobes(shown.x, shown.y, cut, SPEEDS, shown.cross)
+    depth, chatter = ZeroOrderBatch.of(rows).limits(SPEEDS)
     assert depth[0] == pytest.approx(wanted.depth, rel=0.02)
     assert chatter[0] == pytest.approx(wanted.chatter_frequency, rel=2e-3)
 
@@ -55,10 +55,10 @@ def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation(
     vectors: list[list[float]] | None,
 ) -> None:
     cut = Cut(4, 1.0, "down", 1.4e9, 5e8)
-    rows = rows_of(milling_system(X, Y, vectors), cut, SPEEDS)
+    rows = rows_at_speeds(build_milling_system(X, Y, vectors), cut, SPEEDS)
     depth = 3e-3
-    multiplier = largest_multipliers(rows, np.full((60, 1), depth), piece_numbers(rows, depth))[:, 0]
-    grown, frequency = MeanForce.of(rows).loudest(SPEEDS, depth)
+    multiplier = largest_multipliers(rows, np.full((60, 1), depth), count_pieces(rows, depth))[:, 0]
+    grown, frequency = ZeroOrderBatch.of(rows).fastest_growth(SPEEDS, depth)
     teeth = 1 / rows.tooth_period
     far = np.abs(multiplier) > 1.02
     assert np.sum(far) > 40
@@ -69,4 +69,9 @@ def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation(
 
 def test_the_force_of_a_slot_with_four_teeth_is_constant_and_that_of_three_or_of_half_a_slot_is_not() -> None:
     kinds = ((4, 1.0), (6, 1.0), (3, 1.0), (4, 0.5))
-    assert [is_constant(Cut(teeth, share, "up", 7e8, 2e8)) for teeth, share in kinds] == [True, True, False, False]
+    assert [is_force_constant(Cut(teeth, share, "up", 7e8, 2e8)) for teeth, share in kinds] == [
+        True,
+        True,
+        False,
+        False,
+    ]

@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.draws import as_program
-from lobewatch.verdicts.hard_draws import hard_draws
-from lobewatch.verdicts.judgement import weigh
-from lobewatch.verdicts.room import all_around
-from lobewatch.verdicts.setting import Setting
-from lobewatch.verdicts.setting_search import SPARE, SettingSearch
-from lobewatch.verdicts.spindle_at_speed import AT_REST
+from lobewatch.verdicts.monte_carlo import run_monte_carlo
+from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.safe_depth_estimates import select_critical_samples
+from lobewatch.verdicts.setting_robustness import Setting, sweep_neighborhood
+from lobewatch.verdicts.setting_search import MIN_DEPTH_MARGIN, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from modal import Mode
 
-MACHINE: Machine = parse_machine('[machine]\nname = "m"\n[speed]\nlow_rpm = 5000\nhigh_rpm = 15000\n')
+MACHINE: Machine = parse_machine_file('[machine]\nname = "m"\n[speed]\nlow_rpm = 5000\nhigh_rpm = 15000\n')
 
 
 def tool(apart: float = 1.06) -> Assembly:
@@ -45,9 +44,9 @@ def cut(immersion: float = 1.0, depth: float = 1.0, speed: float = 9000.0) -> Pr
 
 @pytest.mark.parametrize(("immersion", "depth"), [(1.0, 0.9), (0.2, 4.5)])
 def test_draws_that_are_passed_over_in_other_cuts_are_stable_there(immersion: float, depth: float) -> None:
-    judgement = weigh(cut(immersion, depth), tool(1.3), MACHINE, AT_REST)
-    draws = all_around(judgement.draws, 0.02, lambda fall: 1 - fall)
-    every, counted = draws.growth(depth / 1e3)[:, 0], draws.growth_that_counts(depth / 1e3)
+    judgement = run_monte_carlo(cut(immersion, depth), tool(1.3), MACHINE, NO_TEST_CUTS)
+    draws = sweep_neighborhood(judgement.samples, 0.02, lambda fall: 1 - fall)
+    every, counted = draws.growth(depth / 1e3)[:, 0], draws.critical_growth(depth / 1e3)
     assert np.array_equal(counted >= 0, every >= 0)
     assert np.all(counted <= every + 1e-6)
     assert counted[np.argmax(every)] == pytest.approx(np.max(every), abs=1e-4)
@@ -57,19 +56,21 @@ def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
     search = SettingSearch(cut(), tool(), MACHINE)
     best = search.best
     assert best is not None
-    top, likely = search.likely.tops(1)[0]
-    beside = search.verified(round(top, -1), round(0.97 * likely * 20) / 20)
+    top, likely = search.likely_depths.removal_peaks(1)[0]
+    beside = search.verify(round(top, -1), round(0.97 * likely * 20) / 20)
     chips = beside.speed_rpm * beside.depth_mm if isinstance(beside, Setting) else 0.0
     assert best.speed_rpm > 1.005 * top
     assert best.speed_rpm * best.depth_mm > 1.05 * chips > 0
-    again = SettingSearch(cut(), tool(), MACHINE).verified(best.speed_rpm, best.depth_mm)
+    again = SettingSearch(cut(), tool(), MACHINE).verify(best.speed_rpm, best.depth_mm)
     assert again == best
 
 
 def test_few_draws_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
     search = SettingSearch(cut(), tool(), MACHINE)
-    judgement = weigh(cut(depth=0.5), tool(), MACHINE, AT_REST)
-    program = as_program(cut(depth=0.5), MACHINE)
-    few = hard_draws(program, search.cuts, search.spindle, search.doubt, 0.02, search.stiffness_at, SPARE)
-    assert 0 < few.deepest(20e-3) <= 1.01 * judgement.middle.limit / (1 + SPARE)
-    assert few.deepest(1e-4) == pytest.approx(1e-4)
+    judgement = run_monte_carlo(cut(depth=0.5), tool(), MACHINE, NO_TEST_CUTS)
+    program = build_program(cut(depth=0.5), MACHINE)
+    few = select_critical_samples(
+        program, search.cuts, search.spindle, search.uncertainty, 0.02, search.stiffness_at, MIN_DEPTH_MARGIN
+    )
+    assert 0 < few.deepest_stable(20e-3) <= 1.01 * judgement.median.limit / (1 + MIN_DEPTH_MARGIN)
+    assert few.deepest_stable(1e-4) == pytest.approx(1e-4)

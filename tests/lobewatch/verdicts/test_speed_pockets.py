@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from acquisition import Circumstances, Hit, HitFlags, TapDirection, TapTest, estimate_frf, new_tap_id
-from lobes import best_pockets, pockets
+from lobes import find_pockets, rank_pockets
 from lobewatch.cli import app
 from lobewatch.machine import ProgramTable
-from lobewatch.tool import lobes_of
+from lobewatch.tool import compute_lobes
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.speed_pockets import speed_pockets
+from lobewatch.verdicts.speed_pockets import find_speed_pockets
 from tests.lobewatch.commands.test_listen import recording
 from tests.lobewatch.conftest import Shop
 from tests.modal.test_uncertainty import tap
@@ -62,36 +62,36 @@ def test_pockets_are_where_they_are_with_force(shop: Shop, new_shop: type[Shop],
     other.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 4000")
     without, with_force = tapped(shop, force=False), tapped(other, force=True)
     (program,) = shop.folder.machine.program
-    found = speed_pockets(program, without, shop.folder.machine)
-    lobes = lobes_of(with_force, other.folder.machine)["A"]
-    known = pockets(lobes, 20 * lobes.minimum.depth)
+    found = find_speed_pockets(program, without, shop.folder.machine)
+    lobes = compute_lobes(with_force, other.folder.machine)["A"]
+    known = find_pockets(lobes, 20 * lobes.minimum.depth)
     assert len(found) == 3
     for pocket in found:
         nearest = min(known, key=lambda other: abs(other.speed_rpm - pocket.speed_rpm))
         assert pocket.speed_rpm == pytest.approx(nearest.speed_rpm, rel=0.01)
         assert pocket.gain == pytest.approx(nearest.depth / lobes.minimum.depth, rel=0.1)
         assert nearest.from_rpm < pocket.window_rpm[0] < pocket.window_rpm[1] <= nearest.to_rpm
-    best = best_pockets(known, 3, "removal")
+    best = rank_pockets(known, 3, "removal")
     assert [pocket.speed_rpm for pocket in found] == pytest.approx([pocket.speed_rpm for pocket in best], rel=0.01)
 
 
 def test_a_larger_doubt_of_the_frequency_narrows_windows_and_closes_pockets(without_force: Shop) -> None:
     machine, assembly = without_force.folder.machine, without_force.logbook.assembly("reference")
     (program,) = machine.program
-    (best, *_), sure = speed_pockets(program, assembly, machine), machine.doubt
+    (best, *_), sure = find_speed_pockets(program, assembly, machine), machine.doubt
     without_force.edit("[speed]", "[doubt]\nfrequency_percent = 0.8\n\n[speed]")
-    wide = speed_pockets(program, assembly, without_force.folder.machine)
+    wide = find_speed_pockets(program, assembly, without_force.folder.machine)
     assert sure.frequency_percent is None
     assert wide[0].window_rpm[1] - wide[0].window_rpm[0] < best.window_rpm[1] - best.window_rpm[0]
     without_force.edit("frequency_percent = 0.8", "frequency_percent = 6.0")
-    assert speed_pockets(program, assembly, without_force.folder.machine) == []
+    assert find_speed_pockets(program, assembly, without_force.folder.machine) == []
 
 
 def test_nothing_is_known_of_pockets_without_such_a_tap(shop: Shop) -> None:
     assembly = tapped(shop, force=True)
     (program,) = shop.folder.machine.program
-    assert assembly.unweighed == {}
-    assert speed_pockets(program, assembly, shop.folder.machine) == []
+    assert assembly.without_stiffness == {}
+    assert find_speed_pockets(program, assembly, shop.folder.machine) == []
 
 
 def test_lobes_lists_speeds_without_depths(without_force: Shop) -> None:

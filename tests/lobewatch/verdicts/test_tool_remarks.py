@@ -9,12 +9,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.lesson import next_cut
-from lobewatch.machine import tool_limits
+from lobewatch.cuts.learning.program_learning import find_next_cut
+from lobewatch.machine import find_tool_limits
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.verdicts.advice import robust_pockets
+from lobewatch.verdicts.program_remarks import missing_tool_remarks, tool_limit_remarks
+from lobewatch.verdicts.recommendation import find_stable_pockets
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
-from lobewatch.verdicts.tool_remarks import not_described, outside_tool
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -65,13 +65,13 @@ def test_an_18_mm_carbide_tool_is_nowhere_sent_to_21500_rpm_in_steel(tapped: Sho
     (verdict,) = logbook.verdicts()
     assert "outside-tool-limits" in [remark.code for remark in verdict.remarks]
     advice = logbook.advice(verdict)
-    pockets = robust_pockets(verdict.program, verdict.assembly, logbook.machine)
+    pockets = find_stable_pockets(verdict.program, verdict.assembly, logbook.machine)
     assert "tool-not-described" not in [remark.code for remark in advice.remarks]
     settings = [setting for setting in (advice.best, advice.here, *pockets) if setting is not None]
     assert settings
     for setting in settings:
         assert 3000 <= setting.window_rpm[0] <= setting.speed_rpm <= setting.window_rpm[1] <= FASTEST
-    suggested = next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5).suggested
+    suggested = find_next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5).suggestion
     assert suggested is not None
     assert suggested.speed_rpm <= FASTEST
 
@@ -79,7 +79,7 @@ def test_an_18_mm_carbide_tool_is_nowhere_sent_to_21500_rpm_in_steel(tapped: Sho
 def test_what_cuts_have_taught_of_the_force_leaves_the_limits_as_they_are(tapped: Shop) -> None:
     tapped.put(steel(3100, tool=COATED))
     machine = tapped.folder.machine
-    taught = SpindleAtSpeed(cuts=3, tangential=1500.0, radial=500.0)
+    taught = SpindleAtSpeed(n_cuts=3, tangential=1500.0, radial=500.0)
     known = msgspec.structs.replace(
         machine.program[0], tangential_n_per_mm2=taught.tangential, radial_n_per_mm2=taught.radial
     )
@@ -109,7 +109,7 @@ def test_what_cuts_have_taught_of_the_force_leaves_the_limits_as_they_are(tapped
 def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program: str, words: str) -> None:
     mill.put(program)
     machine = mill.folder.machine
-    (remark,) = outside_tool(machine.program[0], machine)
+    (remark,) = tool_limit_remarks(machine.program[0], machine)
     assert (remark.code, remark.about) == ("outside-tool-limits", "steel")
     assert words in remark.text
     assert "[[tool]] 'reference'" in remark.cure
@@ -127,7 +127,7 @@ def test_a_tool_that_was_never_tapped_is_remarked_too(mill: Shop) -> None:
 def test_a_program_inside_is_not(mill: Shop) -> None:
     mill.put(steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.1"))
     machine = mill.folder.machine
-    assert list(outside_tool(machine.program[0], machine)) == []
+    assert list(tool_limit_remarks(machine.program[0], machine)) == []
 
 
 def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop) -> None:
@@ -136,10 +136,10 @@ def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop)
     (verdict,) = logbook.verdicts()
     advice = logbook.advice(verdict)
     assert (advice.best, advice.here) == (None, None)
-    assert robust_pockets(verdict.program, verdict.assembly, logbook.machine) == []
-    following = next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5)
-    assert following.suggested is None
-    assert "of which the tool bears none" in following.reach.words
+    assert find_stable_pockets(verdict.program, verdict.assembly, logbook.machine) == []
+    following = find_next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5)
+    assert following.suggestion is None
+    assert "of which the tool bears none" in following.cut_range.text
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop)
 def test_advice_asks_for_what_is_not_known_of_the_tool(mill: Shop, program: str, words: str) -> None:
     mill.put(program)
     machine = mill.folder.machine
-    asked = list(not_described(machine.program[0], tool_limits(machine, machine.program[0])))
+    asked = list(missing_tool_remarks(machine.program[0], find_tool_limits(machine, machine.program[0])))
     assert [(remark.code, remark.about) for remark in asked] == [("tool-not-described", "reference")] * bool(words)
     assert all(words in remark.text and "cutting_speed_m_min" in remark.cure for remark in asked)
 
@@ -173,4 +173,4 @@ def test_flutes_and_helix_of_the_tool_hold_for_a_program_that_does_not_say_them(
     assert lags[1] == lags[2] > 0
     mill.put(steel(2000, tool=CARBIDE + "flute_length_mm = 6"))
     machine = mill.folder.machine
-    assert np.all(CutRange.of(machine, machine.program[0]).depths(np.array([2000.0])) == 6)
+    assert np.all(CutRange.of(machine, machine.program[0]).depth_limits(np.array([2000.0])) == 6)

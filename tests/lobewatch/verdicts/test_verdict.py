@@ -10,9 +10,9 @@ import pytest
 
 from dsm import calibrate
 from lobes import Program, program_limit
-from lobewatch.verdicts import Word
-from lobewatch.verdicts.aging import softening, tolerable_decay
-from lobewatch.verdicts.draws import as_program
+from lobewatch.verdicts import Stability
+from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
+from lobewatch.verdicts.program_samples import build_program
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -62,7 +62,7 @@ def test_a_direction_that_was_not_tapped_is_like_the_other_one_and_widens_the_do
     )
     for single, double in zip(alone, shop.logbook.verdicts(), strict=True):
         assert single.limit == pytest.approx(double.limit, rel=1e-4)
-        assert (single.word, double.word) == (Word.DOUBTFUL, Word.STABLE)
+        assert (single.word, double.word) == (Stability.DOUBTFUL, Stability.STABLE)
         assert single.limit_low < 0.9 * double.limit_low
         assert [remark.code for remark in single.remarks] == ["one-direction", "doubt-decides"]
 
@@ -74,7 +74,7 @@ def test_a_program_runs_along_one_axis_or_both(shop: Shop) -> None:
     shop.run(("both", 12900, 1))
     shop.edit("radial_depth_mm = 20\n", "radial_depth_mm = 5\n")
     (verdict,) = shop.logbook.verdicts()
-    program = as_program(verdict.program, shop.folder.machine)
+    program = build_program(verdict.program, shop.folder.machine)
     limits = [
         program_limit(program, assembly.x, assembly.y, [replace(program.cut, feed_angle=np.radians(15.0 * i))]).limit
         for i in range(12)
@@ -86,10 +86,10 @@ def test_a_program_runs_along_one_axis_or_both(shop: Shop) -> None:
 def test_decay_left_ends_where_the_limit_crosses_the_depth(shop: Shop) -> None:
     shop.tap_both()
     for verdict in shop.logbook.verdicts():
-        stiffness_at, remark = softening(verdict.assembly)
+        stiffness_at, remark = model_softening(verdict.assembly)
         assert remark.code == "decay-assumption"
-        fall = tolerable_decay(verdict.draws, verdict.program.depth_mm / 1e3, stiffness_at)
-        program = as_program(verdict.program, shop.folder.machine)
+        fall = find_tolerable_drop(verdict.draws, verdict.program.depth_mm / 1e3, stiffness_at)
+        program = build_program(verdict.program, shop.folder.machine)
         if np.isinf(fall):
             assert limit_after(verdict, program, 0.2, stiffness_at(0.2)) > program.depth
             continue
@@ -108,7 +108,7 @@ def limit_after(verdict: Any, program: Program, fall: float, stiffness: float) -
 
 def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: Shop) -> None:
     shop.tap_both()
-    stiffness_at, remark = softening(shop.logbook.assembly())
+    stiffness_at, remark = model_softening(shop.logbook.assembly())
     model = shop.folder.machine.model("reference")
     ratios = [calibrate(model, 1690.0 * share).modal_stiffness_after for share in (1.0, 0.9)]
     assert stiffness_at(0.1) == pytest.approx(ratios[1] / ratios[0], abs=1e-3)
@@ -116,7 +116,7 @@ def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: 
     assert "stiffness changes as in the model" in remark.text
     toml = shop.path / "machine.toml"
     toml.write_text(toml.read_text("utf-8").partition("# The spindle of the example")[0], "utf-8")
-    stiffness_at, remark = softening(shop.logbook.assembly())
+    stiffness_at, remark = model_softening(shop.logbook.assembly())
     assert (stiffness_at(0.1), "stiffness does not (no model)" in remark.text) == (1.0, True)
 
 
@@ -124,4 +124,4 @@ def test_a_chattering_program_has_no_decay_left(shop: Shop) -> None:
     shop.run(("A", 12900, 6))
     shop.tap_both()
     (verdict,) = shop.logbook.verdicts()
-    assert tolerable_decay(verdict.draws, 6e-3, softening(verdict.assembly)[0]) == 0.0
+    assert find_tolerable_drop(verdict.draws, 6e-3, model_softening(verdict.assembly)[0]) == 0.0

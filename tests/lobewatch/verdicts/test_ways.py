@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from lobes import program_limit
-from lobewatch.verdicts import Word
-from lobewatch.verdicts.advice import advise, robust_pockets
-from lobewatch.verdicts.draws import as_program
-from lobewatch.verdicts.verdict import judge
-from lobewatch.verdicts.ways import ways
+from lobewatch.verdicts import Stability
+from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of
+from lobewatch.verdicts.recommendation import advise, find_stable_pockets
+from lobewatch.verdicts.verdict import evaluate_program
 
 Shop = Any
 
@@ -30,7 +29,7 @@ def judged(shop: Shop) -> Any:
         toml.write_text(f"{head}radial_depth_mm = {radial}\n{tail}", "utf-8")
         machine = shop.folder.machine
         (table,) = machine.program
-        return judge(table, shop.logbook.assembly(), machine)
+        return evaluate_program(table, shop.logbook.assembly(), machine)
 
     return judged
 
@@ -45,7 +44,7 @@ def test_a_range_is_judged_at_its_worst_inside(judged: Any, shop: Shop) -> None:
     alone = [judged(0.3, radial=f"{depth:g}").limit for depth in (2, 5, 9, 12)]
     assert verdict.limit <= min(alone) * 1.0001
     cut = verdict.draws.cuts[0]
-    limit = program_limit(as_program(verdict.program, machine), tool.x, tool.y, [cut]).limit
+    limit = program_limit(build_program(verdict.program, machine), tool.x, tool.y, [cut]).limit
     assert limit == pytest.approx(verdict.limit, rel=1e-12)
     assert len({cut.immersion for cut in verdict.draws.cuts}) >= 4
 
@@ -53,7 +52,11 @@ def test_a_range_is_judged_at_its_worst_inside(judged: Any, shop: Shop) -> None:
 def test_a_corner_takes_most_of_the_limit_whatever_the_feed(judged: Any, shop: Shop) -> None:
     straight, corner = judged(0.3, 'feed = "x"'), judged(0.3, "corner_radius_mm = 15", 'feed = "x"')
     assert corner.limit < 0.4 * straight.limit
-    inside = [cut for cut in ways(corner.program, shop.folder.machine, corner.assembly) if cut.immersion > 0.6]
+    inside = [
+        cut
+        for cut in cutting_conditions_of(corner.program, shop.folder.machine, corner.assembly)
+        if cut.immersion > 0.6
+    ]
     assert len({cut.feed_angle for cut in inside}) == 12
 
 
@@ -97,12 +100,12 @@ def test_wear_of_the_doubt_holds_for_all_programs(judged: Any, shop: Shop) -> No
 def test_what_wear_decides_is_said(judged: Any) -> None:
     new = judged(0.5, radial="20")
     worn = judged(round(0.93e3 * new.limit_low, 2), 'wear = "worn"', radial="20")
-    assert (worn.word, worn.decided_by) == (Word.DOUBTFUL, "wear")
+    assert (worn.word, worn.decided_by) == (Stability.DOUBTFUL, "wear")
 
 
 def test_a_thin_wall_is_never_called_stable(judged: Any, shop: Shop) -> None:
-    assert judged(0.2, radial="20").word is Word.STABLE
+    assert judged(0.2, radial="20").word is Stability.STABLE
     verdict = judged(0.2, "thin = true", radial="20")
-    assert (verdict.word, verdict.decided_by) == (Word.DOUBTFUL, "workpiece")
+    assert (verdict.word, verdict.decided_by) == (Stability.DOUBTFUL, "workpiece")
     assert advise(verdict, shop.folder.machine).best is None
-    assert robust_pockets(verdict.program, verdict.assembly, shop.folder.machine) == []
+    assert find_stable_pockets(verdict.program, verdict.assembly, shop.folder.machine) == []

@@ -20,9 +20,9 @@ from acquisition import (
     Event,
     HammeredStructure,
     Hammering,
-    SensorPlace,
+    SensorDataLocation,
     Structure,
-    on_no_serial_port,
+    skip_serial_probe,
 )
 from acquisition.emulation import quantise
 
@@ -85,7 +85,7 @@ DRIVER = Driver(
     "dummybench",
     "a dummy bench",
     _open,
-    on_no_serial_port,
-    sensors=SensorPlace("the drawing of the bench", "gain", "skew"),
+    skip_serial_probe,
+    sensor_data=SensorDataLocation("the drawing of the bench", "gain", "skew"),
     search=lambda: [DeviceAddress(ADDRESS, IDENTITY, "bench at the window")],
 )

@@ -16,16 +16,16 @@ from typing import Self
 import numpy as np
 
 from acquisition import (
-    Bench,
     Block,
     Channel,
     DeviceError,
     DeviceIdentity,
     DeviceSettings,
     Driver,
+    EmulationSetup,
     EmulatorThread,
     Event,
-    SensorPlace,
+    SensorDataLocation,
 )
 from acquisition.emulation import quantise
 from acquisition.ports import SerialLink
@@ -123,7 +123,7 @@ def ask(link: SerialLink) -> list[str] | None:
 class DummyEmulator(EmulatorThread):
     """A dummy device made of software."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: EmulationSetup) -> None:
         super().__init__(bench.tcp)
         self._signal = bench.signal_at(RATE)
         self._channels = tuple(one.channel for one in bench.inputs)
@@ -179,8 +179,8 @@ DRIVER = Driver(
     _open,
     _probe,
     _check,
-    SensorPlace("the memory of the dummy", "gain", "skew"),
-    vendors=frozenset({0xD0D0}),
+    SensorDataLocation("the memory of the dummy", "gain", "skew"),
+    usb_vendors=frozenset({0xD0D0}),
     emulate=DummyEmulator,
     emulates_fast=True,
 )

@@ -10,8 +10,8 @@ import pytest
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.new_folder import make_machine_folder
-from modal import Mode, synthesize
+from lobewatch.machine.folder_files import make_machine_folder
+from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
@@ -33,7 +33,7 @@ def tap(
 ) -> None:
     when = START + timedelta(days=days)
     about = Circumstances("m", when, "reference", direction, "", folder.toml.read_text("utf-8"))
-    frf = synthesize([Mode(frequency, 0.029136, stiffness)], LINES)
+    frf = synthesize_frf([Mode(frequency, 0.029136, stiffness)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 

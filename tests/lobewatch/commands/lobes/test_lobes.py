@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from lobes import Cut, radial_lobes, stability_boundary
-from lobewatch.history.history_columns import row_lobes
+from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.figures.lobe_figures import BAND, radial_figure, waterfall_figure
-from lobewatch.tool import Dynamics, Method, chart, lobes_of, speed_grid
-from lobewatch.verdicts.limit_band import limit_band
+from lobewatch.show.figures.lobe_figures import BAND_LABEL, plot_radial_map, plot_waterfall
+from lobewatch.tool import DynamicsSource, LobeMethod, compute_lobe_chart, compute_lobes, speed_grid
+from lobewatch.verdicts.monte_carlo import compute_limit_band
 from modal import Mode
 from tests.lobewatch.commands.conftest import Run
 from tests.lobewatch.commands.lobes.conftest import START, edit, tap
@@ -46,8 +46,8 @@ def test_methods_and_shifts(run: Run, folder: MachineFolder) -> None:
 def relative_width(folder: MachineFolder) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Of the band around the line of the reference cut, at each speed."""
     assembly = Logbook(folder).assembly()
-    line = lobes_of(assembly, folder.machine)["reference cut"]
-    band = limit_band(line, "reference cut", assembly, folder.machine)
+    line = compute_lobes(assembly, folder.machine)["reference cut"]
+    band = compute_limit_band(line, "reference cut", assembly, folder.machine)
     assert np.all(band.low <= line.depth)
     assert np.all(line.depth <= band.high)
     return np.asarray((band.high - band.low) / line.depth)
@@ -79,19 +79,19 @@ def test_the_band_is_as_wide_as_the_doubt(folder: MachineFolder) -> None:
     assert np.median(relative_width(published)) > 1.5 * np.median(widths[-1])
 
 
-@pytest.mark.parametrize("method", [Method.AVERAGE_ANGLE, Method.SEMI_DISCRETISATION])
-def test_the_band_belongs_to_the_line_of_any_method(folder: MachineFolder, method: Method) -> None:
+@pytest.mark.parametrize("method", [LobeMethod.AVERAGE_ANGLE, LobeMethod.SEMI_DISCRETISATION])
+def test_the_band_belongs_to_the_line_of_any_method(folder: MachineFolder, method: LobeMethod) -> None:
     folder = edit(folder, "steps = 300", "steps = 80")
     tap(folder, 1713.0)
     tap(folder, 1690.0, days=0.2, direction="y")
     assembly = Logbook(folder).assembly()
     lines = [
-        chart(
+        compute_lobe_chart(
             one, assembly.x, assembly.y, folder.machine.cuts("reference")["reference cut"], speed_grid(folder.machine)
         )
-        for one in (Method.ZERO_ORDER, method)
+        for one in (LobeMethod.ZERO_ORDER, method)
     ]
-    bands = [limit_band(line, "reference cut", assembly, folder.machine) for line in lines]
+    bands = [compute_limit_band(line, "reference cut", assembly, folder.machine) for line in lines]
     zero, other = (np.stack((band.low, band.high)) / line.depth for band, line in zip(bands, lines, strict=True))
     np.testing.assert_allclose(np.median(other, axis=1), np.median(zero, axis=1), rtol=0.1)
 
@@ -111,9 +111,9 @@ def test_both_directions_count_from_the_frf_too(folder: MachineFolder) -> None:
     tap(folder, 1600.0, days=0.2, direction="y", stiffness=2e7)
     tap(folder, 1700.0, 400.0, stiffness=9e7)
     book = Logbook(folder)
-    frf = compare_lobes(book, None, "reference cut", Dynamics.FRF, Method.ZERO_ORDER)
+    frf = compare_lobes(book, None, "reference cut", DynamicsSource.FRF, LobeMethod.ZERO_ORDER)
     assert "older-direction" in [remark.code for remark in frf.remarks]
-    modes = lobes_of(book.assembly(), folder.machine)["reference cut"]
+    modes = compute_lobes(book.assembly(), folder.machine)["reference cut"]
     np.testing.assert_allclose(frf.now.lobes.depth, modes.depth, rtol=0.03)
 
 
@@ -132,7 +132,7 @@ def test_now_is_compared_with_the_first_tests_of_the_same_directions(run: Run, f
     html = Path("m/report.html").read_text("utf-8")
     assert "<h2>Stability lobes, then and now</h2>" in html
     assert "by zero order, x and y directions" in html
-    assert BAND in html
+    assert BAND_LABEL in html
 
 
 def test_a_predicted_diagram_says_so_and_is_no_waterfall(run: Run, folder: MachineFolder) -> None:
@@ -200,8 +200,8 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
     tap(folder, 1713.0)
     tap(folder, 1650.0, days=200)
     history = Logbook(folder).history
-    depth = np.stack([row_lobes(row, folder.machine)["reference cut"].depth for row in history.rows])
-    figure = waterfall_figure(speed_grid(folder.machine), [START, START + timedelta(days=200)], depth, "t")
+    depth = np.stack([compute_row_lobes(row, folder.machine)["reference cut"].depth for row in history.rows])
+    figure = plot_waterfall(speed_grid(folder.machine), [START, START + timedelta(days=200)], depth, "t")
     (mesh,) = figure.axes[0].collections
     shown = np.asarray(mesh.get_array()).reshape(depth.shape)
     low = shown < 0.99 * shown.max()
@@ -213,6 +213,6 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
         Cut(4, 1, "up", 1e9, 3e8),
         [0.5, 1],
     )
-    axes = radial_figure(found, 0.02, 0.75).axes[0]
+    axes = plot_radial_map(found, 0.02, 0.75).axes[0]
     assert axes.get_ylim() == pytest.approx((10.0, 20.0))
     assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(15.0)

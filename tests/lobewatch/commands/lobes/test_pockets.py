@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobes import zero_order
+from lobes import zero_order_lobes
 from lobewatch.logbook import Logbook, compare_lobes
-from lobewatch.machine import drive_limit
+from lobewatch.machine import drive_depth_limit
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.figures.lobe_figures import BAND
-from lobewatch.show.figures.lobe_pictures import lobes_picture
-from lobewatch.show.figures.style import svg
-from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
-from lobewatch.tool import Dynamics, Method, lobes_of
-from lobewatch.verdicts import Word
-from lobewatch.verdicts.advice import robust_pockets
+from lobewatch.show.figures.drawing import render_svg
+from lobewatch.show.figures.lobe_figures import BAND_LABEL, plot_comparison
+from lobewatch.show.programs.lobes import comparison_json, comparison_texts
+from lobewatch.tool import DynamicsSource, LobeMethod, compute_lobes
+from lobewatch.verdicts import Stability
+from lobewatch.verdicts.recommendation import find_stable_pockets
 from modal import Mode
 from tests.lobewatch.commands.conftest import Run
 from tests.lobewatch.commands.lobes.conftest import MODEL, edit, tap
@@ -58,12 +57,12 @@ def test_a_pocket_entered_as_a_program_is_stable(run: Run, folder: MachineFolder
         assert one["speed_rpm"] == pytest.approx(np.mean(robust), abs=0.5 * np.ptp(robust) + 0.005 * high)
         assert low <= one["speed_rpm"] <= high
     verdicts = Logbook(with_pockets(folder, found)).verdicts()
-    assert [verdict.word for verdict in verdicts] == [Word.STABLE] * 3
+    assert [verdict.stability for verdict in verdicts] == [Stability.STABLE] * 3
     for verdict, one in zip(verdicts, found, strict=True):
         assert verdict.depth_margin >= 0.2
         assert verdict.depth_margin == pytest.approx(one["depth_margin"])
     ends = [one | {"speed_rpm": speed} for one in found for speed in one["window_rpm"]]
-    assert {verdict.word for verdict in Logbook(with_pockets(folder, ends)).verdicts()} == {Word.STABLE}
+    assert {verdict.stability for verdict in Logbook(with_pockets(folder, ends)).verdicts()} == {Stability.STABLE}
 
 
 def test_pockets_stay_within_flutes_and_drive(folder: MachineFolder) -> None:
@@ -75,8 +74,8 @@ def test_pockets_stay_within_flutes_and_drive(folder: MachineFolder) -> None:
     tap(folder, 1560.0, days=0.2, direction="y")
     cut, assembly = folder.machine.reference_cut, Logbook(folder).assembly()
     assert cut is not None
-    found = robust_pockets(cut, assembly, folder.machine)
-    allowed = [drive_limit(folder.machine, cut, np.array([one.speed_rpm]))[0] * 1e3 for one in found]
+    found = find_stable_pockets(cut, assembly, folder.machine)
+    allowed = [drive_depth_limit(folder.machine, cut, np.array([one.speed_rpm]))[0] * 1e3 for one in found]
     assert len(found) >= 2
     assert max(one.depth_mm for one in found) <= 2.0
     assert all(one.depth_mm <= limit for one, limit in zip(found, allowed, strict=True))
@@ -86,11 +85,11 @@ def test_pockets_stay_within_flutes_and_drive(folder: MachineFolder) -> None:
 def test_pockets_are_printed_and_drawn_as_they_are(folder: MachineFolder) -> None:
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
-    found = compare_lobes(Logbook(folder), None, "reference cut", Dynamics.MODES, Method.ZERO_ORDER)
+    found = compare_lobes(Logbook(folder), None, "reference cut", DynamicsSource.MODES, LobeMethod.ZERO_ORDER)
     said, texts = comparison_json(found, []), comparison_texts(found, [])
     table, *_ = (text for text in texts if not isinstance(text, str))
     printed = list(zip(*(column.cells for column in table.columns), strict=True))
-    drawn = svg(lobes_picture(folder.machine, found, ()))
+    drawn = render_svg(plot_comparison(folder.machine, found, ()))
     assert len(found.pockets) == len(printed) == 3
     for one, cells in zip(said["pockets"], printed, strict=True):
         low, high = one["window_rpm"]
@@ -98,7 +97,7 @@ def test_pockets_are_printed_and_drawn_as_they_are(folder: MachineFolder) -> Non
         assert 0 <= 100 * one["depth_margin"] - float(str(cells[3]).rstrip(" %")) < 1
         assert f"{one['speed_rpm']:.0f} rpm</text>" in drawn
         assert f"{one['depth_mm']:.2f} mm</text>" in drawn
-    assert BAND in drawn
+    assert BAND_LABEL in drawn
 
 
 def test_nothing_is_called_safe_with_one_direction(run: Run, folder: MachineFolder) -> None:
@@ -115,7 +114,7 @@ def test_a_direction_that_was_not_tapped_is_not_rigid(run: Run, folder: MachineF
     tap(folder, 1713.0)
     both, frf = (json.loads(run("lobes", "m", "--source", name, "--json").out) for name in ("modes", "frf"))
     modes, cut = [Mode(1713.0, 0.029136, 3.5e7)], folder.machine.build_cut(folder.machine.program[0])
-    alike = zero_order(modes, modes, cut, both["speed_rpm"]).minimum.depth * 1e3
+    alike = zero_order_lobes(modes, modes, cut, both["speed_rpm"]).minimum.depth * 1e3
     assert both["minimum_depth_mm"] == pytest.approx(alike, rel=1e-3)
     assert frf["minimum_depth_mm"] == pytest.approx(alike, rel=0.01)
     assert "one-direction" in [remark["code"] for remark in frf["remarks"]]
@@ -134,7 +133,7 @@ def test_pockets_are_compared_where_both_tops_are_known(run: Run, folder: Machin
     tap(folder, 1700.0, days=300, stiffness=1.2e7)
     said = json.loads(run("lobes", "m", "--json").out)
     logbook = Logbook(folder)
-    first = lobes_of(logbook.assembly(until=logbook.taps[0].id), folder.machine)["reference cut"]
+    first = compute_lobes(logbook.assembly(until=logbook.taps[0].id), folder.machine)["reference cut"]
     shifts = said["pocket_shifts"]
     assert len(shifts) >= 3
     for shift in shifts:

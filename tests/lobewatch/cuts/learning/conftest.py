@@ -9,12 +9,12 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from lobes import Cut, MillingRows, milling_system, rows_of, zero_order
-from lobes.floquet import largest_multipliers, piece_numbers
+from lobes import Cut, MillingRows, build_milling_system, rows_at_speeds, zero_order_lobes
+from lobes.floquet import count_pieces, largest_multipliers
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, speeds_between
-from lobewatch.cuts.learning.posterior import Posterior, prior
-from lobewatch.verdicts.doubt import Doubt, Span
+from lobewatch.cuts.learning.expected_gain import CutGrid, list_speeds
+from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 
 SLOT = Cut(teeth=4, immersion=1.0, direction="down", tangential=1.4e9, radial=5e8)
@@ -35,22 +35,22 @@ class Mill:
     @property
     def middle(self) -> MillingRows:
         """At rest."""
-        return rows_of(milling_system([self.x], [self.y]), self.cut, np.ones(1))
+        return rows_at_speeds(build_milling_system([self.x], [self.y]), self.cut, np.ones(1))
 
     @property
     def prior(self) -> Posterior:
         """Before the first cut."""
-        return prior(self.middle, doubt(), 700)
+        return build_prior(self.middle, doubt(), 700)
 
     def learnt_from(self, cuts: Iterable[CutEvidence]) -> Posterior:
         """After some cuts."""
         return reduce(Posterior.learn_from, cuts, self.prior)
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> CutGrid:
         """4000 to 20 000 rpm, flutes of 12 mm."""
-        speeds = speeds_between(4000, 20000)
-        return Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, 0.012), np.ones(speeds.shape))
+        speeds = list_speeds(4000, 20000)
+        return CutGrid(self.cut, (0.0,), speeds, np.full(speeds.shape, 0.012), np.ones(speeds.shape))
 
     @property
     def turning(self) -> tuple[Mode, Mode]:
@@ -66,8 +66,8 @@ class Mill:
     def multiplier(self, speed: float, depth: float) -> complex:
         """Of the spindle that turns, by semi-discretisation."""
         x, y = self.turning
-        rows = rows_of(milling_system([x], [y]), self.pushed, np.array([speed]))
-        return complex(largest_multipliers(rows, np.array([[depth]]), piece_numbers(rows, depth))[0, 0])
+        rows = rows_at_speeds(build_milling_system([x], [y]), self.pushed, np.array([speed]))
+        return complex(largest_multipliers(rows, np.array([[depth]]), count_pieces(rows, depth))[0, 0])
 
     def hear(self, speed: float, depth: float) -> CutEvidence:
         """What the cut sounds like; the frequency is the one that the multiplier leaves next above a natural one."""
@@ -84,12 +84,14 @@ class Mill:
     def chatter(self, speed: float) -> CutEvidence:
         """Of a slot a tenth deeper than its limit."""
         x, y = self.turning
-        return self.hear(speed, 1.1 * float(zero_order([x], [y], self.pushed, [speed]).depth[0]))
+        return self.hear(speed, 1.1 * float(zero_order_lobes([x], [y], self.pushed, [speed]).depth[0]))
 
 
-def doubt() -> Doubt:
+def doubt() -> Uncertainty:
     """Of a tap test without errors; 20 % of the coefficients."""
-    return Doubt({"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
+    return Uncertainty(
+        {"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, FactorRange(0.8, 1.2), FactorRange(0.8, 1.2)
+    )
 
 
 @pytest.fixture

@@ -11,20 +11,18 @@ from typer.testing import CliRunner
 
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.machine.additions.correct import exclude
-from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.additions.observe_cut import observe_cut
-from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.machine.settings.cut_setting import cut_setting
-from lobewatch.verdicts import Word
+from lobewatch.machine.folder_updates import exclude_entry, make_observed_cut, store_cut
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.verdicts import Stability
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
 
 
-def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> HeardCut:
-    setting = cut_setting(shop.folder.machine, "A", speed, depth_mm)
-    return keep_cut(shop.folder, observe_cut(setting, word, frequency, at=shop.start + timedelta(days=1)))
+def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> CutEntry:
+    setting = find_cut_setting(shop.folder.machine, "A", speed, depth_mm)
+    return store_cut(shop.folder, make_observed_cut(setting, word, frequency, at=shop.start + timedelta(days=1)))
 
 
 def judged(shop: Shop, name: str = "A") -> Any:
@@ -46,7 +44,7 @@ def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop
     assert (at_rest.draws.doubt.learnt is None, four.draws.doubt.learnt is None) == (True, False)
     assert four.limit_high / four.limit_low < first.limit_high / first.limit_low
     assert four.limit_low > first.limit_low
-    assert four.word is Word.STABLE
+    assert four.word is Stability.STABLE
     assert four.chance_turning < at_rest.chance_turning
     assert four.program.tangential_n_per_mm2 < at_rest.program.tangential_n_per_mm2
     assert [draws.rows.tangential[0] for draws in (at_rest.draws, four.draws)] == pytest.approx(
@@ -73,8 +71,8 @@ def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_
     cut = hear(shop, 12900, 1.5, "chatter")
     after = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in after}
-    assert judged(shop).word is not Word.STABLE
-    exclude(shop.folder, cut.id, "a chip was stuck")
+    assert judged(shop).word is not Stability.STABLE
+    exclude_entry(shop.folder, cut.id, "a chip was stuck")
     again = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in before}
     for earlier, now in zip(before, again, strict=True):
@@ -82,9 +80,9 @@ def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_
         assert np.array_equal(now.draws.rows.frequency, earlier.draws.rows.frequency)
 
 
-def words(logbook: Logbook) -> dict[str, Word]:
-    rulings = logbook.rulings(logbook.history.rows[-1].tap_id)
-    return {name: ruling.word for name, ruling in rulings.items()}
+def words(logbook: Logbook) -> dict[str, Stability]:
+    rulings = logbook.stored_verdicts(logbook.history.rows[-1].tap_id)
+    return {name: ruling.stability for name, ruling in rulings.items()}
 
 
 def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Shop) -> None:
@@ -105,4 +103,4 @@ def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     hear(shop, 12900, 1.0, "stable")
     verdict = judged(shop)
-    assert (verdict.word, verdict.decided_by) == (Word.DOUBTFUL, "untapped")
+    assert (verdict.word, verdict.decided_by) == (Stability.DOUBTFUL, "untapped")

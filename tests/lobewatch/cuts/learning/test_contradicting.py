@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.contradicting import (
-    ContradictingCut,
-    Contradiction,
-    contradiction,
-    contradiction_remarks,
-    contradictions,
-)
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood
+from lobewatch.cuts.learning.cut_likelihood import CutPrediction, log_likelihood
+from lobewatch.cuts.learning.label_check import (
+    Contradiction,
+    InconsistentCut,
+    find_contradiction,
+    find_inconsistent_cuts,
+    inconsistent_cut_remarks,
+)
 from lobewatch.cuts.learning.posterior import NewEvidence
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
@@ -28,7 +28,7 @@ CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0, id="c8")
 def evidence(cut: CutEvidence, share: float, base: float = 150.0) -> NewEvidence:
     """A cut of which a share of the weight says chatter at a folded frequency (Hz), the others that it is stable."""
     before = replace(Mill().prior, log_weight=np.log([share, 1 - share]))
-    before = replace(before, draws=before.draws[:2])
+    before = replace(before, samples=before.samples[:2])
     frequencies = np.array([base, 390.0])
     prediction = CutPrediction(np.array([5.0, -5.0]), frequencies, frequencies, np.zeros(2, dtype=bool))
     return NewEvidence(before, cut, prediction)
@@ -39,21 +39,21 @@ def test_a_cut_is_not_believed_where_all_else_gives_it_less_than_it_is_to_be_wro
     """Of weights that have learnt from the cut: 3 % of the weight before make half of that after."""
     without = replace(CHATTER, frequency=math.nan)
     after = share * 0.97 / (share * 0.97 + (1 - share) * 0.03)
-    chatters, stable = contradiction(evidence(without, after)), contradiction(evidence(STABLE, 1 - after))
+    chatters, stable = find_contradiction(evidence(without, after)), find_contradiction(evidence(STABLE, 1 - after))
     assert (chatters is not None) is (stable is not None) is is_odd
     if is_odd:
         assert chatters is not None
         assert stable is not None
-        assert (chatters.why, stable.why) == (Contradiction.CHATTERS, Contradiction.STABLE)
-        assert [chatters.wrong, stable.wrong] == pytest.approx([1 - after] * 2)
+        assert (chatters.contradiction, stable.contradiction) == (Contradiction.CHATTERS, Contradiction.STABLE)
+        assert [chatters.wrong_probability, stable.wrong_probability] == pytest.approx([1 - after] * 2)
 
 
 @pytest.mark.parametrize(("off", "is_odd"), [(69.0, False), (71.0, True)])
 def test_chatter_contradicts_where_its_frequency_is_four_standard_deviations_from_all(off: float, is_odd: bool) -> None:
     """Standard deviation: 1 % of 1750 Hz."""
-    told = contradiction(evidence(CHATTER, 0.999, 150.0 + off))
-    assert (told and told.why) is (Contradiction.FREQUENCY if is_odd else None)
-    assert contradiction(evidence(replace(CHATTER, frequency=math.nan), 0.999, 150.0 + off)) is None
+    told = find_contradiction(evidence(CHATTER, 0.999, 150.0 + off))
+    assert (told and told.contradiction) is (Contradiction.FREQUENCY if is_odd else None)
+    assert find_contradiction(evidence(replace(CHATTER, frequency=math.nan), 0.999, 150.0 + off)) is None
 
 
 @pytest.mark.parametrize(("share", "is_odd"), [(0.004, True), (0.006, False)])
@@ -61,31 +61,31 @@ def test_chatter_of_half_a_percent_of_the_weight_by_the_others_is_explained(shar
     found = evidence(CHATTER, share)
     prediction = found.prediction._replace(excess=np.array([5.0, 5.0]))
     log_weight = np.log([share, 1 - share]) + log_likelihood(CHATTER, prediction)
-    learnt = replace(found.before, log_weight=log_weight)
-    chatters = replace(found, before=learnt, prediction=prediction)
-    odd = contradiction(chatters)
-    assert (odd and odd.why) is (Contradiction.FREQUENCY if is_odd else None)
+    learnt = replace(found.prior, log_weight=log_weight)
+    chatters = replace(found, prior=learnt, prediction=prediction)
+    odd = find_contradiction(chatters)
+    assert (odd and odd.contradiction) is (Contradiction.FREQUENCY if is_odd else None)
 
 
 def test_a_cut_that_contradicts_those_before_it_is_believed_where_those_after_explain_it(mill: Mill) -> None:
     stable = CutEvidence(mill.cut, 12000, 1.6e-3, "stable")
     shallow, deep = (CutEvidence(mill.cut, 12000, depth, "chatter") for depth in (0.9e-3, 1.65e-3))
-    (odd,) = contradictions(mill.learnt_from([stable, replace(stable, depth=1.7e-3), shallow]))
-    assert (odd.cut, odd.why) == (shallow, Contradiction.CHATTERS)
-    assert odd.wrong > 0.9
+    (odd,) = find_inconsistent_cuts(mill.learnt_from([stable, replace(stable, depth=1.7e-3), shallow]))
+    assert (odd.cut, odd.contradiction) == (shallow, Contradiction.CHATTERS)
+    assert odd.wrong_probability > 0.9
     again = [stable, shallow, deep, replace(shallow, depth=0.95e-3), replace(shallow, speed_rpm=12100)]
-    (odd,) = contradictions(mill.learnt_from(again))
-    assert (odd.cut, odd.why) == (stable, Contradiction.STABLE)
+    (odd,) = find_inconsistent_cuts(mill.learnt_from(again))
+    assert (odd.cut, odd.contradiction) == (stable, Contradiction.STABLE)
 
 
 def test_each_contradiction_is_said_with_its_cause(mill: Mill) -> None:
     odd = [
-        ContradictingCut(CHATTER, Contradiction.FREQUENCY),
-        ContradictingCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS, 0.871),
-        ContradictingCut(STABLE, Contradiction.STABLE, 0.6),
-        ContradictingCut(STABLE, Contradiction.POWER),
+        InconsistentCut(CHATTER, Contradiction.FREQUENCY),
+        InconsistentCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS, 0.871),
+        InconsistentCut(STABLE, Contradiction.STABLE, 0.6),
+        InconsistentCut(STABLE, Contradiction.POWER),
     ]
-    remarks = list(contradiction_remarks(mill.prior, odd, "A"))
+    remarks = list(inconsistent_cut_remarks(mill.prior, odd, "A"))
     assert [(remark.code, remark.about) for remark in remarks] == [
         ("cut-unexplained", "c8"), ("cut-unexplained", "c8"), ("cut-unexplained", "c7"), ("cut-unexplained", "c7"),
     ]  # fmt: skip

@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.contradicting import contradictions
-from lobewatch.cuts.learning.cut_again import cut_again, is_taken
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.suggest import suggest
+from lobewatch.cuts.learning.cut_evidence import CutEvidence, find_cut_to_repeat, is_setting_taken
+from lobewatch.cuts.learning.label_check import find_inconsistent_cuts
+from lobewatch.cuts.learning.suggestion import suggest_cut
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 CHATTER = CutEvidence(SLOT, 9000, 12.2e-3, "chatter", 700.0, id="c2")
-STABLE = replace(CHATTER, word="stable", frequency=math.nan, id="c3")
+STABLE = replace(CHATTER, verdict="stable", frequency=math.nan, id="c3")
 
 
 @pytest.mark.parametrize(("speed", "depth", "taken"), [
@@ -25,30 +24,30 @@ STABLE = replace(CHATTER, word="stable", frequency=math.nan, id="c3")
 def test_chatter_that_is_not_believed_takes_its_place_a_tenth_above_it_and_all_below(
     speed: float, depth: float, taken: bool
 ) -> None:
-    assert is_taken(speed, depth, [CHATTER], [CHATTER]) is taken
-    assert not is_taken(speed, depth, [STABLE], [STABLE])
+    assert is_setting_taken(speed, depth, [CHATTER], [CHATTER]) is taken
+    assert not is_setting_taken(speed, depth, [STABLE], [STABLE])
 
 
 @pytest.mark.parametrize(("depth", "taken"), [(12.1e-3, True), (11.8e-3, True), (11.6e-3, False), (20e-3, True)])
 def test_chatter_that_is_believed_takes_4_percent_above_it(depth: float, taken: bool) -> None:
-    assert is_taken(8920, depth, [CHATTER]) is taken
-    assert not is_taken(8920, depth, [STABLE])
-    assert not is_taken(8900, depth, [CHATTER])
+    assert is_setting_taken(8920, depth, [CHATTER]) is taken
+    assert not is_setting_taken(8920, depth, [STABLE])
+    assert not is_setting_taken(8900, depth, [CHATTER])
 
 
 def test_a_place_is_free_again_where_the_same_cut_was_stable_later_and_not_before() -> None:
-    assert not is_taken(9000, 12.1e-3, [CHATTER, STABLE])
-    assert is_taken(9000, 12.1e-3, [STABLE, CHATTER])
-    assert is_taken(9000, 12.1e-3, [CHATTER, replace(STABLE, depth=11e-3)])
+    assert not is_setting_taken(9000, 12.1e-3, [CHATTER, STABLE])
+    assert is_setting_taken(9000, 12.1e-3, [STABLE, CHATTER])
+    assert is_setting_taken(9000, 12.1e-3, [CHATTER, replace(STABLE, depth=11e-3)])
 
 
 def test_a_cut_that_is_not_believed_is_asked_for_once_and_never_a_third_time() -> None:
     other = replace(STABLE, speed_rpm=12000.0, id="c1")
-    assert cut_again([other, CHATTER], [CHATTER]) is CHATTER
-    assert cut_again([other, CHATTER], []) is None
+    assert find_cut_to_repeat([other, CHATTER], [CHATTER]) is CHATTER
+    assert find_cut_to_repeat([other, CHATTER], []) is None
     for second in (STABLE, replace(CHATTER, id="c3")):
-        assert cut_again([other, CHATTER, second], [CHATTER, second]) is None
-    assert cut_again([CHATTER, replace(CHATTER, depth=11e-3)], [CHATTER]) is CHATTER
+        assert find_cut_to_repeat([other, CHATTER, second], [CHATTER, second]) is None
+    assert find_cut_to_repeat([CHATTER, replace(CHATTER, depth=11e-3)], [CHATTER]) is CHATTER
 
 
 def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_chattered(mill: Mill) -> None:
@@ -57,12 +56,12 @@ def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_c
     cuts = [CutEvidence(mill.cut, speed, depth, "stable", id=f"c{k}") for k, depth in enumerate((2e-3, 2.5e-3))]
     odd = CutEvidence(mill.cut, speed, 1e-3, "chatter", id="c2")
     learnt = mill.learnt_from([*cuts, odd])
-    again = suggest(learnt, mill.grid, [*cuts, odd], 2, [odd])
+    again = suggest_cut(learnt, mill.grid, [*cuts, odd], 2, [odd])
     assert again is not None
     assert (again.speed_rpm, again.depth, again.repeats) == (speed, 1e-3, "c2")
-    assert again.chance < 0.1
+    assert again.chatter_probability < 0.1
     twice = [*cuts, odd, replace(odd, id="c3")]
-    following = suggest(learnt, mill.grid, twice, 2, [odd, twice[-1]])
+    following = suggest_cut(learnt, mill.grid, twice, 2, [odd, twice[-1]])
     assert following is not None
     assert following.repeats == ""
     assert abs(math.log(following.speed_rpm / speed)) >= 0.01
@@ -74,7 +73,7 @@ def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: M
     cuts = [CutEvidence(mill.cut, speed, depth, "chatter", id=f"c{k}") for k, depth in enumerate((4e-3, 3e-3))]
     odd = CutEvidence(mill.cut, speed, 8e-3, "stable", id="c2")
     learnt = mill.learnt_from([*cuts, odd])
-    found = {left: suggest(learnt, mill.grid, [*cuts, odd], left, [odd]) for left in (2, 1)}
+    found = {left: suggest_cut(learnt, mill.grid, [*cuts, odd], left, [odd]) for left in (2, 1)}
     assert {left: cut.repeats for left, cut in found.items() if cut} == {2: "c2", 1: ""}
 
 
@@ -84,14 +83,14 @@ def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_le
     places = [(speed, 1.5e-3, "stable"), (speed, 2e-3, "chatter"), (1.015 * speed, 2e-3, "stable")]
     cuts = [CutEvidence(mill.cut, *place, id=f"c{k}") for k, place in enumerate(places, 1)]  # type: ignore[arg-type]
     learnt = mill.learnt_from(cuts)
-    assert contradictions(learnt) == ()
-    again = suggest(learnt, mill.grid, cuts, 2)
+    assert find_inconsistent_cuts(learnt) == ()
+    again = suggest_cut(learnt, mill.grid, cuts, 2)
     assert again is not None
     assert (again.speed_rpm, again.depth, again.repeats) == (speed, 2e-3, "c2")
-    last = suggest(learnt, mill.grid, cuts, 1)
+    last = suggest_cut(learnt, mill.grid, cuts, 1)
     assert last is None or not last.repeats
     twice = [*cuts, replace(cuts[1], id="c4")]
-    third = suggest(mill.learnt_from(twice), mill.grid, twice, 2)
+    third = suggest_cut(mill.learnt_from(twice), mill.grid, twice, 2)
     assert third is None or third.repeats != "c2"
 
 
@@ -100,7 +99,7 @@ def test_chatter_is_asked_for_again_where_no_frequency_speaks_for_it(mill: Mill)
     chatter = mill.chatter(12000)
     told = replace(chatter, depth=0.85 * chatter.depth, id="c1")
     for cut, repeats in ((told, ""), (replace(told, frequency=math.nan), "c1")):
-        found = suggest(mill.prior.learn_from(cut), mill.grid, [cut], 3)
+        found = suggest_cut(mill.prior.learn_from(cut), mill.grid, [cut], 3)
         assert found is not None
         assert found.repeats == repeats
 
@@ -110,7 +109,7 @@ def test_chatter_is_not_asked_for_again_where_a_stable_word_is_more_doubtful(mil
     first, last = (replace(mill.chatter(speed), frequency=math.nan) for speed in (12000, 12400))
     between = CutEvidence(mill.cut, 12200, 1.1 * first.depth, "stable")
     cuts = [first, between, last]
-    found = suggest(mill.learnt_from(cuts), mill.grid, cuts, 2)
+    found = suggest_cut(mill.learnt_from(cuts), mill.grid, cuts, 2)
     assert found is not None
     assert found.repeats == ""
     assert (found.speed_rpm, found.depth) not in [(cut.speed_rpm, cut.depth) for cut in cuts]

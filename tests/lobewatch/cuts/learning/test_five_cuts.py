@@ -18,15 +18,15 @@ from shown_power import FEED, ShownPower
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
-from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, zero_order
+from lobes import Cut, build_milling_system, lower_envelope, rows_at_speeds, stability_boundary, zero_order_lobes
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, floor_depth, speeds_between, zero_order_trust
-from lobewatch.cuts.learning.likelihood import log_likelihood, predict_cut
-from lobewatch.cuts.learning.posterior import Posterior, prior
-from lobewatch.cuts.learning.suggest import best_removal_rate, suggest
-from lobewatch.machine.journal.heard_cut import CutWord
-from lobewatch.verdicts.doubt import Doubt, Span
-from lobewatch.verdicts.mean_force import is_constant
+from lobewatch.cuts.learning.cut_likelihood import log_likelihood, predict_cut
+from lobewatch.cuts.learning.expected_gain import CutGrid, compare_zero_order, floor_depth, list_speeds
+from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import find_best_removal_rate, suggest_cut
+from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.zero_order_batch import is_force_constant
 from modal import Mode
 
 CUTS = 5
@@ -70,11 +70,11 @@ class Hidden:
             self.ratios |= {"frequency_x": self.frequency, "frequency_y": self.frequency}
         self.turn(self.ratios)
         self.drive = ShownPower(self.cut, self.truly.tangential, np.random.default_rng((36, self.number)))
-        speeds = speeds_between(LOW, HIGH)
-        trust = zero_order_trust([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
-        self.grid = Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, DEEPEST), trust)
-        self.learnt: Posterior = prior(
-            rows_of(milling_system([self.rest[0]], [self.rest[1]]), self.cut, np.ones(1)), DOUBT
+        speeds = list_speeds(LOW, HIGH)
+        trust = compare_zero_order([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
+        self.grid = CutGrid(self.cut, (0.0,), speeds, np.full(speeds.shape, DEEPEST), trust)
+        self.learnt: Posterior = build_prior(
+            rows_at_speeds(build_milling_system([self.rest[0]], [self.rest[1]]), self.cut, np.ones(1)), DOUBT
         )
         self.optimum = self._optimum()
 
@@ -99,11 +99,11 @@ class Hidden:
 
     def limits(self, modes: Sequence[Mode], cut: Cut) -> np.ndarray:
         """Depths (m) at the speeds of the grid, as deep as is allowed."""
-        if is_constant(cut):
-            found = zero_order([modes[0]], [modes[1]], cut, self.grid.speeds)
+        if is_force_constant(cut):
+            found = zero_order_lobes([modes[0]], [modes[1]], cut, self.grid.speeds)
         else:
             found = stability_boundary([modes[0]], [modes[1]], cut, self.grid.speeds, DEEPEST)
-        return np.minimum(lowest_of([found]).depth, DEEPEST)
+        return np.minimum(lower_envelope([found]).depth, DEEPEST)
 
     def _optimum(self) -> float:
         """Largest removal rate on the grid (rpm m)."""
@@ -112,7 +112,7 @@ class Hidden:
 
     def suggested(self, left: int) -> tuple[float, float] | None:
         """What is to be cut next."""
-        found = suggest(self.learnt, self.grid, self.cuts, left)
+        found = suggest_cut(self.learnt, self.grid, self.cuts, left)
         return None if found is None else (found.speed_rpm, found.depth)
 
     def milling(self, speed: float, depth: float) -> MillingCut:
@@ -124,7 +124,7 @@ class Hidden:
         angles = cut.entry_angle, cut.exit_angle
         return MillingCut(cut.teeth, *angles, cut.tangential, cut.radial, depth, FEED, speed, x, y)
 
-    def hear(self, speed: float, depth: float, word: CutWord, frequency: float) -> None:
+    def hear(self, speed: float, depth: float, word: CutVerdict, frequency: float) -> None:
         """Learn from the cut."""
         pitch = frequency * (1 + NOISE * self.random.standard_normal())
         stable = word == "stable"
@@ -133,12 +133,14 @@ class Hidden:
         self.learnt = self.learnt.learn_from(self.cuts[-1])
 
 
-DOUBT = Doubt({"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
+DOUBT = Uncertainty(
+    {"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, FactorRange(0.8, 1.2), FactorRange(0.8, 1.2)
+)
 
 
-def heard(cuts: Sequence[MillingCut]) -> list[tuple[CutWord, float]]:
+def heard(cuts: Sequence[MillingCut]) -> list[tuple[CutVerdict, float]]:
     """Word and chatter frequency (Hz) of cuts, from their motion alone."""
-    found: list[tuple[CutWord, float]] = [("stable", np.nan)] * len(cuts)
+    found: list[tuple[CutVerdict, float]] = [("stable", np.nan)] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
         teeth = round(motion.sample_rate * cuts[number].tooth_period)
         steady = motion.acceleration[:, int(motion.sample_rate * 0.5) : int(motion.sample_rate * 0.82)]
@@ -150,7 +152,7 @@ def heard(cuts: Sequence[MillingCut]) -> list[tuple[CutWord, float]]:
         power = np.sum(np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), 4 * left.shape[1])) ** 2, axis=0)
         pitch = float(np.argmax(power)) * motion.sample_rate / (4 * left.shape[1])
         base = pitch * cuts[number].tooth_period
-        word: CutWord = "flip" if abs(base % 1 - 0.5) < 0.003 else "chatter"
+        word: CutVerdict = "flip" if abs(base % 1 - 0.5) < 0.003 else "chatter"
         found[number] = word, pitch
     return found
 
@@ -163,7 +165,7 @@ def five_cuts(spindles: Sequence[Hidden]) -> None:
         for (one, (speed, depth)), (word, pitch) in zip(asked, words, strict=True):
             one.hear(speed, depth, word, pitch)
         for one in spindles:
-            one.share.append(best_removal_rate(one.cuts) / one.optimum)
+            one.share.append(find_best_removal_rate(one.cuts) / one.optimum)
 
 
 def chattering(one: Hidden, number: int) -> list[tuple[float, float]]:
@@ -183,22 +185,22 @@ def noticed(spindles: Sequence[Hidden], number: int = 3) -> tuple[float, float]:
         for place, (word, pitch) in zip(own, words[number * k :], strict=False):
             one.hear(*place, word, pitch)
             found = [one.learnt.intervals[f"frequency_{side}"] for side in "xy"]
-            if one.learnt.frequencies < 2:
+            if one.learnt.n_frequencies < 2:
                 too_early.append(any(not each.low <= one.frequency <= each.high for each in found if one.frequency))
-        in_time.append(one.learnt.is_far_off)
+        in_time.append(one.learnt.is_frequency_unusual)
     return float(np.mean(too_early)), float(np.mean(in_time))
 
 
 def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_truth() -> None:
     """Simulated in time; what grows most at this depth sounds 22 % higher."""
     one, speed, depth = Hidden(215), 13510.0, 12e-3
-    truth = one.learnt.draws[:1]
+    truth = one.learnt.samples[:1]
     truth.normal[:] = 0.0
     one.turn({name: float(values[0]) for name, values in truth.ratios().items()})
     ((word, pitch),) = heard([one.milling(speed, depth)])
     cut = CutEvidence(one.cut, speed, depth, word, pitch)
     prediction = predict_cut(cut, truth)
-    at_depth, at_limit = prediction.distances(cut)[:, 0] / pitch
+    at_depth, at_limit = prediction.frequency_distances(cut)[:, 0] / pitch
     assert at_depth > 0.1
     assert at_limit < 0.01
     assert log_likelihood(cut, prediction) > 1
@@ -212,7 +214,7 @@ def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
     share = [one.share[-1] for one in spindles]
     assert np.median(share) >= 0.93
     assert np.quantile(share, 0.1) >= 0.82
-    assert np.mean([sum(cut.chatters for cut in one.cuts) for one in spindles]) <= 2.5
+    assert np.mean([sum(cut.has_chatter for cut in one.cuts) for one in spindles]) <= 2.5
     for names in (["tangential"], ["frequency_x", "frequency_y"]):
         held = [
             one.learnt.intervals[name].low <= one.ratios[name] <= one.learnt.intervals[name].high

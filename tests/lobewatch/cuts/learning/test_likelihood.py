@@ -10,11 +10,17 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from lobes import Cut, stability_boundary, zero_order
+from lobes import Cut, stability_boundary, zero_order_lobes
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood, misheard, most_likely, predict_cut
-from lobewatch.cuts.learning.posterior import prior
-from lobewatch.cuts.learning.priors import Draws
+from lobewatch.cuts.learning.cut_likelihood import (
+    CutPrediction,
+    log_likelihood,
+    max_log_likelihood,
+    mislabel_probability,
+    predict_cut,
+)
+from lobewatch.cuts.learning.posterior import build_prior
+from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
 
 TEETH = 800.0
@@ -33,9 +39,9 @@ def log_of(cut: CutEvidence, prediction: CutPrediction) -> float:
     return float(log_likelihood(cut, prediction)[0])
 
 
-def middle(mill: Mill) -> Draws:
+def middle(mill: Mill) -> SpindleSamples:
     """One spindle in the middle of the prior."""
-    draws = mill.prior.draws[:1]
+    draws = mill.prior.samples[:1]
     draws.normal[:] = 0.0
     return draws
 
@@ -43,9 +49,9 @@ def middle(mill: Mill) -> Draws:
 @pytest.mark.parametrize("depth", [0.9, 0.95, 1.0, 1.03, 1.1])
 def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_words_that_are_wrong(depth: float) -> None:
     """3 %, of chatter without a frequency 6 %."""
-    chance = predicted(0.0, 0.0, math.log(depth)).chance[0]
+    chance = predicted(0.0, 0.0, math.log(depth)).label_probability[0]
     assert chance == pytest.approx(0.03 + 0.94 * ndtr(math.log(depth) / 0.05))
-    stable = replace(CHATTER, word="stable", frequency=math.nan)
+    stable = replace(CHATTER, verdict="stable", frequency=math.nan)
     assert log_of(stable, predicted(0.0, 0.0, math.log(depth))) == pytest.approx(math.log(1 - chance))
     untold = replace(CHATTER, frequency=math.nan)
     wrong_or_right = 0.06 + 0.88 * ndtr(math.log(depth) / 0.05)
@@ -56,20 +62,20 @@ def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_words_t
 def test_the_same_cut_made_twice_has_one_truth(depth: float) -> None:
     """Of two words that differ one is wrong, however near the limit: stable with 3 %, or chatter untold with 6 %."""
     prediction = predicted(0.0, 0.0, math.log(depth))
-    chatter, stable = replace(CHATTER, frequency=math.nan), replace(CHATTER, word="stable", frequency=math.nan)
+    chatter, stable = replace(CHATTER, frequency=math.nan), replace(CHATTER, verdict="stable", frequency=math.nan)
     chance = ndtr(math.log(depth) / 0.05)
     differ = log_of(chatter, prediction) + float(log_likelihood(stable, prediction, [chatter])[0])
     chatters, quiet = chance * 0.94 * 0.03, (1 - chance) * 0.06 * 0.97
     assert differ == pytest.approx(math.log(chatters + quiet))
     alike = log_of(chatter, prediction) + float(log_likelihood(chatter, prediction, [chatter])[0])
     assert alike == pytest.approx(math.log(chance * 0.94**2 + (1 - chance) * 0.06**2))
-    assert misheard(chatter, prediction, [stable])[0] == pytest.approx(quiet / (chatters + quiet))
-    assert misheard(stable, prediction, [chatter])[0] == pytest.approx(chatters / (chatters + quiet))
+    assert mislabel_probability(chatter, prediction, [stable])[0] == pytest.approx(quiet / (chatters + quiet))
+    assert mislabel_probability(stable, prediction, [chatter])[0] == pytest.approx(chatters / (chatters + quiet))
 
 
 def test_a_cut_is_another_one_again_at_its_speed_and_depth_in_its_material() -> None:
-    again = replace(CHATTER, speed_rpm=12000 * 1.0015, depth=3e-3 * 1.008, word="stable", frequency=math.nan)
-    assert CHATTER.is_again(again)
+    again = replace(CHATTER, speed_rpm=12000 * 1.0015, depth=3e-3 * 1.008, verdict="stable", frequency=math.nan)
+    assert CHATTER.is_repeat_of(again)
     others: list[dict[str, Any]] = [
         {"speed_rpm": 12030.0},
         {"depth": 3.05e-3},
@@ -77,7 +83,7 @@ def test_a_cut_is_another_one_again_at_its_speed_and_depth_in_its_material() -> 
         {"cut": replace(SLOT, immersion=0.5)},
     ]
     for other in others:
-        assert not CHATTER.is_again(replace(again, **other))
+        assert not CHATTER.is_repeat_of(replace(again, **other))
 
 
 def test_a_frequency_far_from_both_says_nothing_in_5_percent_and_one_that_is_met_speaks_for_the_spindle() -> None:
@@ -105,12 +111,12 @@ def test_a_frequency_that_is_not_predicted_speaks_neither_for_nor_against_a_spin
 
 
 def test_period_two_is_told_from_other_chatter_in_nine_of_ten() -> None:
-    flip = replace(CHATTER, word="flip", frequency=math.nan)
+    flip = replace(CHATTER, verdict="flip", frequency=math.nan)
     for cut, base in ((CHATTER, 150.0), (flip, TEETH / 2)):
-        is_flip = cut.word == "flip"
+        is_flip = cut.verdict == "flip"
         alike, unlike = (log_of(cut, predicted(base, base, flip=kind)) for kind in (is_flip, not is_flip))
         assert alike - unlike == pytest.approx(math.log(0.9 / 0.1))
-        assert most_likely(cut) == pytest.approx(alike)
+        assert max_log_likelihood(cut) == pytest.approx(alike)
     wide = 0.01 * TEETH
     far = predicted(TEETH / 2 - 2 * wide, math.nan, flip=True)
     peak = TEETH / 2 * math.sqrt(2 / math.pi) / wide * math.exp(-2)
@@ -118,8 +124,8 @@ def test_period_two_is_told_from_other_chatter_in_nine_of_ten() -> None:
 
 
 def test_what_was_not_told_is_as_likely_as_can_be_where_a_cut_chatters() -> None:
-    assert most_likely(replace(CHATTER, frequency=math.nan)) == 0.0
-    assert most_likely(replace(CHATTER, word="stable", frequency=math.nan)) == 0.0
+    assert max_log_likelihood(replace(CHATTER, frequency=math.nan)) == 0.0
+    assert max_log_likelihood(replace(CHATTER, verdict="stable", frequency=math.nan)) == 0.0
 
 
 def test_a_stable_spindle_is_as_likely_to_be_taken_for_chatter_of_any_sound() -> None:
@@ -128,15 +134,15 @@ def test_a_stable_spindle_is_as_likely_to_be_taken_for_chatter_of_any_sound() ->
         quiet = predicted(base, base, excess=-5.0)
         assert log_of(CHATTER, quiet) == pytest.approx(math.log(0.03 / 2))
         assert log_of(replace(CHATTER, frequency=math.nan), quiet) == pytest.approx(math.log(0.06))
-        assert misheard(CHATTER, quiet)[0] == pytest.approx(1.0)
+        assert mislabel_probability(CHATTER, quiet)[0] == pytest.approx(1.0)
 
 
 def test_a_word_is_wrong_with_3_percent_where_either_is_as_likely_and_chatter_without_a_frequency_with_6() -> None:
     at_limit, untold = predicted(150.0, 150.0, excess=0.0), replace(CHATTER, frequency=math.nan)
-    stable = replace(untold, word="stable")
-    assert misheard(untold, at_limit)[0] == pytest.approx(0.06)
-    assert misheard(stable, at_limit)[0] == pytest.approx(0.03)
-    assert misheard(stable, predicted(150.0, 150.0, excess=0.05))[0] == pytest.approx(
+    stable = replace(untold, verdict="stable")
+    assert mislabel_probability(untold, at_limit)[0] == pytest.approx(0.06)
+    assert mislabel_probability(stable, at_limit)[0] == pytest.approx(0.03)
+    assert mislabel_probability(stable, predicted(150.0, 150.0, excess=0.05))[0] == pytest.approx(
         0.03 * ndtr(1.0) / (0.03 * ndtr(1.0) + 0.97 * ndtr(-1.0))
     )
 
@@ -144,7 +150,7 @@ def test_a_word_is_wrong_with_3_percent_where_either_is_as_likely_and_chatter_wi
 def test_of_several_directions_of_feed_the_worst_counts() -> None:
     mill = Mill(cut=replace(SLOT, immersion=0.3))
     limits = {
-        angle: zero_order([mill.x], [mill.y], replace(mill.cut, feed_angle=angle), [9000.0]).depth[0]
+        angle: zero_order_lobes([mill.x], [mill.y], replace(mill.cut, feed_angle=angle), [9000.0]).depth[0]
         for angle in (0.0, 0.7, np.pi / 2)
     }
     cut = CutEvidence(mill.cut, 9000, 1e-3, "stable")
@@ -155,7 +161,7 @@ def test_of_several_directions_of_feed_the_worst_counts() -> None:
 
 
 def test_a_speed_that_was_not_found_is_as_far_off_as_the_doubt_of_the_machine_says(mill: Mill) -> None:
-    draws = mill.prior.draws[:5]
+    draws = mill.prior.samples[:5]
     draws.normal[:] = 0.0
     cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")
     found, commanded = (predict_cut(replace(cut, speed_found=sure), draws).excess for sure in (True, False))
@@ -170,7 +176,7 @@ def test_an_old_cut_was_made_with_a_frequency_that_was_higher(mill: Mill) -> Non
     """As of a spindle whose modes are 3 % higher."""
     stiff = Mill(x=mill.x.scaled(1.03, 1.0, ""), y=mill.y.scaled(1.03, 1.0, ""))
     cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")
-    old = predict_cut(replace(cut, moved=1.03), middle(mill)).excess[0]
+    old = predict_cut(replace(cut, frequency_ratio=1.03), middle(mill)).excess[0]
     assert old == pytest.approx(predict_cut(cut, middle(stiff)).excess[0], abs=1e-9)
     assert old != pytest.approx(predict_cut(cut, middle(mill)).excess[0], abs=1e-3)
 
@@ -187,7 +193,7 @@ def test_by_semi_discretisation_kind_and_frequency_are_those_of_the_boundary() -
     """A slender cut in a flip lobe and in a Hopf lobe, at its limit."""
     cut = Cut(2, 0.1, "down", 1.4e9 / 1.1, 5e8 / 1.1)
     mill = Mill(cut=cut, y=Mill().x)
-    draws = prior(mill.middle, doubt(), 2).draws[:1]
+    draws = build_prior(mill.middle, doubt(), 2).samples[:1]
     draws.normal[:] = 0.0
     ratios = {name: float(values[0]) for name, values in draws.ratios().items()}
     mode = mill.x.scaled(ratios["frequency_x"], ratios["stiffness_x"], "")
@@ -203,9 +209,9 @@ def test_by_semi_discretisation_kind_and_frequency_are_those_of_the_boundary() -
             continue
         teeth = 2 * speed / 60
         prediction = predict_cut(CutEvidence(cut, speed, 1.001 * depth, "chatter", chatter), draws)
-        kinds.add(bool(prediction.flip[0]))
-        assert prediction.flip[0] == (str(kind) == "flip")
+        kinds.add(bool(prediction.is_flip[0]))
+        assert prediction.is_flip[0] == (str(kind) == "flip")
         assert prediction.excess[0] == pytest.approx(0.0, abs=0.05)
         folded = min(chatter % teeth, teeth - chatter % teeth)
-        assert prediction.base[0] == pytest.approx(folded, abs=0.01 * teeth)
+        assert prediction.frequency[0] == pytest.approx(folded, abs=0.01 * teeth)
     assert kinds == {True, False}

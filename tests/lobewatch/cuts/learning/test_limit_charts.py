@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobes import zero_order
+from lobes import zero_order_lobes
+from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, floor_depth
-from lobewatch.cuts.learning.limit_charts import LimitCharts
-from lobewatch.cuts.listening.fold_frequency import fold_frequency
+from lobewatch.cuts.learning.expected_gain import CutGrid, LimitCharts, floor_depth
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 Floats = NDArray[np.float64]
@@ -24,7 +23,7 @@ def charts(limits_mm: Floats, frequencies: Floats | None = None) -> LimitCharts:
     """Limits of some spindles (r, s) as a chart; typical natural frequency 1000 Hz."""
     limits = np.asarray(limits_mm) / 1e3
     speeds = SPEEDS[: limits.shape[1]]
-    grid = Grid(SLOT, (0.0,), speeds, np.full(speeds.shape, 0.02), np.ones(speeds.shape))
+    grid = CutGrid(SLOT, (0.0,), speeds, np.full(speeds.shape, 0.02), np.ones(speeds.shape))
     order = np.argsort(-limits, axis=0, kind="stable")
     floored = np.vectorize(floor_depth)(np.take_along_axis(limits, order, axis=0))
     heard = np.zeros(limits.shape) if frequencies is None else frequencies
@@ -49,46 +48,46 @@ def test_the_gain_at_a_speed_is_that_of_the_best_depth_more_likely_stable_than_n
     random = np.random.default_rng(3)
     chart = charts(random.uniform(0.5, 4.0, (41, 5)))
     for weights in (np.full(41, 1 / 41), random.dirichlet(np.full(41, 0.3))):
-        assert chart.gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
+        assert chart.expected_gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
 
 
 def test_the_best_so_far_may_differ_from_spindle_to_spindle() -> None:
     random = np.random.default_rng(4)
     chart, best = charts(random.uniform(0.5, 4.0, (41, 5))), random.choice([0.0, 9.0, 14.0], 41)
     for weights in (np.full(41, 1 / 41), random.dirichlet(np.full(41, 0.3))):
-        assert chart.gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
+        assert chart.expected_gains(weights, best) == pytest.approx(counted_gains(chart, weights, best))
 
 
 def test_the_best_so_far_is_that_of_cuts_whose_word_a_spindle_does_not_contradict() -> None:
     chart = charts(np.array([[1.0, 2.0], [2.0, 2.0], [2.15, 2.0]]))
     deep = CutEvidence(SLOT, 6010.0, 2.3e-3, "stable")
     shallow = replace(deep, depth=1.2e-3, speed_rpm=9000.0)
-    assert chart.contradicts(deep).tolist() == [True, True, False]  # 2.3 mm is 7 % beyond 2.15
-    assert chart.truly_best([deep, shallow]) == pytest.approx([10.8, 10.8, 6010.0 * 2.3e-3])
-    chatter = replace(deep, word="chatter", depth=1.9e-3)
-    assert chart.contradicts(chatter).tolist() == [False, False, True]
-    assert chart.truly_best([chatter]).tolist() == [0.0, 0.0, 0.0]
+    assert chart.is_label_wrong(deep).tolist() == [True, True, False]  # 2.3 mm is 7 % beyond 2.15
+    assert chart.true_best_rates([deep, shallow]) == pytest.approx([10.8, 10.8, 6010.0 * 2.3e-3])
+    chatter = replace(deep, verdict="chatter", depth=1.9e-3)
+    assert chart.is_label_wrong(chatter).tolist() == [False, False, True]
+    assert chart.true_best_rates([chatter]).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_the_last_cut_is_worth_its_gain_times_its_chance() -> None:
     chart = charts(np.array([[1.0], [2.0], [3.0], [4.0]]))
-    assert chart.worth(0, 2e-3, 9.0, 1) == pytest.approx(0.75 * (12.0 - 9.0))
-    assert chart.worth(0, 2e-3, 13.0, 1) == 0.0
-    assert chart.worth(0, 3e-3, 0.0, 1) == 0.0
-    assert chart.worth(0, 3e-3, 0.0, 2) == 0.0
+    assert chart.expected_worth(0, 2e-3, 9.0, 1) == pytest.approx(0.75 * (12.0 - 9.0))
+    assert chart.expected_worth(0, 2e-3, 13.0, 1) == 0.0
+    assert chart.expected_worth(0, 3e-3, 0.0, 1) == 0.0
+    assert chart.expected_worth(0, 3e-3, 0.0, 2) == 0.0
 
 
 def test_before_another_cut_it_is_worth_what_the_next_one_gains_besides() -> None:
     """Stable leaves the spindles of 2 to 4 mm, chatter those of 1 and 1.5 mm, of which both have one frequency."""
     chart = charts(np.array([[1.0], [1.5], [2.0], [2.0], [3.0], [4.0]]), np.full((6, 1), 80.0))
-    stable = chart.worth(0, 2e-3, 3.0, 2)
+    stable = chart.expected_worth(0, 2e-3, 3.0, 2)
     after_stable = 4 / 6 * max(4 / 4 * (12 - 12), 2 / 4 * 0)
     after_chatter = 2 / 6 * max(2 / 2 * (6 - 3), 0)
     assert stable == pytest.approx(4 / 6 * (12 - 3) + after_stable + after_chatter)
     deeper = charts(np.array([[1.0], [2.0], [3.0], [3.0], [4.0]]), np.full((5, 1), 80.0))
     after_stable = 4 / 5 * 3 / 4 * (18 - 12)
-    assert deeper.worth(0, 2e-3, 3.0, 2) == pytest.approx(4 / 5 * (12 - 3) + after_stable + 1 / 5 * (6 - 3))
-    shallow = deeper.worth(0, 2e-3, 13.0, 2)
+    assert deeper.expected_worth(0, 2e-3, 3.0, 2) == pytest.approx(4 / 5 * (12 - 3) + after_stable + 1 / 5 * (6 - 3))
+    shallow = deeper.expected_worth(0, 2e-3, 13.0, 2)
     assert shallow == pytest.approx(4 / 5 * 3 / 4 * (18 - 13))
 
 
@@ -105,7 +104,7 @@ def test_chatter_teaches_by_its_frequency_within_1_5_percent_of_a_natural_one() 
         high = max(9000 * 4e-3, shares[0] * 9000 * 8e-3 if shares[0] > 0.5 else 0.0)
         after_chatter = 4 / 10 * (low + high) / 2
         after_stable = 0.0
-        worth = charts(limits, heard).worth(0, 9e-3, 0.0, 2)
+        worth = charts(limits, heard).expected_worth(0, 9e-3, 0.0, 2)
         assert worth == pytest.approx(6 / 10 * 6000 * 9e-3 + after_stable + after_chatter), off
 
 
@@ -121,19 +120,19 @@ def test_candidates_are_the_best_speeds_apart_by_2_percent_and_depths_likely_sta
 
 def test_no_more_than_eight_speeds_are_looked_at() -> None:
     mill = Mill()
-    places = {place for place, _ in LimitCharts.of(mill.prior.sample(50), mill.grid).candidates(0.0)}
+    places = {place for place, _ in LimitCharts.of(mill.prior.draw(50), mill.grid).candidates(0.0)}
     assert len(places) == 8
     speeds = np.sort(mill.grid.speeds[list(places)])
     assert np.min(np.diff(np.log(speeds))) > 0.02
 
 
 def test_a_chart_is_that_of_zero_order_corrected_and_as_deep_as_is_allowed(mill: Mill) -> None:
-    draws = mill.prior.draws[:3]
+    draws = mill.prior.samples[:3]
     draws.normal[:] = 0.0
     draws.normal[1, :2] = 1.5
     speeds = np.array([6000.0, 8000.0, 12000.0, 16000.0])
     deepest, trust = np.array([0.02, 0.02, 0.02, 0.0013]), np.array([1.0, 0.7, 1.3, 1.0])
-    grid = Grid(mill.cut, (0.0, np.pi / 2), speeds, deepest, trust)
+    grid = CutGrid(mill.cut, (0.0, np.pi / 2), speeds, deepest, trust)
     chart = LimitCharts.of(draws, grid)
     ratios = draws.ratios()
     for number in range(3):
@@ -147,15 +146,15 @@ def test_a_chart_is_that_of_zero_order_corrected_and_as_deep_as_is_allowed(mill:
         )
         radial = 1.1 * ratios["ratio"][number] * mill.cut.radial
         pushed = replace(mill.cut, tangential=1.1 * mill.cut.tangential, radial=radial)
-        lobes = [zero_order([x], [y], replace(pushed, feed_angle=angle), speeds) for angle in grid.feed_angles]
+        lobes = [zero_order_lobes([x], [y], replace(pushed, feed_angle=angle), speeds) for angle in grid.feed_angles]
         limit = np.minimum(np.min([part.depth for part in lobes], axis=0) * trust, deepest)
         assert chart.limits[number] == pytest.approx(limit, rel=0.01)
         worst = np.argmin([part.depth for part in lobes], axis=0)
         chatter = np.array([part.chatter_frequency for part in lobes])[worst, np.arange(4)]
         folded = fold_frequency(chatter, 4 * speeds / 60)
         assert chart.frequencies[number, :3] == pytest.approx(folded[:3], abs=5.0)
-    assert np.all(np.diff(np.take_along_axis(chart.limits, chart.order, axis=0), axis=0) <= 0)
+    assert np.all(np.diff(np.take_along_axis(chart.limits, chart.depth_order, axis=0), axis=0) <= 0)
     depths = np.sort([[floor_depth(limit) for limit in row] for row in chart.limits], axis=0)[::-1]
-    assert chart.chips == pytest.approx(speeds * depths)
+    assert chart.removal_rates == pytest.approx(speeds * depths)
     middle = np.mean([ratios["frequency_x"] * mill.x.frequency, ratios["frequency_y"] * mill.y.frequency])
-    assert chart.typical == pytest.approx(middle)
+    assert chart.typical_frequency == pytest.approx(middle)

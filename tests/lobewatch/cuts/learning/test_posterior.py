@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 
 from lobes import Cut, stability_boundary
-from lobewatch.cuts.learning.contradicting import Contradiction, contradictions
+from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import MISJUDGED, UNTOLD, log_likelihood, most_likely, predict_cut
-from lobewatch.cuts.learning.posterior import Posterior, prior
-from lobewatch.cuts.listening.fold_frequency import fold_frequency
-from lobewatch.machine.journal.heard_cut import CutWord
+from lobewatch.cuts.learning.cut_likelihood import (
+    MISLABELED_SHARE,
+    UNPITCHED_MISLABELED_SHARE,
+    log_likelihood,
+    max_log_likelihood,
+    predict_cut,
+)
+from lobewatch.cuts.learning.label_check import Contradiction, find_inconsistent_cuts
+from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.machine.journal.cut_entry import CutVerdict
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill, doubt
 
@@ -22,7 +28,7 @@ TEETH = 800.0
 
 
 def likelihood(cut: CutEvidence, learnt: Posterior) -> np.ndarray:
-    return np.exp(log_likelihood(cut, predict_cut(cut, learnt.draws)))
+    return np.exp(log_likelihood(cut, predict_cut(cut, learnt.samples)))
 
 
 def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
@@ -32,24 +38,24 @@ def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
     assert (intervals["damping_x"].mean, intervals["damping_x"].std) == pytest.approx((1.1, 0.275), rel=0.08)
     assert (intervals["stiffness_y"].mean, intervals["stiffness_y"].std) == pytest.approx((1.0, 0.10), rel=0.08)
     assert (intervals["tangential"].mean, intervals["tangential"].std) == pytest.approx((1.1, 0.355), rel=0.09)
-    draws = mill.prior.draws.ratios()
+    draws = mill.prior.samples.ratios()
     assert abs(np.corrcoef(draws["frequency_x"], draws["frequency_y"])[0, 1]) < 0.1
 
 
 def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_misheard(mill: Mill) -> None:
     stable, chatters = (CutEvidence(mill.cut, 12000, 1e-5, word) for word in ("stable", "chatter"))
-    assert likelihood(stable, mill.prior) == pytest.approx(1 - MISJUDGED)
-    assert likelihood(chatters, mill.prior) == pytest.approx(UNTOLD)
+    assert likelihood(stable, mill.prior) == pytest.approx(1 - MISLABELED_SHARE)
+    assert likelihood(chatters, mill.prior) == pytest.approx(UNPITCHED_MISLABELED_SHARE)
     deep = replace(chatters, depth=0.05)
-    assert likelihood(deep, mill.prior) == pytest.approx(1 - UNTOLD)
+    assert likelihood(deep, mill.prior) == pytest.approx(1 - UNPITCHED_MISLABELED_SHARE)
 
 
 @pytest.mark.parametrize(
     ("word", "frequency"), [("chatter", 1450.0), ("chatter", np.nan), ("flip", np.nan), ("stable", np.nan)]
 )
-def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutWord, frequency: float) -> None:
+def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutVerdict, frequency: float) -> None:
     cut = CutEvidence(mill.cut, 12000, 1e-5 if word == "stable" else 0.05, word, frequency)
-    most, likelihoods = most_likely(cut), np.log(likelihood(cut, mill.prior))
+    most, likelihoods = max_log_likelihood(cut), np.log(likelihood(cut, mill.prior))
     assert np.max(likelihoods) <= most
     if word != "flip":
         assert np.max(likelihoods) == pytest.approx(most, abs=0.75)
@@ -58,7 +64,7 @@ def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutWord
 @pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(2, 1.0, "down", 1.4e9, 5e8)])
 def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
     mill = Mill(cut=cut)
-    middle = mill.prior.draws[:1]
+    middle = mill.prior.samples[:1]
     middle.normal[:] = 0.0
     ratios = middle.ratios()
     x, y = (
@@ -72,7 +78,9 @@ def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
     pushed = replace(cut, tangential=1.1 * cut.tangential, radial=1.1 * cut.radial)
     limit = stability_boundary([x], [y], pushed, [12000.0], 0.02).depth[0]
     shares = (0.8, 1.0, 1.25)
-    chances = [predict_cut(CutEvidence(cut, 12000, limit * share, "stable"), middle).chance[0] for share in shares]
+    chances = [
+        predict_cut(CutEvidence(cut, 12000, limit * share, "stable"), middle).label_probability[0] for share in shares
+    ]
     assert chances[0] < 0.05
     assert 0.4 < chances[1] < 0.6
     assert chances[2] > 0.95
@@ -80,12 +88,12 @@ def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
 
 def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_teeth(mill: Mill) -> None:
     cut = mill.hear(12000, 4e-3)
-    assert cut.chatters
+    assert cut.has_chatter
     assert cut.tooth_frequency == TEETH
-    middle = mill.prior.draws[:1]
+    middle = mill.prior.samples[:1]
     middle.normal[:] = 0.0
     prediction = predict_cut(cut, middle)
-    assert fold_frequency(cut.frequency, TEETH) == pytest.approx(prediction.base[0], abs=0.01 * cut.frequency)
+    assert fold_frequency(cut.frequency, TEETH) == pytest.approx(prediction.frequency[0], abs=0.01 * cut.frequency)
     heard, alias, beside = (
         log_likelihood(replace(cut, frequency=cut.frequency + off), prediction)[0] for off in (0, TEETH, 60)
     )
@@ -99,7 +107,7 @@ def test_a_deep_stable_cut_lowers_kt_and_chatter_in_a_shallow_one_raises_it(mill
     chatter = mill.prior.learn_from(CutEvidence(mill.cut, 12000, 0.8e-3, "chatter"))
     assert stable.intervals["tangential"].mean < 0.85 * before
     assert chatter.intervals["tangential"].mean > 1.05 * before
-    assert stable.frequencies == chatter.frequencies == 0
+    assert stable.n_frequencies == chatter.n_frequencies == 0
 
 
 def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
@@ -107,7 +115,7 @@ def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
     learnt = mill.prior
     for speed, depth in ((9500, 3e-3), (11000, 3e-3), (13500, 3e-3)):
         learnt = learnt.learn_from(mill.hear(speed, depth))
-    assert learnt.frequencies == 3
+    assert learnt.n_frequencies == 3
     found = learnt.intervals["frequency_y"]
     assert found.low < 0.945 < found.high < 0.985
     assert found.std < 0.6 * mill.prior.intervals["frequency_y"].std
@@ -118,20 +126,20 @@ def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() 
     mill = Mill(frequency=(0.985, 0.905))
     learnt = mill.prior.learn_from(mill.chatter(11000))
     assert learnt.intervals["frequency_y"].low < 0.92
-    assert not learnt.is_far_off
+    assert not learnt.is_frequency_unusual
     for speed in (12000, 13500):
         learnt = learnt.learn_from(mill.chatter(speed))
     assert learnt.intervals["frequency_y"].high < 0.945
-    assert learnt.is_far_off
+    assert learnt.is_frequency_unusual
 
 
 def test_old_cuts_are_of_a_frequency_that_has_fallen_since(mill: Mill) -> None:
     now = then = mill.prior
     for speed in (9500, 13500):
         cut = mill.chatter(speed)
-        now, then = now.learn_from(cut), then.learn_from(replace(cut, moved=1.02))
+        now, then = now.learn_from(cut), then.learn_from(replace(cut, frequency_ratio=1.02))
     assert then.intervals["frequency_y"].mean < now.intervals["frequency_y"].mean - 0.004
-    assert [replace(cut, moved=moved).weight for moved in (1.0, 0.98, 1.05)] == pytest.approx(
+    assert [replace(cut, frequency_ratio=moved).weight for moved in (1.0, 0.98, 1.05)] == pytest.approx(
         [1, 0.607, 0.044], abs=1e-3
     )
 
@@ -148,50 +156,52 @@ def test_another_material_teaches_the_spindle_but_not_the_force_of_this_one() ->
 def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
     cuts = [replace(mill.hear(9500, 3e-3), material=1), mill.hear(13500, 3e-3)]
     learnt = mill.learnt_from(cuts)
-    assert (learnt.cuts, contradictions(learnt)) == (tuple(cuts), ())
+    assert (learnt.cuts, find_inconsistent_cuts(learnt)) == (tuple(cuts), ())
 
 
 def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
     once, again = (mill.learnt_from(cuts) for _ in range(2))
-    assert np.array_equal(once.draws.normal, again.draws.normal)
+    assert np.array_equal(once.samples.normal, again.samples.normal)
     assert np.array_equal(once.log_weight, again.log_weight)
-    assert once.refreshed == 1
-    assert once.size > 100
+    assert once.n_refreshed == 1
+    assert once.effective_size > 100
 
 
 def test_what_contradicts_is_named_and_teaches_nothing(mill: Mill) -> None:
     cuts = [CutEvidence(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
     odd = CutEvidence(mill.cut, 12000, 0.3e-3, "chatter")
     without, learnt = mill.learnt_from(cuts), mill.learnt_from([*cuts, odd])
-    assert [(doubt.cut, doubt.why) for doubt in contradictions(learnt)] == [(odd, Contradiction.CHATTERS)]
+    assert [(doubt.cut, doubt.contradiction) for doubt in find_inconsistent_cuts(learnt)] == [
+        (odd, Contradiction.CHATTERS)
+    ]
     assert learnt.intervals["tangential"].mean == pytest.approx(without.intervals["tangential"].mean, rel=0.01)
     deep = CutEvidence(mill.cut, 8000, 0.03, "stable")
-    assert [doubt.why for doubt in contradictions(without.learn_from(deep))] == [Contradiction.STABLE]
+    assert [doubt.contradiction for doubt in find_inconsistent_cuts(without.learn_from(deep))] == [Contradiction.STABLE]
     cut = mill.hear(20000, 4e-3)
-    assert contradictions(without.learn_from(cut)) == ()
-    elsewhere = contradictions(without.learn_from(replace(cut, frequency=1150.0)))
-    assert [doubt.why for doubt in elsewhere] == [Contradiction.FREQUENCY]
+    assert find_inconsistent_cuts(without.learn_from(cut)) == ()
+    elsewhere = find_inconsistent_cuts(without.learn_from(replace(cut, frequency=1150.0)))
+    assert [doubt.contradiction for doubt in elsewhere] == [Contradiction.FREQUENCY]
 
 
 def weighted(*log_weight: float, cuts: tuple[CutEvidence, ...] = ()) -> Posterior:
     """The first draws of a prior with weights."""
     learnt = Mill().prior
-    return replace(learnt, draws=learnt.draws[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
+    return replace(learnt, samples=learnt.samples[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
 
 
 def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
     learnt = weighted(-2000.0, -2000.0 + np.log(3.0))
     assert learnt.weights == pytest.approx([0.25, 0.75])
-    assert learnt.size == pytest.approx(1 / (0.25**2 + 0.75**2))
+    assert learnt.effective_size == pytest.approx(1 / (0.25**2 + 0.75**2))
 
 
 def test_intervals_hold_95_percent_of_the_weight() -> None:
     """Of 700 draws of which half have ten times the weight, against the weighted distribution itself."""
     log_weight = np.where(np.arange(700) % 2 == 0, 0.0, np.log(10.0))
     learnt = replace(Mill().prior, log_weight=log_weight)
-    values, interval = learnt.draws.ratios()["tangential"], learnt.intervals["tangential"]
+    values, interval = learnt.samples.ratios()["tangential"], learnt.intervals["tangential"]
     assert np.sum(learnt.weights[values < interval.low]) == pytest.approx(0.025, abs=0.003)
     assert np.sum(learnt.weights[values > interval.high]) == pytest.approx(0.025, abs=0.003)
     assert interval.mean == pytest.approx(np.sum(learnt.weights * values))
@@ -200,15 +210,15 @@ def test_intervals_hold_95_percent_of_the_weight() -> None:
 
 def test_frequencies_stay_open_until_chatter_was_heard_twice(mill: Mill) -> None:
     chatter = CutEvidence(mill.cut, 12000, 3e-3, "chatter", 1450.0)
-    stable, untold = replace(chatter, word="stable"), replace(chatter, frequency=np.nan)
+    stable, untold = replace(chatter, verdict="stable"), replace(chatter, frequency=np.nan)
     for cuts, is_open in (((chatter, stable, untold), True), ((chatter, chatter), False), ((), True)):
         intervals = weighted(*[0.0] * 5, *[-50.0] * 100, cuts=cuts).intervals
         for side in "xy":
             interval = intervals[f"frequency_{side}"]
             assert (interval.low <= 0.90 and interval.high >= 1.05) is is_open
         assert intervals["stiffness_x"].high < 1.3
-    flip = replace(untold, word="flip")
-    assert weighted(0.0, 0.0, cuts=(flip, flip)).frequencies == 2
+    flip = replace(untold, verdict="flip")
+    assert weighted(0.0, 0.0, cuts=(flip, flip)).n_frequencies == 2
 
 
 @pytest.mark.parametrize(("off", "share", "is_far"), [
@@ -221,38 +231,40 @@ def test_a_spindle_is_far_off_where_more_than_half_of_the_weight_is_outside_of_9
     values = np.linspace(-6, 6, 4001)
     for column in (0, 1):
         learnt = mill.prior
-        draws = learnt.draws[np.zeros(4001, dtype=np.intp)]
+        draws = learnt.samples[np.zeros(4001, dtype=np.intp)]
         draws.normal[:] = 0.0
         draws.normal[:, column] = values
         frequency = draws.ratios()["frequency_x" if column == 0 else "frequency_y"]
         place = int(np.argmin(np.abs(frequency - off)))
         both = draws[np.array([place, 2000])]
         log_weight = np.log([share, 1 - share])
-        assert replace(learnt, draws=both, log_weight=log_weight, cuts=(chatter, chatter)).is_far_off is is_far
-        assert not replace(learnt, draws=both, log_weight=log_weight, cuts=(chatter,)).is_far_off
+        assert (
+            replace(learnt, samples=both, log_weight=log_weight, cuts=(chatter, chatter)).is_frequency_unusual is is_far
+        )
+        assert not replace(learnt, samples=both, log_weight=log_weight, cuts=(chatter,)).is_frequency_unusual
 
 
 def test_draws_that_are_ruled_out_are_not_looked_at_any_more(mill: Mill) -> None:
     learnt = weighted(0.0, np.log(1.3e-6), np.log(0.7e-6), -1.0)
     evidence = learnt.predict(CutEvidence(mill.cut, 12000, 2e-3, "stable"))
-    assert len(evidence.before.draws) == len(evidence.prediction.excess) == 3
-    assert evidence.before.log_weight.tolist() == [0.0, np.log(1.3e-6), -1.0]
+    assert len(evidence.prior.samples) == len(evidence.prediction.excess) == 3
+    assert evidence.prior.log_weight.tolist() == [0.0, np.log(1.3e-6), -1.0]
 
 
 def test_a_cut_weighs_draws_by_its_likelihood_and_an_old_one_less(mill: Mill) -> None:
     cut = CutEvidence(mill.cut, 12000, 1.2e-3, "stable")
     for moved in (1.0, 1.03):
-        evidence = mill.prior.predict(replace(cut, moved=moved))
-        learnt = evidence.learn()
+        evidence = mill.prior.predict(replace(cut, frequency_ratio=moved))
+        learnt = evidence.update()
         weight = np.exp(-(((moved - 1) / 0.02) ** 2) / 2)
-        assert learnt.log_weight == pytest.approx(weight * np.log(1 - evidence.prediction.chance))
-        assert (learnt.cuts, learnt.refreshed) == ((evidence.cut,), 0)
+        assert learnt.log_weight == pytest.approx(weight * np.log(1 - evidence.prediction.label_probability))
+        assert (learnt.cuts, learnt.n_refreshed) == ((evidence.cut,), 0)
 
 
 def test_samples_are_drawn_as_often_as_their_weight_says_but_for_one() -> None:
     learnt = weighted(*np.log([0.5, 0.25, 0.2, 0.05]))
-    sample = learnt.sample(40)
-    counts = [int(np.sum(np.all(sample.normal == normal, axis=1))) for normal in learnt.draws.normal]
+    sample = learnt.draw(40)
+    counts = [int(np.sum(np.all(sample.normal == normal, axis=1))) for normal in learnt.samples.normal]
     assert sum(counts) == 40
     assert np.abs(np.array(counts) - [20, 10, 8, 2]).max() <= 1
 
@@ -261,14 +273,14 @@ def test_draws_that_are_made_anew_are_those_of_prior_and_likelihood() -> None:
     """Against 12 000 draws that are only weighted: mean and spread of what three cuts have taught."""
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
-    few, many = mill.prior, prior(mill.middle, doubt(), 12000, seed=1)
+    few, many = mill.prior, build_prior(mill.middle, doubt(), 12000, seed=1)
     for cut in cuts:
         few = few.learn_from(cut)
-        many = replace(many, log_weight=many.log_weight + log_likelihood(cut, predict_cut(cut, many.draws)))
-    assert few.refreshed >= 1
-    assert len(few.draws) == 500
+        many = replace(many, log_weight=many.log_weight + log_likelihood(cut, predict_cut(cut, many.samples)))
+    assert few.n_refreshed >= 1
+    assert len(few.samples) == 500
     many = replace(many, cuts=few.cuts)
-    assert many.size > 300
+    assert many.effective_size > 300
     for name, interval in few.intervals.items():
         weighted_only = many.intervals[name]
         assert interval.mean == pytest.approx(weighted_only.mean, abs=0.3 * weighted_only.std), name

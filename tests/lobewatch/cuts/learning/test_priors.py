@@ -8,24 +8,24 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from lobes import milling_system, rows_of
-from lobewatch.cuts.learning.posterior import prior
-from lobewatch.cuts.learning.priors import Draws
-from lobewatch.verdicts.doubt import Doubt, Span
+from lobes import build_milling_system, rows_at_speeds
+from lobewatch.cuts.learning.posterior import build_prior
+from lobewatch.cuts.learning.prior_samples import SpindleSamples
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
 
-KR_OVER_KT = Span(0.5, 1.1)
+KR_OVER_KT = FactorRange(0.5, 1.1)
 
 
-def draws(*rows: dict[int, float], ratio: Span = KR_OVER_KT) -> Draws:
+def draws(*rows: dict[int, float], ratio: FactorRange = KR_OVER_KT) -> SpindleSamples:
     """Draws in the middle of the prior, but for some standard deviations of some numbers; ratio: doubt of Kr/Kt."""
-    middle = Mill().prior.draws[: len(rows)]
+    middle = Mill().prior.samples[: len(rows)]
     middle.normal[:] = 0.0
     for number, row in enumerate(rows):
         for place, deviations in row.items():
             middle.normal[number, place] = deviations
-    return replace(middle, doubt=replace(middle.doubt, ratio=ratio))
+    return replace(middle, uncertainty=replace(middle.uncertainty, ratio=ratio))
 
 
 def test_the_middle_of_the_prior_is_a_slower_softer_damped_spindle_and_a_harder_cut() -> None:
@@ -64,9 +64,9 @@ def test_kt_is_drawn_at_speed_and_as_doubted() -> None:
     assert ratios["ratio"][:2] == pytest.approx(ratios["ratio"][[3, 3]])
 
 
-@pytest.mark.parametrize("span", [KR_OVER_KT, Span(-0.2, 0.5), Span(2.0, 4.0), Span(1.0, 1.0)])
+@pytest.mark.parametrize("span", [KR_OVER_KT, FactorRange(-0.2, 0.5), FactorRange(2.0, 4.0), FactorRange(1.0, 1.0)])
 @pytest.mark.parametrize("deviations", [-3.0, -0.7, 0.0, 1.3, 2.5])
-def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: Span, deviations: float) -> None:
+def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: FactorRange, deviations: float) -> None:
     """As many lie below as of the mixture; Kr/Kt of the slot is 5/14."""
     drawn = draws({8: deviations}, ratio=span).ratios()["ratio"][0]
     assert 0 <= drawn <= max(2.8, span.high)
@@ -77,21 +77,23 @@ def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: 
 
 
 def test_without_radial_force_kr_over_kt_stays_as_doubted() -> None:
-    bare = Mill(cut=replace(Mill().cut, radial=0.0)).prior.draws
+    bare = Mill(cut=replace(Mill().cut, radial=0.0)).prior.samples
     ratios = bare.ratios()["ratio"]
     assert np.min(ratios) > 0.8
     assert np.max(ratios) < 1.2
-    assert np.all(bare.rows(9000.0, 1.4e9, 0.0).radial == 0)
+    assert np.all(bare.build_rows(9000.0, 1.4e9, 0.0).radial == 0)
 
 
 def test_each_mode_has_its_own_frequency_and_both_of_a_direction_one_damping() -> None:
     """The mode that gives way most is the first of its direction, wherever it stands."""
     x = [Mode(3100.0, 0.03, 9e7), Mode(1713.0, 0.029, 3.5e7)]
-    middle = rows_of(milling_system(x, [Mode(1400.0, 0.035, 2.5e7)]), Mill().cut, np.ones(1))
-    drawn = prior(middle, Doubt({}, np.zeros((0, 4, 4)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2)), 3).draws
+    middle = rows_at_speeds(build_milling_system(x, [Mode(1400.0, 0.035, 2.5e7)]), Mill().cut, np.ones(1))
+    drawn = build_prior(
+        middle, Uncertainty({}, np.zeros((0, 4, 4)), 0.01, FactorRange(0.8, 1.2), FactorRange(0.8, 1.2)), 3
+    ).samples
     drawn.normal[:] = 0.0
     drawn.normal[0, 0], drawn.normal[1, 1], drawn.normal[2, 3] = -1.0, 1.0, 1.0
-    ratios, rows = drawn.ratios(), drawn.rows(9000.0, 1.4e9, 5e8)
+    ratios, rows = drawn.ratios(), drawn.build_rows(9000.0, 1.4e9, 5e8)
     assert (ratios["frequency_x_2"][0] < 0.985, ratios["frequency_x"][0]) == (True, pytest.approx(0.985))
     assert (ratios["frequency_x"][1] > 0.985, ratios["frequency_x_2"][1]) == (True, pytest.approx(0.985))
     at_rest = 2 * np.pi * np.array([3100.0, 1713.0, 1400.0])
@@ -104,7 +106,7 @@ def test_each_mode_has_its_own_frequency_and_both_of_a_direction_one_damping() -
 def test_rows_cut_with_the_coefficients_of_their_material_and_turn_at_the_speed_asked_for() -> None:
     both = draws({0: 1.0, 4: 1.0}, {5: 1.0}).with_materials(2, 0)
     both.normal[:, 9:] = [[1.0, 0.0, 1.0], [0.0, 0.0, 0.0]]
-    ratios, rows = both.ratios(), both.rows(9000.0, 1.4e9, 5e8)
+    ratios, rows = both.ratios(), both.build_rows(9000.0, 1.4e9, 5e8)
     sides = ["xy"[axis] for axis in rows.axes[rows.direction]]
     assert sorted(sides) == ["x", "y"]
     for column, side in enumerate(sides):
@@ -117,18 +119,18 @@ def test_rows_cut_with_the_coefficients_of_their_material_and_turn_at_the_speed_
     assert rows.tangential == pytest.approx([1.4e9 * 1.1] * 2)
     assert rows.radial == pytest.approx(5e8 * 1.1 * ratios["ratio"])
     wide = draws({8: 1.0}, {}).ratios()["ratio"]
-    steel = both.rows(9000.0, 1.4e9, 5e8, 1)
+    steel = both.build_rows(9000.0, 1.4e9, 5e8, 1)
     assert steel.tangential == pytest.approx([1.4e9 * 1.1 * 1.3, 1.4e9 * 1.1])
     assert steel.radial == pytest.approx([5e8 * 1.1 * 1.3 * wide[0], 5e8 * 1.1 * wide[1]])
 
 
 def test_a_mode_that_is_drawn_still_rings() -> None:
     both = draws({2: 200.0}, {})
-    assert both.rows(9000.0, 1.4e9, 5e8).damping_ratio[0].tolist()[:1] == [0.95]
+    assert both.build_rows(9000.0, 1.4e9, 5e8).damping_ratio[0].tolist()[:1] == [0.95]
 
 
 def test_a_new_material_leaves_what_was_drawn_as_it_is() -> None:
-    known = Mill().prior.draws[:40]
+    known = Mill().prior.samples[:40]
     more = known.with_materials(3, 0)
     assert more.normal.shape == (40, 6 + 3 * 3)
     assert np.array_equal(more.normal[:, :9], known.normal)

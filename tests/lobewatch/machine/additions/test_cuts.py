@@ -19,14 +19,12 @@ from acquisition.files.cut_file import CutSignal, read_cut_signal
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
-from lobewatch.machine.additions.correct import exclude, include
-from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.additions.observe_cut import observe_cut
-from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import verify
-from lobewatch.machine.journal.heard_cut import HeardCut, cut_of_line
-from lobewatch.machine.settings.cut_setting import cut_setting, find_named
-from lobewatch.show.history.describe_cut import untapped_remarks
+from lobewatch.machine.folder_updates import exclude_entry, include_entry, make_observed_cut, store_cut
+from lobewatch.machine.journal.cut_entry import CutEntry, parse_cut_line
+from lobewatch.machine.rebuild_files import rebuild_files
+from lobewatch.machine.settings.requested_cut import find_by_name, find_cut_setting
+from lobewatch.machine.verify_files import verify
+from lobewatch.show.history import untapped_remarks
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -38,9 +36,9 @@ def run(shop: Shop, command: str, *arguments: object) -> Result:
     return CliRunner().invoke(app, [command, str(shop.path), *map(str, arguments)])
 
 
-def heard(shop: Shop, speed: float = 12000.0, depth: float = 2.0) -> HeardCut:
-    setting = cut_setting(shop.folder.machine, "A", speed, depth)
-    return replace(observe_cut(setting, "chatter", 1650.0), by="accelerometer", speed_rpm=speed * 1.004)
+def heard(shop: Shop, speed: float = 12000.0, depth: float = 2.0) -> CutEntry:
+    setting = find_cut_setting(shop.folder.machine, "A", speed, depth)
+    return replace(make_observed_cut(setting, "chatter", 1650.0), by="accelerometer", speed_rpm=speed * 1.004)
 
 
 def signal() -> CutSignal:
@@ -49,9 +47,9 @@ def signal() -> CutSignal:
 
 def test_a_program_is_found_by_how_its_name_begins() -> None:
     tables: dict[str, Any] = {"A": 1, "A: slot": 2, "B: rib": 3, "B: slot": 4}
-    assert [find_named(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
+    assert [find_by_name(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
     with pytest.raises(ValueError, match="'B' may be several: say more of its name; there are 'B: rib', 'B: slot'"):
-        find_named(tables, "B")
+        find_by_name(tables, "B")
 
 
 def test_what_was_heard_stands_in_both_copies_with_all_that_it_is_judged_by(shop: Shop) -> None:
@@ -102,7 +100,7 @@ def test_the_power_of_a_cut_stands_in_its_line_with_the_kt_that_it_says(shop: Sh
 def test_a_line_from_before_there_was_any_power_is_read_as_it_was(shop: Shop) -> None:
     cut = replace(heard(shop), id="c1")
     line = {name: value for name, value in cut.line.items() if name != "power"}
-    assert cut_of_line(line) == cut_of_line(cut.line) == cut
+    assert parse_cut_line(line) == parse_cut_line(cut.line) == cut
 
 
 def test_a_kte_that_is_known_counts_in_its_ratio_to_kt(shop: Shop) -> None:
@@ -110,10 +108,10 @@ def test_a_kte_that_is_known_counts_in_its_ratio_to_kt(shop: Shop) -> None:
     shop.edit("tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed", 'material = "own"\nspeed')
     own = "tangential_n_per_mm2 = 700\nradial_n_per_mm2 = 200\ntangential_edge_n_per_mm = 10"
     shop.edit("[reference_cut]", f'[[material]]\nname = "own"\n{own}\n\n[reference_cut]')
-    setting = cut_setting(
+    setting = find_cut_setting(
         shop.folder.machine, "A", 12000, 1.0, 8 / 7 * 4 * 200 * 1e-3 * 0.02 * (7e4 + 1e4 * np.pi / 2) / 1e3
     )
-    power = observe_cut(setting, "stable").power
+    power = make_observed_cut(setting, "stable").power
     assert power is not None
     assert power.edge_known
     assert power.tangential == pytest.approx(8e8)
@@ -206,16 +204,16 @@ def test_a_cut_is_taken_out_and_back_and_listed_each_time(shop: Shop) -> None:
 
 
 def test_excluding_a_cut_that_is_none_or_twice_is_refused(shop: Shop) -> None:
-    keep_cut(shop.folder, heard(shop))
-    exclude(shop.folder, "c1", "no")
+    store_cut(shop.folder, heard(shop))
+    exclude_entry(shop.folder, "c1", "no")
     with pytest.raises(ValueError, match="c1: excluded already"):
-        exclude(shop.folder, "c1", "no")
+        exclude_entry(shop.folder, "c1", "no")
     with pytest.raises(ValueError, match="no such tap test"):
-        include(shop.folder, "c2")
+        include_entry(shop.folder, "c2")
 
 
 def test_a_recording_is_the_one_that_was_kept_and_its_line_vouches_for_it(shop: Shop) -> None:
-    kept = keep_cut(shop.folder, heard(shop), signal())
+    kept = store_cut(shop.folder, heard(shop), signal())
     assert shop.logbook.cuts == (kept,)
     assert kept.recording is not None
     assert kept.recording.file == "cuts/c1.h5"
@@ -236,7 +234,7 @@ def damaged(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [damaged, Path.unlink])
 def test_a_damaged_recording_is_named_and_mended_and_its_word_goes_on_to_count(shop: Shop, harm: Any) -> None:
-    keep_cut(shop.folder, heard(shop), signal())
+    store_cut(shop.folder, heard(shop), signal())
     path = shop.path / "cuts" / "c1.h5"
     harm(path)
     assert [(one.code, one.about) for one in verify(shop.path).damage] == [("cut-damaged", "cuts/c1.h5")]
@@ -245,15 +243,15 @@ def test_a_damaged_recording_is_named_and_mended_and_its_word_goes_on_to_count(s
     assert verify(shop.path).damage == ()
     assert "cut-lost" in [one.code for one in verify(shop.path).remarks]
     assert [cut.id for cut in shop.logbook.cuts] == ["c1"]
-    assert keep_cut(shop.folder, heard(shop), signal()).id == "c2"
+    assert store_cut(shop.folder, heard(shop), signal()).id == "c2"
 
 
 def test_a_recording_whose_line_a_crash_has_kept_away_is_entered_by_rebuild_and_never_overwritten(shop: Shop) -> None:
-    keep_cut(shop.folder, heard(shop), signal())
+    store_cut(shop.folder, heard(shop), signal())
     kept = shop.logbook.cuts[0]
     for name in ("journal.jsonl", "journal.copy.jsonl"):
         (shop.path / name).unlink()
-    assert keep_cut(shop.folder, heard(shop, 9000.0)).id == "c2"
+    assert store_cut(shop.folder, heard(shop, 9000.0)).id == "c2"
     assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
     assert rebuild_files(shop.path) == ["cuts/c1.h5: entered in the journal"]
     assert kept in shop.logbook.cuts
@@ -261,7 +259,7 @@ def test_a_recording_whose_line_a_crash_has_kept_away_is_entered_by_rebuild_and_
 
 
 def test_a_foreign_file_among_the_recordings_is_put_aside(shop: Shop) -> None:
-    keep_cut(shop.folder, heard(shop), signal())
+    store_cut(shop.folder, heard(shop), signal())
     (shop.path / "cuts" / "c7.h5").write_bytes((shop.path / "cuts" / "c1.h5").read_bytes())
     assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
     assert rebuild_files(shop.path) == ["cuts/c7.h5: put into damaged/c7.h5"]
@@ -269,15 +267,15 @@ def test_a_foreign_file_among_the_recordings_is_put_aside(shop: Shop) -> None:
 
 
 def test_nothing_is_kept_while_the_journal_is_damaged(shop: Shop) -> None:
-    keep_cut(shop.folder, heard(shop))
+    store_cut(shop.folder, heard(shop))
     (shop.path / "journal.jsonl").write_bytes(b"{}\n")
     with pytest.raises(DataError, match="damaged"):
-        keep_cut(MachineFolder(shop.path), heard(shop), signal())
+        store_cut(MachineFolder(shop.path), heard(shop), signal())
     assert not (shop.path / "cuts").exists()
 
 
 def test_what_cannot_be_told_teaches_nothing_and_is_kept(shop: Shop) -> None:
-    keep_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
+    store_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
     logbook = Logbook.open(shop.path)
     assert logbook.cuts == ()
     assert len(logbook.files.cuts) == 1

@@ -17,11 +17,10 @@ from acquisition import Channel
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.additions.observe_cut import observe_cut
-from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import verify
-from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.machine.folder_updates import make_observed_cut, store_cut
+from lobewatch.machine.rebuild_files import rebuild_files
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.machine.verify_files import verify
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -35,9 +34,9 @@ def heard(shop: Shop) -> Path:
     shop.run(("A", 12000, 2.0))
     shop.tap_both()
     for speed in (12000.0, 11000.0):
-        cut = observe_cut(cut_setting(shop.folder.machine, "A", speed, 2.0), "chatter", None)
+        cut = make_observed_cut(find_cut_setting(shop.folder.machine, "A", speed, 2.0), "chatter", None)
         signal = CutSignal(np.asarray(CODES * CHANNEL.scale, np.float64), 51200.0, CODES, CHANNEL)
-        keep_cut(shop.folder, replace(cut, by="accelerometer"), signal)
+        store_cut(shop.folder, replace(cut, by="accelerometer"), signal)
     path: Path = shop.path
     return path
 

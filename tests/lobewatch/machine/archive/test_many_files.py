@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lobewatch.machine.archive.verify import verify
+from lobewatch.machine.verify_files import verify
 from tests.lobewatch.conftest import Shop
 
 

@@ -19,14 +19,14 @@ from typer.testing import CliRunner
 
 from acquisition import Circumstances, Hit, HitFlags, Remark, SourceFile, TapTest, Trigger, write_hit
 from lobewatch.cli import app
-from lobewatch.machine.additions.correct import add_event, exclude
-from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import Verification, verify
+from lobewatch.machine.daq_rates import StoredDevice
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.known_devices import KnownDevice
-from lobewatch.machine.rows import read_rows, write_rows
-from lobewatch.tap.in_progress import begin_tap
-from lobewatch.tap.spool import write_set_up
+from lobewatch.machine.folder_updates import add_event, exclude_entry
+from lobewatch.machine.rebuild_files import rebuild_files
+from lobewatch.machine.row_file import read_rows, write_rows
+from lobewatch.machine.verify_files import Verification, verify
+from lobewatch.tap.spool import write_setup
+from lobewatch.tap.tap_in_progress import begin_tap
 
 MakeTap = Callable[..., TapTest]
 NAMES = ["tap_0", "tap_1", "tap_2"]
@@ -76,12 +76,12 @@ DAMAGES: dict[str, tuple[Callable[[MachineFolder], object], str, list[str]]] = {
     "no last line": (cut_both, "tap_2.h5", NAMES),
     "a journal cut short": (lambda m: m.journal.path.write_bytes(m.journal.path.read_bytes()[:-9]), "journal.j", NAMES),
     "an altered copy": (
-        lambda m: m.journal.copy.write_bytes(b"?" + m.journal.copy.read_bytes()),
+        lambda m: m.journal.copy_path.write_bytes(b"?" + m.journal.copy_path.read_bytes()),
         "journal.copy",
         NAMES,
     ),
     "no machine.toml": (lambda m: m.toml.unlink(), "machine.toml", NAMES),
-    "an altered history": (lambda m: m.history.write_bytes(b"no history"), "history.rows", NAMES),
+    "an altered history": (lambda m: m.history_path.write_bytes(b"no history"), "history.rows", NAMES),
     "an altered daq.json": (lambda m: (m.path / "daq.json").write_text("[{"), "daq.json", NAMES),
 }
 
@@ -125,7 +125,7 @@ def test_a_tap_file_that_cannot_be_read_just_now_stays_where_it_is(
 
 def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFolder) -> None:
     add_event(folder, "belt changed")
-    exclude(folder, "tap_1", "wrong tool")
+    exclude_entry(folder, "tap_1", "wrong tool")
     for name in ("journal.jsonl", "journal.copy.jsonl"):
         lines = (folder.path / name).read_bytes().splitlines(keepends=True)
         (folder.path / name).write_bytes(b"".join([*lines[:3], b"?" + lines[3], *lines[4:]]))
@@ -141,7 +141,7 @@ def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFo
 
 def test_one_sound_copy_has_all_corrections(folder: MachineFolder) -> None:
     add_event(folder, "belt changed")
-    exclude(folder, "tap_1", "wrong tool")
+    exclude_entry(folder, "tap_1", "wrong tool")
     folder.journal.path.write_bytes(folder.journal.path.read_bytes()[:100])
     assert not any("enter them again" in one for one in rebuild_files(folder.path))
     assert [event.text for event in MachineFolder(folder.path).contents().events] == ["belt changed"]
@@ -187,9 +187,9 @@ def test_a_tap_that_an_ended_program_has_not_entered_is_entered(
     if source is None:
         (folder.spool / "tap_3").mkdir(parents=True)
     found = verify(folder.path)
-    assert (found.damage, found.adopted) == ((), ("taps/tap_3.h5",))
+    assert (found.damage, found.entered) == ((), ("taps/tap_3.h5",))
     assert [entry.id for entry in MachineFolder(folder.path).taps()] == [*NAMES, "tap_3"]
-    assert verify(folder.path).adopted == ()
+    assert verify(folder.path).entered == ()
 
 
 def test_an_edited_machine_file_is_told_with_its_first_line(folder: MachineFolder) -> None:
@@ -307,7 +307,7 @@ def results_of(folder: MachineFolder) -> list[bytes]:
     """What all results follow from."""
     found = MachineFolder(folder.path)
     taps = found.taps()
-    return [*(found.read(entry).known_frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
+    return [*(found.read(entry).required_frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
 
 
 def one_round(
@@ -332,13 +332,13 @@ def one_round(
 @pytest.fixture
 def full(folder: MachineFolder, make_tap: MakeTap) -> Path:
     """With all that can stand in a folder."""
-    device = KnownDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
-    device = msgspec.structs.replace(device, crc=device.right_crc)
+    device = StoredDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
+    device = msgspec.structs.replace(device, crc=device.computed_crc)
     (folder.path / "daq.json").write_bytes(msgspec.json.format(msgspec.json.encode([device]), indent=2))
-    write_rows(folder.history, [b"head", b"first", b"second"])
+    write_rows(folder.history_path, [b"head", b"first", b"second"])
     spool = folder.spool / "tap_9"
     spool.mkdir(parents=True)
-    write_set_up(spool, Trigger(20.0, 1000, 100))
+    write_setup(spool, Trigger(20.0, 1000, 100))
     pulse = np.exp(-((np.arange(1000) / 30 - 5) ** 2))
     for number in range(2):
         hit = Hit(500 * pulse, 100 * pulse, 25600.0)

@@ -11,9 +11,9 @@ import pytest
 
 from acquisition import DataError, TapTest, read_tap
 from lobewatch.logbook import Logbook
-from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.rebuild_files import rebuild_files
+from lobewatch.machine.verify_files import verify
 
 VERSION_1 = Path(__file__).parents[3] / "data" / "version_1" / "machine"
 MakeTap = Callable[..., TapTest]
@@ -29,7 +29,7 @@ def test_a_folder_of_version_1_is_read_verified_and_added_to(old: MachineFolder,
     assert verify(old.path).remarks == ()
     x, y = (old.read(entry) for entry in old.taps())
     assert (x.circumstances.direction, y.circumstances.direction) == ("x", "y")
-    assert (len(x.hits), x.circumstances.operator, x.known_frf.n_averages) == (2, "Kim", 2)
+    assert (len(x.hits), x.circumstances.operator, x.required_frf.n_averages) == (2, "Kim", 2)
     assert x.hits[0].force.max() == pytest.approx(500, rel=0.02)
     old.commit(make_tap(3))
     assert len(MachineFolder(old.path).taps()) == 3

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from acquisition import DataError, TapTest, new_tap_id
-from lobewatch.machine.additions.correct import add_event
-from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.journal.journal_text import JournalText, scan
-from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.folder_updates import add_event
+from lobewatch.machine.journal.journal_scan import JournalFileState, scan_journal_file
+from lobewatch.machine.rebuild_files import rebuild_files
+from lobewatch.machine.verify_files import verify
 
 MakeTap = Callable[..., TapTest]
 NAMES = ("journal.jsonl", "journal.copy.jsonl")
@@ -192,11 +192,11 @@ def test_a_flipped_bit_in_a_long_journal_is_named(folder: MachineFolder) -> None
 
 def test_only_what_was_appended_is_read_anew(folder: MachineFolder) -> None:
     path = folder.path / NAMES[0]
-    before = scan(path, JournalText(exists=False))
-    assert scan(path, before) is before
+    before = scan_journal_file(path, JournalFileState(exists=False))
+    assert scan_journal_file(path, before) is before
     folder.journal.append({"kind": "note", "text": "x"})
-    after = scan(path, before)
-    assert (len(after.chain), after.broken) == (len(before.chain) + 1, 0)
+    after = scan_journal_file(path, before)
+    assert (len(after.chain), after.first_broken_line) == (len(before.chain) + 1, 0)
     assert all(old is new for old, new in zip(before.chain, after.chain, strict=False))
 
 

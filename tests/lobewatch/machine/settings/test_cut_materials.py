@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 
 EXAMPLE = """
 [machine]
@@ -27,19 +27,19 @@ material = "ours"
 
 
 def test_own_and_published_materials() -> None:
-    machine = parse_machine(EXAMPLE)
+    machine = parse_machine_file(EXAMPLE)
     assert machine.reference_cut is not None
     cut = machine.build_cut(machine.reference_cut)
     assert (cut.tangential, cut.radial, cut.immersion) == (800e6, 200e6, 0.5)
     assert cut.helix_lag == pytest.approx(2 * np.tan(np.radians(30)) / 0.01)
-    steel = parse_machine(EXAMPLE.replace('material = "ours"', 'material = "Steel (textbook)"'))
+    steel = parse_machine_file(EXAMPLE.replace('material = "ours"', 'material = "Steel (textbook)"'))
     assert steel.reference_cut is not None
     assert steel.build_cut(steel.reference_cut).tangential == pytest.approx(2173.3e6)
 
 
 @pytest.mark.parametrize("name", ["42CrMo4", "42crmo4", "1.7225", "AISI 4140", "aisi4140", " UNS G41400"])
 def test_a_material_goes_by_any_of_its_names(name: str) -> None:
-    machine = parse_machine(EXAMPLE.replace('material = "ours"', f'material = "{name}"'))
+    machine = parse_machine_file(EXAMPLE.replace('material = "ours"', f'material = "{name}"'))
     assert machine.reference_cut is not None
     known = machine.coefficients(machine.reference_cut)
     assert (known.material, known.iso_group) == ("42CrMo4", "P")
@@ -49,7 +49,7 @@ def test_a_material_goes_by_any_of_its_names(name: str) -> None:
 def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
     for name in ("C45", "c 45"):
         text = EXAMPLE.replace('name = "ours"', 'name = "C45"').replace('material = "ours"', f'material = "{name}"')
-        machine = parse_machine(text)
+        machine = parse_machine_file(text)
         assert machine.reference_cut is not None
         assert machine.coefficients(machine.reference_cut).tangential == 800e6
 
@@ -72,4 +72,4 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
 )
 def test_bad_materials_are_told_with_their_place(old: str, new: str, message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)):
-        parse_machine(EXAMPLE.replace(old, new))
+        parse_machine_file(EXAMPLE.replace(old, new))

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition import DataError
 from lobewatch.machine.settings.cut_tables import corner_engagement
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
 FIRST = "speed_rpm = 12600"
@@ -41,7 +41,7 @@ def test_engagement_in_a_corner_is_that_of_a_tool_drawn_in_it(tool: float, radia
 
 def test_a_range_and_a_corner_are_engagements_no_further_apart_than_15_degrees() -> None:
     for lines, radial, ends in (((), "[4, 12]", (0.2, 0.6)), (("corner_radius_mm = 15",), "5", (0.25, 0.625))):
-        (program, *_) = parse_machine(with_first(*lines, radial=radial)).program
+        (program, *_) = parse_machine_file(with_first(*lines, radial=radial)).program
         immersions = np.array(program.immersions)
         assert (immersions[0], immersions[-1]) == pytest.approx(ends)
         steps = np.diff(np.arccos(1 - 2 * immersions))
@@ -50,27 +50,30 @@ def test_a_range_and_a_corner_are_engagements_no_further_apart_than_15_degrees()
 
 @pytest.mark.parametrize("radial", ["5", "[5, 5]"])
 def test_one_radial_depth_is_one_engagement(radial: str) -> None:
-    assert parse_machine(with_first(radial=radial)).program[0].immersions == (0.25,)
+    assert parse_machine_file(with_first(radial=radial)).program[0].immersions == (0.25,)
 
 
 def test_the_pitch_of_a_tool_is_that_of_its_programs_unless_they_say_otherwise() -> None:
     tool = 'tool = "long end mill"'
     text = with_first("pitch_deg = [80, 100, 80, 100]").replace('tool = "reference"\nteeth', f"{tool}\nteeth")
     text = text.replace('name = "long end mill"', 'name = "long end mill"\npitch_deg = [85, 95, 85, 95]')
-    machine = parse_machine(text)
+    machine = parse_machine_file(text)
     own, of_tool, _ = (machine.build_cut(program) for program in machine.program)
     assert np.degrees(own.pitch) == pytest.approx([80, 100, 80, 100])
     assert np.degrees(of_tool.pitch) == pytest.approx([85, 95, 85, 95])
     assert machine.reference_cut is not None
     assert machine.build_cut(machine.reference_cut).pitch == ()
-    assert machine.program_hashes != parse_machine(text.replace("[85, 95, 85, 95]", "[84, 96, 84, 96]")).program_hashes
+    assert (
+        machine.program_hashes
+        != parse_machine_file(text.replace("[85, 95, 85, 95]", "[84, 96, 84, 96]")).program_hashes
+    )
     with pytest.raises(DataError, match=r"program 2: .*has 4 angles for 3 teeth.*of tool 'long end mill'"):
-        parse_machine(
+        parse_machine_file(
             text.replace(f"{tool}\nteeth = 4", f"{tool}\nteeth = 3").replace("[80, 100, 80, 100]", "[80, 140, 140]")
         )
 
 
 def test_a_reference_cut_has_a_feed() -> None:
-    machine = parse_machine(EXAMPLE.replace("[reference_cut]", '[reference_cut]\nfeed = "y"'))
+    machine = parse_machine_file(EXAMPLE.replace("[reference_cut]", '[reference_cut]\nfeed = "y"'))
     (cut,) = machine.cuts("reference")["reference cut"]
     assert cut.feed_angle == pytest.approx(math.pi / 2)

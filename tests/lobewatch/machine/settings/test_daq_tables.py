@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from acquisition import Channel, DataError, SensorInput
-from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine_file
 
 PLUGIN = Path(__file__).parents[3] / "plugins" / "dummy_device"
 HEAD = '[machine]\nname = "mill 3"\n'
@@ -37,7 +37,7 @@ skew_us = 6.5
 
 
 def test_channels_are_converted_at_the_door() -> None:
-    force, acceleration = (channel.build() for channel in parse_machine(HEAD + DAQ).daq.channel)
+    force, acceleration = (channel.build() for channel in parse_machine_file(HEAD + DAQ).daq.channel)
     assert force == SensorInput(2, Channel("force", 2.25e-3, 5.0))
     assert acceleration.number == 3
     channel = acceleration.channel
@@ -82,7 +82,7 @@ def test_channels_are_converted_at_the_door() -> None:
 def test_every_mistake_is_told_with_its_table_and_key(old: str, new: str, message: str) -> None:
     assert old in DAQ
     with pytest.raises(DataError) as caught:
-        parse_machine(HEAD + DAQ.replace(old, new, 1))
+        parse_machine_file(HEAD + DAQ.replace(old, new, 1))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -91,15 +91,15 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
     with pytest.raises(
         DataError, match=r"needs two \[\[daq.channel\]\], one of force and one of acceleration; here are no"
     ):
-        parse_machine(HEAD + '[daq]\ndriver = "dataq"\n')
+        parse_machine_file(HEAD + '[daq]\ndriver = "dataq"\n')
     with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
-        parse_machine(HEAD + "[daq]\nloss_detection = false\n")
+        parse_machine_file(HEAD + "[daq]\nloss_detection = false\n")
     with pytest.raises(DataError, match="daq: digital_clock=true: a TAPS/1 device numbers its scans"):
-        parse_machine(HEAD + "[daq]\ndigital_clock = true\n")
+        parse_machine_file(HEAD + "[daq]\ndigital_clock = true\n")
     clock = HEAD + DAQ.replace('driver = "dataq"', 'driver = "dataq"\ndigital_clock = true')
-    assert parse_machine(clock).daq.settings.digital_clock
+    assert parse_machine_file(clock).daq.settings.digital_clock
     with pytest.raises(DataError, match="daq: digital_clock=true: the clock stands in the digital word"):
-        parse_machine(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
+        parse_machine_file(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
 
 
 AXIS = '[[daq.channel]]\ninput = {}\nquantity = "acceleration"\nsensitivity_mv_per_g = 100\nrange_v = 1.6\n{}\n'
@@ -117,28 +117,28 @@ BOARD = HEAD + '[tap]\nhammer = "none"\n[daq]\ndriver = "lines"\nsample_rate_hz 
 )
 def test_axes_that_cannot_be_told_apart_are_refused(axes: list[tuple[int, str]], message: str) -> None:
     with pytest.raises(DataError, match=message):
-        parse_machine(BOARD + "".join(AXIS.format(*axis) for axis in axes))
+        parse_machine_file(BOARD + "".join(AXIS.format(*axis) for axis in axes))
 
 
 def test_three_axes_are_read_and_need_the_hammer_to_be_none() -> None:
     text = BOARD + "".join(
         AXIS.format(i, f'direction = "{name}"' if name else "") for i, name in enumerate(("x", "y", ""))
     )
-    assert [channel.direction for channel in parse_machine(text).daq.channel] == ["x", "y", ""]
+    assert [channel.direction for channel in parse_machine_file(text).daq.channel] == ["x", "y", ""]
     with pytest.raises(DataError, match="of acceleration alone; add that of the hammer"):
-        parse_machine(text.replace('hammer = "none"', ""))
+        parse_machine_file(text.replace('hammer = "none"', ""))
 
 
 def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     dummy = HEAD + '[daq]\ndriver = "dummy"\n'
     with pytest.raises(DataError, match=r"daq: driver='dummy' is none of taps, dataq, .*ljm; correct the name"):
-        parse_machine(dummy)
+        parse_machine_file(dummy)
     monkeypatch.syspath_prepend(PLUGIN)
-    assert parse_machine(dummy).daq.driver == "dummy"
+    assert parse_machine_file(dummy).daq.driver == "dummy"
     with pytest.raises(DataError, match="daq: sample_rate_hz=1000 is not 25600, the only rate of a dummy device"):
-        parse_machine(dummy + "sample_rate_hz = 1000\n")
+        parse_machine_file(dummy + "sample_rate_hz = 1000\n")
     with pytest.raises(DataError, match=r"daq: channel: a dummy device names its own sensors: leave \[\[daq.channel"):
-        parse_machine(HEAD + DAQ.replace('"dataq"', '"dummy"'))
+        parse_machine_file(HEAD + DAQ.replace('"dataq"', '"dummy"'))
 
 
 @pytest.mark.parametrize("name", ["new_machine.toml", "surrogate_machine.toml"])
@@ -146,7 +146,7 @@ def test_what_the_machine_files_show_in_comments_is_right(name: str) -> None:
     text = resources.files("sim_data").joinpath(name).read_text("utf-8")
     start, end = text.index('# driver = "dataq"'), text.index("[mode]")
     shown = re.sub("^# ", "", text[start:end], flags=re.MULTILINE)
-    daq = parse_machine(text[:start] + shown + text[end:]).daq
+    daq = parse_machine_file(text[:start] + shown + text[end:]).daq
     assert [channel.build().channel.quantity for channel in daq.channel] == ["force", "acceleration"]
 
 
@@ -155,6 +155,6 @@ def test_the_examples_in_the_documentation_are_right() -> None:
     shown = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     channels = shown[0][shown[0].index("[[daq.channel]]") :]
     for example, driver in zip(shown, ("dataq", "lines", "audio"), strict=True):
-        daq = parse_machine(HEAD + example + ("" if "[[daq.channel]]" in example else channels)).daq
+        daq = parse_machine_file(HEAD + example + ("" if "[[daq.channel]]" in example else channels)).daq
         assert daq.driver == driver
         assert [channel.build().channel.full_scale for channel in daq.channel] == [5.0, 5.0]

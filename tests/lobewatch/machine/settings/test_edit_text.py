@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import DataError
-from lobewatch.machine.settings.edit_text import TablePlace, Value, edit_text
+from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml
 
 NEW, EXAMPLE = (
     resources.files("sim_data").joinpath(name).read_text("utf-8")
@@ -22,12 +22,12 @@ VALUES = st.one_of(st.booleans(), st.integers(-(2**53), 2**53), st.floats(-1e12,
 
 @settings(deadline=None)
 @given(st.sampled_from([NEW, EXAMPLE]), st.sampled_from(["tap", "daq", "speed", "drive", "limits"]), VALUES)
-def test_any_value_comes_back_and_other_lines_stay(text: str, table: str, value: Value) -> None:
-    edited = edit_text(text, TablePlace(table), {"state": value})
+def test_any_value_comes_back_and_other_lines_stay(text: str, table: str, value: TomlValue) -> None:
+    edited = edit_toml(text, TablePath(table), {"state": value})
     assert tomllib.loads(edited)[table]["state"] == value
     gone = [line for line in text.splitlines() if line not in edited.splitlines()]
     assert all(line.startswith("# state = ") for line in gone)
-    again = edit_text(edited, TablePlace(table), {"state": None})
+    again = edit_toml(edited, TablePath(table), {"state": None})
     assert tomllib.loads(again).get(table, {}) == tomllib.loads(text).get(table, {})
 
 
@@ -44,18 +44,18 @@ def test_any_value_comes_back_and_other_lines_stay(text: str, table: str, value:
         ("[a]\nx = 1\n", "x", None, "[a]\n# x = 1\n"),
     ],
 )
-def test_a_line_is_edited_where_a_person_would(text: str, key: str, value: Value, edited: str) -> None:
-    assert edit_text(text, TablePlace("a"), {key: value}) == edited
+def test_a_line_is_edited_where_a_person_would(text: str, key: str, value: TomlValue, edited: str) -> None:
+    assert edit_toml(text, TablePath("a"), {key: value}) == edited
 
 
 def test_tables_of_a_list_are_told_apart_and_added() -> None:
     text = '[[p]]\nname = "A"\n\n[[p]]\nname = "B"\n\n# about c\n[c]\n'
-    assert '"A"\n\n[[p]]\nname = "Z"' in edit_text(text, TablePlace("p", 1), {"name": "Z"})
-    added = edit_text(text, TablePlace("p", 2), {"name": "C"})
+    assert '"A"\n\n[[p]]\nname = "Z"' in edit_toml(text, TablePath("p", 1), {"name": "Z"})
+    added = edit_toml(text, TablePath("p", 2), {"name": "C"})
     assert added == '[[p]]\nname = "A"\n\n[[p]]\nname = "B"\n\n[[p]]\nname = "C"\n\n# about c\n[c]\n'
 
 
 @pytest.mark.parametrize("text", ["[a]\nx = [\n 1,\n]\n", "a = { x = 1 }\n", 'a.x = """\n1"""\n', "[ a ]\nx = 1\n"])
 def test_what_only_a_person_can_edit_is_refused(text: str) -> None:
     with pytest.raises(DataError, match="edit it by hand"):
-        edit_text(text, TablePlace("a"), {"x": 2})
+        edit_toml(text, TablePath("a"), {"x": 2})

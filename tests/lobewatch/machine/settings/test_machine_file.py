@@ -12,16 +12,16 @@ import pytest
 
 from acquisition import DataError
 from dsm import MATERIALS
-from lobewatch.machine.settings.doubt_table import DoubtTable
-from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine, read_machine
-from lobewatch.verdicts.doubt import SCATTER
+from lobewatch.machine.settings.cut_tables import UncertaintyTable
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine_file, read_machine_file
+from lobewatch.verdicts.uncertainty import DEFAULT_TAP_SCATTER
 
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
 FRESH = resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8")
 
 
 def test_the_example_is_the_surrogate_in_si() -> None:
-    machine = parse_machine(EXAMPLE)
+    machine = parse_machine_file(EXAMPLE)
     assert machine.spindle is not None
     assert "surrogate" in machine.spindle.label
     spindle = machine.spindle.build()
@@ -38,14 +38,14 @@ def test_the_example_is_the_surrogate_in_si() -> None:
 
 
 def test_a_fresh_machine_needs_no_spindle() -> None:
-    machine = parse_machine(FRESH)
+    machine = parse_machine_file(FRESH)
     assert machine.spindle is None
     assert machine.tap.hits == 10
     assert list(machine.cuts("anything")) == [REFERENCE_CUT]
 
 
 def test_a_table_that_is_left_out_says_what_the_fresh_machine_file_says() -> None:
-    fresh, bare = parse_machine(FRESH), parse_machine('[machine]\nname = "m"\n')
+    fresh, bare = parse_machine_file(FRESH), parse_machine_file('[machine]\nname = "m"\n')
     for table in ("tap", "daq", "mode", "limits", "speed", "drive", "doubt", "notify"):
         assert getattr(bare, table) == getattr(fresh, table), table
 
@@ -53,18 +53,18 @@ def test_a_table_that_is_left_out_says_what_the_fresh_machine_file_says() -> Non
 @pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
 def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
     block = text[text.index("# [doubt]") :].partition("\n\n")[0]
-    shown = parse_machine('[machine]\nname = "m"\n' + re.sub("^# ", "", block, flags=re.MULTILINE)).doubt
+    shown = parse_machine_file('[machine]\nname = "m"\n' + re.sub("^# ", "", block, flags=re.MULTILINE)).doubt
     own = {"frequency_percent": 0.3, "damping_percent": 10.0, "stiffness_percent": 3.0}
-    assert msgspec.structs.asdict(shown) == msgspec.structs.asdict(DoubtTable()) | own
-    assert pytest.approx([value / 100 for value in own.values()]) == SCATTER[:3]
-    assert len(re.findall(r"^# \w+ = \S+ +# \S", block, re.MULTILINE)) == len(DoubtTable.__struct_fields__)
+    assert msgspec.structs.asdict(shown) == msgspec.structs.asdict(UncertaintyTable()) | own
+    assert pytest.approx([value / 100 for value in own.values()]) == DEFAULT_TAP_SCATTER[:3]
+    assert len(re.findall(r"^# \w+ = \S+ +# \S", block, re.MULTILINE)) == len(UncertaintyTable.__struct_fields__)
 
 
 @pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
 @pytest.mark.parametrize("key", ['feed = "both"', "flute_length_mm = 40", "helix_deg = 30", "feed_per_tooth_mm = 0.1"])
 def test_optional_keys_of_a_program_are_shown_and_right(text: str, key: str) -> None:
     assert re.search(rf"^# {re.escape(key)}", text, re.MULTILINE)
-    changed = parse_machine(EXAMPLE.replace('direction = "down"\n', f'direction = "down"\n{key}\n', 2))
+    changed = parse_machine_file(EXAMPLE.replace('direction = "down"\n', f'direction = "down"\n{key}\n', 2))
     assert str(getattr(changed.program[0], key.partition(" ")[0])).rstrip(".0") in key
 
 
@@ -72,7 +72,7 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
     start = FRESH.index("# [spindle]")
     shown = "\n".join(line.removeprefix("#").removeprefix(" ") for line in FRESH[start:].splitlines())
     text = shown.replace("A tool that is not tapped", "# A tool")
-    machine = parse_machine(FRESH[:start] + text)
+    machine = parse_machine_file(FRESH[:start] + text)
     spindle = machine.model("reference")
     assert spindle.theory == "timoshenko"
     assert spindle.segments[0].material == MATERIALS["carbide"]
@@ -94,7 +94,7 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
 
 
 def test_measured_coefficients_beside_a_material_count_and_leave_it_its_group() -> None:
-    machine = parse_machine(EXAMPLE.replace("tangential_n_per_mm2", 'material = "C45"\ntangential_n_per_mm2'))
+    machine = parse_machine_file(EXAMPLE.replace("tangential_n_per_mm2", 'material = "C45"\ntangential_n_per_mm2'))
     known = machine.coefficients(machine.program[0])
     assert (known.tangential, known.radial, known.iso_group) == (1400e6, 500e6, "P")
     assert known.tangential_range is None
@@ -102,7 +102,7 @@ def test_measured_coefficients_beside_a_material_count_and_leave_it_its_group() 
 
 
 def test_programs_belong_to_their_tool() -> None:
-    machine = parse_machine(EXAMPLE.replace('tool = "reference"\nteeth', 'tool = "T7"\nteeth', 1))
+    machine = parse_machine_file(EXAMPLE.replace('tool = "reference"\nteeth', 'tool = "T7"\nteeth', 1))
     assert "A: slot at 12 600 rpm" not in machine.cuts("reference")
     assert list(machine.cuts("T7")) == [REFERENCE_CUT, "A: slot at 12 600 rpm"]
 
@@ -199,7 +199,7 @@ def test_programs_belong_to_their_tool() -> None:
 def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:
     assert old in EXAMPLE
     with pytest.raises(DataError) as caught:
-        parse_machine(EXAMPLE.replace(old, new, 1))
+        parse_machine_file(EXAMPLE.replace(old, new, 1))
     assert str(caught.value).startswith("machine.toml: ")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -219,7 +219,7 @@ def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) 
 def test_control_characters_in_names_are_refused_with_their_place(old: str, place: str, escaped: str) -> None:
     key = old.split(" ")[0].replace("length_mm", "material")
     with pytest.raises(DataError) as caught:
-        parse_machine(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
+        parse_machine_file(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
     assert str(caught.value).startswith(f"machine.toml: {place}")
     assert "holds the control character '\\" in str(caught.value)
     assert str(caught.value).isprintable()
@@ -228,25 +228,25 @@ def test_control_characters_in_names_are_refused_with_their_place(old: str, plac
 def test_control_characters_in_a_material_are_refused() -> None:
     material = '[[material]]\nname = "soft\\u001b"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
     with pytest.raises(DataError, match=r"material 1: name='soft.*' holds the control character"):
-        parse_machine(f"{EXAMPLE}\n{material}")
+        parse_machine_file(f"{EXAMPLE}\n{material}")
 
 
 def test_materials_have_names_of_their_own() -> None:
     material = '[[material]]\nname = "my steel"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
-    assert len(parse_machine(f"{EXAMPLE}\n{material}").material) == 1
+    assert len(parse_machine_file(f"{EXAMPLE}\n{material}").material) == 1
     with pytest.raises(DataError, match="material 2: name='my steel' stands twice"):
-        parse_machine(f"{EXAMPLE}\n{material}{material}")
+        parse_machine_file(f"{EXAMPLE}\n{material}{material}")
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_bytes(EXAMPLE.replace("SURROGATE", "SURROGÄTE").encode("latin-1"))
     with pytest.raises(DataError, match="no UTF-8 text"):
-        read_machine(path)
+        read_machine_file(path)
 
 
 def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() -> None:
-    machine = parse_machine(EXAMPLE)
+    machine = parse_machine_file(EXAMPLE)
     for old, new, same, same_words in (
         ("tap_interval_days = 30", "tap_interval_days = 60", True, True),
         ("depth_mm = 2.5", "depth_mm = 2.0", True, False),
@@ -256,6 +256,6 @@ def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() ->
         ("[speed]", "[doubt]\nspeed_percent = 2\n\n[speed]", True, False),
     ):
         assert old in EXAMPLE
-        changed = parse_machine(EXAMPLE.replace(old, new))
+        changed = parse_machine_file(EXAMPLE.replace(old, new))
         assert (changed.settings_hash == machine.settings_hash) is same
         assert (changed.program_hashes == machine.program_hashes) is same_words

@@ -13,10 +13,14 @@ from typing import Any
 import pytest
 
 from acquisition import DataError
-from lobewatch.machine.settings.edit_text import TablePlace, edit_text
-from lobewatch.machine.settings.machine_file import Machine, parse_machine
-from lobewatch.machine.settings.plausible import RANGES
-from lobewatch.machine.settings.setting_questions import all_questions, guessed_bearings, questions_of_program
+from lobewatch.machine.settings.machine_file import Machine, parse_machine_file
+from lobewatch.machine.settings.plausibility import PLAUSIBLE_RANGES
+from lobewatch.machine.settings.setting_questions import (
+    find_all_questions,
+    find_program_questions,
+    find_template_bearings,
+)
+from lobewatch.machine.settings.toml_text import TablePath, edit_toml
 
 ROOT = Path(__file__).parents[4]
 UNSEEN = set(re.findall(r"^\| `([^`]+)` \|", (ROOT / "docs/plausible.md").read_text("utf-8"), re.MULTILINE))
@@ -103,10 +107,10 @@ def slipped(place: Place, factor: float) -> dict[str, Any]:
 def seen(tables: dict[str, Any]) -> bool:
     """Whether a machine.toml is refused or asked about."""
     try:
-        machine = parse_machine(text_of(tables))
+        machine = parse_machine_file(text_of(tables))
     except DataError:
         return True
-    return bool(all_questions(machine))
+    return bool(find_all_questions(machine))
 
 
 def short(place: Place) -> str:
@@ -115,7 +119,7 @@ def short(place: Place) -> str:
 
 
 def test_nothing_is_asked_where_all_is_as_it_should_be() -> None:
-    assert all_questions(parse_machine(text_of(TABLES))) == []
+    assert find_all_questions(parse_machine_file(text_of(TABLES))) == []
 
 
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
@@ -124,7 +128,7 @@ def test_every_slip_of_1000_is_refused_or_asked_about(factor: float) -> None:
 
 
 def test_the_page_lists_the_ranges_that_a_slip_of_1000_may_stay_in() -> None:
-    wide = {key for ranges in RANGES.values() for key, (low, high) in ranges.items() if high / low >= 1000}
+    wide = {key for ranges in PLAUSIBLE_RANGES.values() for key, (low, high) in ranges.items() if high / low >= 1000}
     assert wide == UNSEEN
 
 
@@ -132,7 +136,7 @@ def machine_of(**changes: Any) -> Machine:
     """The full machine with changes to its first program."""
     tables = copy.deepcopy(TABLES)
     tables["program"][0] |= changes
-    return parse_machine(text_of(tables))
+    return parse_machine_file(text_of(tables))
 
 
 @pytest.mark.parametrize(
@@ -151,28 +155,28 @@ def test_what_is_not_plausible_is_asked_of_the_program_that_rests_on_it(
     changes: dict[str, Any], key: str, words: str
 ) -> None:
     machine = machine_of(**changes)
-    asked = questions_of_program(machine, machine.program[0], on_model=False)
+    asked = find_program_questions(machine, machine.program[0], on_model=False)
     assert any(doubted.key == key and words in str(doubted.remark) for doubted in asked), asked
 
 
 def test_an_answer_is_kept_for_this_value_alone() -> None:
     machine = machine_of(tangential_n_per_mm2=6500, radial_n_per_mm2=2000)
-    (asked,) = questions_of_program(machine, machine.program[0], on_model=False)
+    (asked,) = find_program_questions(machine, machine.program[0], on_model=False)
     tables = copy.deepcopy(TABLES)
-    tables["machine"]["accepted"] = [asked.claim]
+    tables["machine"]["accepted"] = [asked.statement]
     for value, count in ((6500, 0), (6600, 1)):
         tables["program"][0] |= {"tangential_n_per_mm2": value, "radial_n_per_mm2": 2000}
-        accepting = parse_machine(text_of(tables))
-        assert len(questions_of_program(accepting, accepting.program[0], on_model=False)) == count
+        accepting = parse_machine_file(text_of(tables))
+        assert len(find_program_questions(accepting, accepting.program[0], on_model=False)) == count
 
 
 def test_what_the_template_holds_is_nobodys() -> None:
     tables = copy.deepcopy(TABLES)
     tables["spindle"]["bearing_stiffness_n_per_um"] = 500.0
     tables["program"][0] |= {"tangential_n_per_mm2": 700, "radial_n_per_mm2": 250}
-    machine = parse_machine(text_of(tables))
-    assert [doubted.code for doubted in all_questions(machine)] == ["setting-guessed"]
-    guessed = guessed_bearings(machine)
+    machine = parse_machine_file(text_of(tables))
+    assert [doubted.code for doubted in find_all_questions(machine)] == ["setting-guessed"]
+    guessed = find_template_bearings(machine)
     assert guessed is not None
     assert guessed.key == "bearing_stiffness_n_per_um"
     assert "bearing_stiffness_n_per_um = 500.0" in TEMPLATE
@@ -180,6 +184,6 @@ def test_what_the_template_holds_is_nobodys() -> None:
 
 
 def test_accepted_lines_are_written_and_written_again() -> None:
-    once = edit_text("[machine]\nname = 'm'\n", TablePlace("machine"), {"accepted": ["[tap] a = 1"]})
-    twice = edit_text(once, TablePlace("machine"), {"accepted": ["[tap] a = 1", "b = 2"]})
+    once = edit_toml("[machine]\nname = 'm'\n", TablePath("machine"), {"accepted": ["[tap] a = 1"]})
+    twice = edit_toml(once, TablePath("machine"), {"accepted": ["[tap] a = 1", "b = 2"]})
     assert twice == '[machine]\nname = \'m\'\naccepted = ["[tap] a = 1", "b = 2"]\n'

@@ -12,25 +12,24 @@ from matplotlib.collections import LineCollection
 from matplotlib.dates import date2num
 
 from acquisition import Frf
-from lobewatch.machine import Limits, ProgramTable
-from lobewatch.show.figures.labels import PHONE
-from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
-from lobewatch.show.figures.style import new_axes, svg
-from lobewatch.show.figures.trend_figures import Marks, frf_figure, trend_figure
-from lobewatch.verdicts import Setting, Verdict, Word
+from lobewatch.machine import LimitsTable, ProgramTable
+from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, new_axes, render_svg
+from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
+from lobewatch.show.figures.trend_figures import TrendMarks, plot_frf, plot_trend
+from lobewatch.verdicts import Setting, Stability, Verdict
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
 
 
 def test_limits_stand_below_the_first_value() -> None:
-    figure = trend_figure(TIMES, np.array([1700.0, 1690.0, 1650.0]), np.full(3, 0.5), "f", Limits())
+    figure = plot_trend(TIMES, np.array([1700.0, 1690.0, 1650.0]), np.full(3, 0.5), "f", LimitsTable())
     data = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
     levels = [points[0, 1] for points in data if points[0, 0] == 0]
     assert levels == pytest.approx([1700 * 0.95, 1700 * 0.90])
 
 
 def test_bars_are_the_95_percent_interval() -> None:
-    figure = trend_figure(TIMES[:1], np.array([1700.0]), np.array([2.0]), "f")
+    figure = plot_trend(TIMES[:1], np.array([1700.0]), np.array([2.0]), "f")
     (bars,) = figure.axes[0].collections
     assert isinstance(bars, LineCollection)
     ((low, high),) = [np.asarray(segment)[:, 1] for segment in bars.get_segments()]
@@ -38,8 +37,8 @@ def test_bars_are_the_95_percent_interval() -> None:
 
 
 def test_events_are_lines_with_their_text_and_what_does_not_count_is_hollow() -> None:
-    marks = Marks([(TIMES[1], "bearings greased with the new grease of the maker")], [(TIMES[2], 1600.0)])
-    figure = trend_figure(TIMES, np.full(3, 1700.0), np.full(3, 0.5), "f", None, marks)
+    marks = TrendMarks([(TIMES[1], "bearings greased with the new grease of the maker")], [(TIMES[2], 1600.0)])
+    figure = plot_trend(TIMES, np.full(3, 1700.0), np.full(3, 0.5), "f", None, marks)
     *_, hollow, event = figure.axes[0].lines
     assert hollow.get_markerfacecolor() == "none"
     assert np.asarray(hollow.get_xydata()).tolist() == [[date2num(TIMES[2]), 1600.0]]
@@ -50,12 +49,12 @@ def test_events_are_lines_with_their_text_and_what_does_not_count_is_hollow() ->
 def chattering(name: str) -> Verdict:
     cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
     program = ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
-    return Verdict(program, Word.NOT_STABLE)
+    return Verdict(program, Stability.NOT_STABLE)
 
 
 def drawn(name: str, speed_rpm: float, depth_mm: float) -> Verdict:
     program = msgspec.structs.replace(chattering(name).program, speed_rpm=speed_rpm, depth_mm=depth_mm)
-    return Verdict(program, Word.NOT_STABLE)
+    return Verdict(program, Stability.NOT_STABLE)
 
 
 def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a_phone() -> None:
@@ -66,11 +65,11 @@ def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a
     crowd = [drawn(f"one of many programs {i}", 12000.0 + 300 * i, 1.5) for i in range(8)]
     programs = [*(drawn(name, *place) for name, place in zip(names, places, strict=True)), *crowd]
     pockets = [Setting(11440.0, 2.5, (11330.0, 11670.0), 0.5, 0.02)]
-    figure = lobes_figure(speed, {"now": np.full(50, 7e-4)}, programs, pockets=pockets, is_small=True)
+    figure = plot_lobes(speed, {"now": np.full(50, 7e-4)}, programs, pockets=pockets, is_small=True)
     (axes,) = figure.axes
     shown = [text for text in axes.texts if text.get_text()]
     for text in shown:
-        text.set_fontsize(PHONE)
+        text.set_fontsize(PHONE_FONT_SIZE)
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in shown]
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
@@ -83,23 +82,23 @@ def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a
 
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
+    figure = plot_lobes(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
     now, earlier, mark = figure.axes[0].lines
     assert earlier.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
     assert np.asarray(mark.get_xydata()).tolist() == [[1500.0, 3.0]]
-    assert svg(figure).startswith("<svg")
+    assert render_svg(figure).startswith("<svg")
 
 
 def test_a_map_without_any_limit_ends_at_a_millimetre() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    (mesh,) = waterfall_figure(speed, TIMES, np.full((3, 5), np.inf)).axes[0].collections
+    (mesh,) = plot_waterfall(speed, TIMES, np.full((3, 5), np.inf)).axes[0].collections
     assert mesh.get_clim() == (0, 1)
 
 
 def test_receptance_is_drawn_in_nm_per_n() -> None:
     f = np.linspace(1.0, 100.0, 50)
-    figure = frf_figure(None, Frf(f, np.full(50, 2e-9 - 5e-9j)), (1.0, 100.0))
+    figure = plot_frf(None, Frf(f, np.full(50, 2e-9 - 5e-9j)), (1.0, 100.0))
     real, imaginary = (axes.lines[0].get_ydata() for axes in figure.axes)
     assert real == pytest.approx(2.0)
     assert imaginary == pytest.approx(-5.0)
@@ -108,13 +107,13 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
 @pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
 def test_no_name_is_read_as_a_formula(name: str) -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [chattering(name)], title=name))
+    picture = render_svg(plot_lobes(speed, {name: np.full(5, 1e-3)}, [chattering(name)], title=name))
     assert picture.count(f">{name}</text>") == 3
 
 
 def test_logarithmic_axes_have_plain_numbers() -> None:
     figure, (axes,) = new_axes(1, (4.0, 3.0))
     axes.semilogy([1.0, 2.0], [1e-3, 100.0])
-    picture = svg(figure)
+    picture = render_svg(figure)
     assert "$" not in picture
     assert [f">{label}</text>" in picture for label in ("1e\u221203", "1e\u221201", "1", "100")] == [True] * 4

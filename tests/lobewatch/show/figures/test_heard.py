@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from lobes import Cut, StabilityLobes
-from lobewatch.cuts.learning.at_speed import LobesAtSpeed, lobes_at_speed
-from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.journal.heard_cut import CutWord, HeardCut
-from lobewatch.show.figures.lobe_figures import heard_of, lobes_figure
+from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.machine.folder_updates import store_cut
+from lobewatch.machine.journal.cut_entry import CutEntry, CutVerdict
+from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
 from lobewatch.show.report.report import render_report
-from lobewatch.tool import lobes_of
-from lobewatch.verdicts.limit_band import LimitBand
+from lobewatch.tool import compute_lobes
+from lobewatch.verdicts.monte_carlo import LimitBand
 
 SLOT = Cut(4, 1.0, "down", 1.4e9, 5e8)
 
 
-def heard(word: CutWord, speed_rpm: float, depth: float, **changes: Any) -> HeardCut:
-    cut = HeardCut(
+def heard(word: CutVerdict, speed_rpm: float, depth: float, **changes: Any) -> CutEntry:
+    cut = CutEntry(
         id=f"c{speed_rpm:.0f}",
         at=datetime(2026, 2, 1, tzinfo=UTC),
         program="A",
@@ -49,7 +49,7 @@ def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> Non
         heard("flip", 1700.0, 2e-3),
     ]
     speed = np.linspace(1000.0, 2000.0, 5)
-    figure = lobes_figure(speed, {"now": np.full(5, 0.2e-3)}, heard=cuts)
+    figure = plot_lobes(speed, {"now": np.full(5, 0.2e-3)}, heard=cuts)
     (axes,) = figure.axes
     stable, chatter = axes.lines[-2:]
     assert np.asarray(stable.get_xydata()).tolist() == [[1200.0, 1.0]]
@@ -64,7 +64,7 @@ def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
     speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 1e-3)
     lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
     learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
-    (axes,) = lobes_figure(speed, {"now": 2 * depth}, learnt=learnt).axes
+    (axes,) = plot_lobes(speed, {"now": 2 * depth}, learnt=learnt).axes
     (line,) = [artist for artist in axes.lines if artist.get_label() == "at speed, learnt from 4 test cuts"]
     assert line.get_ydata() == pytest.approx(1.0)
     (band,) = [artist for artist in axes.collections if "left open" in str(artist.get_label())]
@@ -77,19 +77,19 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     shop.tap_both(0, 1.0)
     logbook = shop.logbook
     (at_rest,) = logbook.verdicts()
-    assert lobes_at_speed([at_rest], logbook.machine) is None
+    assert compute_lobes_at_speed([at_rest], logbook.machine) is None
     for number in range(3):
         cut = heard(
             "stable", 12900.0, 1e-3 + 1e-4 * number, program="A", cut=logbook.machine.build_cut(at_rest.program)
         )
-        keep_cut(logbook.folder, cut)
+        store_cut(logbook.folder, cut)
     logbook = shop.logbook
     (taught,) = logbook.verdicts()
-    learnt = lobes_at_speed([taught], logbook.machine)
+    learnt = compute_lobes_at_speed([taught], logbook.machine)
     assert learnt is not None
-    assert learnt.cuts == 3
+    assert learnt.n_cuts == 3
     assert taught.assembly is not None
-    softer = float(np.min(lobes_of(taught.at_speed.moved(taught.assembly), logbook.machine)["A"].depth))
+    softer = float(np.min(compute_lobes(taught.at_speed.moved(taught.assembly), logbook.machine)["A"].depth))
     push = (taught.program.tangential_n_per_mm2 or 0) / (at_rest.program.tangential_n_per_mm2 or 1)
     assert float(np.min(learnt.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
     assert np.all(learnt.band.low <= learnt.lobes.depth)
@@ -113,7 +113,7 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
 )
 def test_a_diagram_has_the_cuts_of_its_tool_cutter_and_immersion(changes: dict[str, Any], shown: bool) -> None:
     cut = replace(heard("stable", 1200.0, 1e-3), **changes)
-    assert heard_of([cut], "A", "reference", SLOT) == ([cut] if shown else [])
+    assert select_test_cuts([cut], "A", "reference", SLOT) == ([cut] if shown else [])
 
 
 def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
@@ -123,7 +123,7 @@ def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
     assert "Test cuts" not in html
     cut = shop.logbook.machine.build_cut(shop.logbook.machine.program[0])
     stored = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
-    keep_cut(shop.logbook.folder, stored)
+    store_cut(shop.logbook.folder, stored)
     html = render_report(shop.logbook, "reference", "x")
     assert (
         "<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter at 1725 Hz</td><td>ear</td>" in html

@@ -9,11 +9,10 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from lobewatch.machine import ProgramTable
-from lobewatch.show.figures.labels import PictureLabels
-from lobewatch.show.figures.lobe_figures import lobes_figure
-from lobewatch.show.figures.style import new_axes
-from lobewatch.verdicts import Setting, Verdict, Word
-from lobewatch.verdicts.limit_band import LimitBand
+from lobewatch.show.figures.drawing import LabelPlacer, new_axes
+from lobewatch.show.figures.lobe_figures import plot_lobes
+from lobewatch.verdicts import Setting, Stability, Verdict
+from lobewatch.verdicts.monte_carlo import LimitBand
 
 
 def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
@@ -21,10 +20,10 @@ def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
     cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
     marks = [
         Verdict(ProgramTable(name=f"p{i}", speed_rpm=1100.0 + 250 * i, depth_mm=3.0, **cut), word)  # type: ignore[arg-type]
-        for i, word in enumerate(Word)
+        for i, word in enumerate(Stability)
     ]
     band, pocket = LimitBand(speed, 0.5 * depth, 2 * depth), Setting(1500.0, 0.85, (1400.0, 1650.0), 0.3, 0.02)
-    (axes,) = lobes_figure(speed, {"then": 0.9 * depth, "now": depth}, marks, "", band, [pocket]).axes
+    (axes,) = plot_lobes(speed, {"then": 0.9 * depth, "now": depth}, marks, "", band, [pocket]).axes
     shade, filled = (np.asarray(one.get_paths()[0].vertices)[:, 1] for one in axes.collections)
     assert (filled.min(), filled.max()) == pytest.approx((1.0, 4.0))
     assert shade.min() == pytest.approx(4.0)
@@ -40,7 +39,7 @@ def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
 def test_words_in_a_picture_do_not_cover_one_another() -> None:
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     axes.set(xlim=(0, 100), ylim=(0, 10))
-    labels = PictureLabels(axes)
+    labels = LabelPlacer(axes)
     for place in ((50, 5), (52, 5), (50, 5.3)):
         labels.add("a program\nnot stable", place)
     figure.canvas.draw()

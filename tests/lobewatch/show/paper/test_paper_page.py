@@ -15,7 +15,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from lobewatch.cli import app, main
-from lobewatch.show.paper.paper_figures import FIGURES
+from lobewatch.show.paper.paper_page import PAPER_FIGURES
 
 DOCS = Path(__file__).parents[4] / "docs"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -43,7 +43,7 @@ def test_the_page_is_the_one_in_docs(written: tuple[Path, str]) -> None:
     assert new == pytest.approx(old, rel=SAME, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", PAPER_FIGURES)
 def test_the_figure_is_the_one_in_docs(written: tuple[Path, str], name: str) -> None:
     new, old = (pixels(folder / "images" / f"paper-{name}.png") for folder in (written[0], DOCS))
     assert new.shape == old.shape
@@ -58,7 +58,7 @@ def pixels(path: Path) -> NDArray[np.float64]:
 
 def test_the_page_shows_every_figure(written: tuple[Path, str]) -> None:
     links = re.findall(r"\]\(images/paper-([\w-]+)\.png\)", (written[0] / "paper.md").read_text("utf-8"))
-    assert sorted(links) == sorted(FIGURES)
+    assert sorted(links) == sorted(PAPER_FIGURES)
 
 
 def test_the_table_fits_80_characters_and_says_where_the_page_is(written: tuple[Path, str]) -> None:

@@ -11,18 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lobewatch.machine import ProgramTable
-from lobewatch.show.programs.describe_advice import rpm
-from lobewatch.show.programs.describe_verdicts import (
-    WORDS,
+from lobewatch.show.programs.advice import format_rpm
+from lobewatch.show.programs.verdicts import (
+    VERDICT_STYLES,
+    chatter_risk_text,
     is_safe,
     limits_text,
-    turning_text,
     verdict_json,
     verdict_table,
     verdict_text,
 )
-from lobewatch.show.terminal.output import Terminal, emit
-from lobewatch.verdicts import Verdict, Word
+from lobewatch.show.terminal.output import SafeConsole, emit
+from lobewatch.verdicts import Stability, Verdict
 
 
 def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> ProgramTable:
@@ -39,14 +39,14 @@ def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> Prog
 
 
 def a_verdict(
-    word: Word = Word.STABLE,
+    word: Stability = Stability.STABLE,
     limit: float = 3e-3,
     low: float = 2e-3,
     high: float = 4e-3,
     chance: float = 0.1,
     **more: float,
 ) -> Verdict:
-    return Verdict(program(), word, limit=limit, limit_low=low, limit_high=high, chance_turning=chance, **more)  # type: ignore[arg-type]
+    return Verdict(program(), word, limit=limit, limit_low=low, limit_high=high, chatter_risk=chance, **more)  # type: ignore[arg-type]
 
 
 def printed(*verdicts: Verdict, width: int = 80) -> list[str]:
@@ -54,16 +54,16 @@ def printed(*verdicts: Verdict, width: int = 80) -> list[str]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", str(width))
         patch.setattr(
-            "lobewatch.show.terminal.output.results", Terminal(file=to, width=max(width, 120), soft_wrap=True)
+            "lobewatch.show.terminal.output.results", SafeConsole(file=to, width=max(width, 120), soft_wrap=True)
         )
         emit({}, False, verdict_table(verdicts, ["> 20 %"] * len(verdicts)))
     return [line.rstrip() for line in to.getvalue().splitlines()]
 
 
 def test_there_is_one_table_of_words() -> None:
-    assert list(WORDS) == list(Word)
-    assert [str(word) for word in WORDS] == ["stable", "doubtful", "not stable", "unknown"]
-    assert len({look.symbol for look in WORDS.values()}) == 4
+    assert list(VERDICT_STYLES) == list(Stability)
+    assert [str(word) for word in VERDICT_STYLES] == ["stable", "doubtful", "not stable", "unknown"]
+    assert len({look.symbol for look in VERDICT_STYLES.values()}) == 4
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])
@@ -73,10 +73,10 @@ def test_there_is_one_table_of_words() -> None:
     depth=st.floats(0.05, 300),
     limit=st.one_of(st.floats(1e-5, 2.0), st.just(math.inf)),
     spread=st.floats(1.05, 3),
-    word=st.sampled_from(list(Word)),
+    word=st.sampled_from(list(Stability)),
 )
 def test_no_number_of_a_table_is_cut(
-    width: int, name: str, speed: float, depth: float, limit: float, spread: float, word: Word
+    width: int, name: str, speed: float, depth: float, limit: float, spread: float, word: Stability
 ) -> None:
     verdict = Verdict(
         program(name, speed, depth),
@@ -84,7 +84,7 @@ def test_no_number_of_a_table_is_cut(
         limit=limit,
         limit_low=min(limit, 2.0) / spread,
         limit_high=limit * spread,
-        chance_turning=0.004,
+        chatter_risk=0.004,
     )
     lines = printed(verdict, width=width)
     numbers = (f"{speed:g}", f"{depth:g}", limits_text(verdict), "< 1 %", "> 20 %")
@@ -99,11 +99,11 @@ def test_long_names_and_large_numbers_fit_80_columns() -> None:
     name = "bracket 4711, roughing, slot with the long end mill, left side, 2nd clamping"
     large = Verdict(
         program(name, 120000.0, 123.45),
-        Word.NOT_STABLE,
+        Stability.NOT_STABLE,
         limit=0.0987654,
         limit_low=0.0543211,
         limit_high=math.inf,
-        chance_turning=0.999,
+        chatter_risk=0.999,
     )
     lines = printed(large, a_verdict())
     assert max(map(len, lines)) <= 80
@@ -120,7 +120,7 @@ def test_long_names_and_large_numbers_fit_80_columns() -> None:
         (a_verdict(limit=0.12345, low=0.1, high=1.23456), "123.5 (100.0..1235)"),
         (a_verdict(limit=math.inf, low=30e-3, high=math.inf), "> 40.00 (30.00..> 40.00)"),
         (a_verdict(limit=math.inf, low=math.inf, high=math.inf), "> 40.00"),
-        (a_verdict(Word.UNKNOWN, math.nan, math.nan, math.nan), "-"),
+        (a_verdict(Stability.UNKNOWN, math.nan, math.nan, math.nan), "-"),
     ],
 )
 def test_limits_with_their_band(verdict: Verdict, text: str) -> None:
@@ -131,20 +131,21 @@ def test_limits_with_their_band(verdict: Verdict, text: str) -> None:
     ("chance", "text"), [(0.0, "< 1 %"), (0.004, "< 1 %"), (0.18, "18 %"), (1.0, "> 99 %"), (math.nan, "-")]
 )
 def test_chance_of_chatter_once_it_turns(chance: float, text: str) -> None:
-    assert turning_text(a_verdict(chance=chance)) == text
+    assert chatter_risk_text(a_verdict(chance=chance)) == text
 
 
 def test_a_word_says_what_it_must_in_the_same_breath() -> None:
     beyond = a_verdict(drive_limit=1e-3)
     assert verdict_text(beyond) == "stable, beyond the drive (predicted)"
     assert [
-        is_safe(verdict) for verdict in (a_verdict(), beyond, a_verdict(Word.DOUBTFUL), a_verdict(Word.UNKNOWN))
+        is_safe(verdict)
+        for verdict in (a_verdict(), beyond, a_verdict(Stability.DOUBTFUL), a_verdict(Stability.UNKNOWN))
     ] == [True] + [False] * 3
-    assert verdict_text(a_verdict(Word.UNKNOWN)) == "unknown"
+    assert verdict_text(a_verdict(Stability.UNKNOWN)) == "unknown"
 
 
 def test_json_of_what_is_not_known() -> None:
-    payload = verdict_json(Verdict(program(), Word.UNKNOWN))
+    payload = verdict_json(Verdict(program(), Stability.UNKNOWN))
     assert (payload["stable"], payload["verdict"], payload["decided_by"], payload["doubt"], payload["cuts"]) == (
         None,
         "unknown",
@@ -156,11 +157,16 @@ def test_json_of_what_is_not_known() -> None:
 
 
 def test_speeds_are_read_in_groups() -> None:
-    assert [rpm(speed) for speed in (950.0, 12640.0, 12640.5, 123456.0)] == ["950", "12 640", "12 640.5", "123 456"]
+    assert [format_rpm(speed) for speed in (950.0, 12640.0, 12640.5, 123456.0)] == [
+        "950",
+        "12 640",
+        "12 640.5",
+        "123 456",
+    ]
 
 
 def test_json_says_limits_in_millimetres_and_angles_in_degrees() -> None:
-    verdict = a_verdict(Word.DOUBTFUL, drive_limit=7e-3, feed_angle=math.pi / 2, chatter_frequency=1700.0)
+    verdict = a_verdict(Stability.DOUBTFUL, drive_limit=7e-3, feed_angle=math.pi / 2, chatter_frequency=1700.0)
     said = verdict_json(verdict)
     limits = [said[name] for name in ("limit_mm", "limit_low_mm", "limit_high_mm", "drive_limit_mm")]
     assert limits == pytest.approx([3.0, 2.0, 4.0, 7.0])

@@ -16,12 +16,10 @@ from typer.testing import CliRunner, Result
 
 from acquisition import Frf
 from lobewatch.cli import app
-from lobewatch.plant.plant import Plant
-from lobewatch.show.report.fleet import render_fleet, spark
-from lobewatch.show.report.gauge import WIDE, gauge
-from lobewatch.show.report.material import report_material
-from lobewatch.show.report.page import page
-from lobewatch.show.report.report import render_report
+from lobewatch.fleet.fleet import Fleet
+from lobewatch.show.report.page import GAUGE_WIDTH, make_gauge, render_page
+from lobewatch.show.report.report import render_fleet, render_report, spark_points
+from lobewatch.show.report.report_data import collect_report_data
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -119,10 +117,10 @@ def test_an_acknowledged_alarm_says_so_on_the_first_screen(worn: Shop) -> None:
 
 
 def test_a_gauge_tells_a_small_fall_from_a_large_one() -> None:
-    small, large = (gauge(fall, 5.0, 10.0) for fall in (0.15, 10.0))
+    small, large = (make_gauge(fall, 5.0, 10.0) for fall in (0.15, 10.0))
     assert large.length == large.alarm == 2 * large.warn
     assert small.length == pytest.approx(large.length * 0.015)
-    assert (gauge(-1.0, 5.0, 10.0).length, gauge(99.0, 5.0, 10.0).length) == (0.0, WIDE)
+    assert (make_gauge(-1.0, 5.0, 10.0).length, make_gauge(99.0, 5.0, 10.0).length) == (0.0, GAUGE_WIDTH)
     assert large.text == "frequency -10.00 %; warning at -5 %, alarm at -10 %"
 
 
@@ -145,7 +143,7 @@ def test_a_response_is_shown_from_below_its_lowest_mode_on(shop: Shop) -> None:
     """Lower down what an accelerometer says is divided by next to nothing, and a picture of it has no modes."""
     shop.edit("band_hz = [1200, 2200]", "")
     shop.tap(0, 1713.0)
-    material = shop.logbook.ask(report_material, "reference", "x", None)
+    material = shop.logbook.ask(collect_report_data, "reference", "x", None)
     low, high = material.response_band(Frf(np.arange(1.0, 6001.0), np.zeros(6000, complex)))
     lowest = min(frequency for frequency, *_ in material.last.modes)
     assert (low, high) == (pytest.approx(0.3 * lowest), 6000.0)
@@ -174,16 +172,16 @@ def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> No
 
 
 def test_a_course_falls_on_paper_as_it_does() -> None:
-    assert spark([(0.0, 0.0)]) == ""
-    assert spark([(0.0, 0.0), (10.0, -2.0)]) == "0.0,0.0 140.0,32.0"
-    assert spark([(5.0, 0.0), (5.0, 0.0)]) == "0.0,0.0 0.0,0.0"
+    assert spark_points([(0.0, 0.0)]) == ""
+    assert spark_points([(0.0, 0.0), (10.0, -2.0)]) == "0.0,0.0 140.0,32.0"
+    assert spark_points([(5.0, 0.0), (5.0, 0.0)]) == "0.0,0.0 0.0,0.0"
 
 
 def test_a_name_cannot_end_the_style_sheet() -> None:
     html = render_fleet([], 'x"; } </style><script>alert(1)</script>', datetime(2026, 1, 1, tzinfo=UTC))
     assert "alert(1)</script>" not in html
     assert html.count("</style>") == 1
-    assert callable(page)
+    assert callable(render_page)
 
 
 def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
@@ -196,7 +194,7 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
         days += random.exponential(60)
         frequency *= 1 - float(random.choice([0.0, 0.002, 0.06]) * random.random())
         machine.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
-    plant = Plant({"m": machine.path}).standings()
+    plant = Fleet({"m": machine.path}).assess_machines()
     newest = machine.logbook.newest()
     html = render_report(machine.logbook, newest.tool, newest.direction)
     assert run("report", path).exit_code == 0
@@ -206,7 +204,7 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
     listed = re.search(r'<td><div><span class="\w+">(.*?)</span>', fleet)
     assert shown is not None
     assert listed is not None
-    return plant[0].dated.light.value, words[shown[1]], words[listed[1]]
+    return plant[0].current.status.value, words[shown[1]], words[listed[1]]
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 50))])

@@ -9,25 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobewatch.show.figures.style import new_axes, svg
-from lobewatch.show.report.figure_data import Numbers
-from lobewatch.show.report.material import ReportMaterial
+from lobewatch.show.figures.drawing import new_axes, render_svg
 from lobewatch.show.report.report import render_report
-from lobewatch.show.report.section import (
-    BulletList,
-    DataTable,
-    Drawing,
-    Paragraph,
-    Section,
-    TableCell,
-)
+from lobewatch.show.report.report_data import ReportData
+from lobewatch.show.report.section import BulletList, DataTable, Drawing, NumberTable, Paragraph, Section, TableCell
 from lobewatch.show.report.sections import SECTIONS
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
 
 
-def hours(material: ReportMaterial) -> list[Section]:
+def hours(material: ReportData) -> list[Section]:
     """Hours at which the tests were made: all kinds of parts."""
     taken = [float(row.time.hour) for row in material.rows]
     figure, (axes,) = new_axes(1, (4.0, 2.0))
@@ -41,8 +33,8 @@ def hours(material: ReportMaterial) -> list[Section]:
                 Paragraph(""),
                 BulletList(["early", "late"]),
                 DataTable(["hour", "how"], [["9", TableCell("fine", "ok")]], "words"),
-                DataTable(["minute"], [], if_empty="not looked at", numbers=Numbers(["minute"], []), key="minutes"),
-                Drawing(svg(figure), Numbers(["hour"], [[hour] for hour in taken])),
+                DataTable(["minute"], [], if_empty="not looked at", numbers=NumberTable(["minute"], []), key="minutes"),
+                Drawing(render_svg(figure), NumberTable(["hour"], [[hour] for hour in taken])),
             ],
         )
     ]
@@ -81,7 +73,7 @@ def test_the_oldest_test_is_left_out_where_its_file_turns_out_to_be_damaged(
     for week in range(3):
         shop.tap(7 * week, 1713.0 - week)
     assert len(shop.logbook.history.rows) == 3
-    monkeypatch.setattr("lobewatch.machine.contents.PROVED_FILES", 1)
+    monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_FILES", 1)
     oldest: Path = min((shop.path / "taps").glob("*.h5"))
     content = bytearray(oldest.read_bytes())
     content[len(content) // 2] ^= 1

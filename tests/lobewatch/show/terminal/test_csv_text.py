@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lobewatch.show.terminal.csv_text import csv_text
+from lobewatch.show.terminal.output import format_csv
 
 TEXTS = st.text(st.sampled_from("=+-@\t\r\n,\"'0e. a"), max_size=6) | st.text()
 
 
 @given(st.lists(st.tuples(TEXTS, TEXTS, st.floats(allow_nan=False))))
 def test_every_cell_is_read_back_and_none_runs(lines: list[tuple[str, str, float]]) -> None:
-    read = [*csv.reader(io.StringIO(csv_text(lines), newline=""))]
+    read = [*csv.reader(io.StringIO(format_csv(lines), newline=""))]
     assert len(read) == len(lines)
     for line, cells in zip(lines, read, strict=True):
         assert float(cells[2]) == line[2]
@@ -44,11 +44,11 @@ def test_every_cell_is_read_back_and_none_runs(lines: list[tuple[str, str, float
     ],
 )
 def test_a_text_that_a_spreadsheet_would_run_gets_an_apostrophe(text: str) -> None:
-    assert [*csv.reader(io.StringIO(csv_text([[text, 1]]), newline=""))] == [[f"'{text}", "1"]]
+    assert [*csv.reader(io.StringIO(format_csv([[text, 1]]), newline=""))] == [[f"'{text}", "1"]]
 
 
 @pytest.mark.parametrize(
     "number", ["-0.5", "+3", "1e-3", "-1e-3", "-.5E+10", "-5.", -0.5, -1e-300, 7, None, "a=b", "'=1"]
 )
 def test_numbers_and_other_texts_stay_as_they_are(number: str | float | None) -> None:
-    assert csv_text([[number, ""]]) == f"{'' if number is None else number},\n"
+    assert format_csv([[number, ""]]) == f"{'' if number is None else number},\n"

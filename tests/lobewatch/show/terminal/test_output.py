@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
-from lobewatch.show.terminal.output import Terminal, emit, printable, table
+from lobewatch.show.terminal.output import SafeConsole, emit, make_printable, new_table
 
 HARM = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x00\x7f\u2028"
 
 
 def printed(*texts: object, **options: object) -> str:
     to = io.StringIO()
-    Terminal(file=to, **options).print(*texts)  # type: ignore[arg-type]
+    SafeConsole(file=to, **options).print(*texts)  # type: ignore[arg-type]
     return to.getvalue()
 
 
 def cells(*row: str) -> str:
-    rows = table("<name", "value")
+    rows = new_table("<name", "value")
     rows.add_row(*row)
     return printed(rows, width=120)
 
@@ -39,7 +39,7 @@ def test_the_console_itself_still_can() -> None:
     output = printed("[bold]a[/]", force_terminal=True, color_system="standard")
     assert "\x1b[1ma" in output
     to = io.StringIO()
-    console = Terminal(file=to, force_terminal=True)
+    console = SafeConsole(file=to, force_terminal=True)
     console.bell()
     console.show_cursor(False)
     assert to.getvalue() == "\x07\x1b[?25l"
@@ -56,17 +56,17 @@ def test_lines_of_a_text_stay_and_rows_of_a_table_are_never_broken() -> None:
 def test_json_is_exact_and_harmless(text: str) -> None:
     to = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lobewatch.show.terminal.output.results", Terminal(file=to, width=120))
+        patch.setattr("lobewatch.show.terminal.output.results", SafeConsole(file=to, width=120))
         emit({text: [text, 1.5, float("nan")]}, True)
     assert json.loads(to.getvalue()) == {text: [text, 1.5, None]}
-    assert printable(to.getvalue()) == to.getvalue()
+    assert make_printable(to.getvalue()) == to.getvalue()
 
 
 def test_json_on_a_terminal_is_coloured_as_rich_does_it() -> None:
     ours, theirs = io.StringIO(), io.StringIO()
     payload = {"a": [1, None, True, "ä"], "b": {"c": "x"}}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lobewatch.show.terminal.output.results", Terminal(file=ours, force_terminal=True, width=80))
+        patch.setattr("lobewatch.show.terminal.output.results", SafeConsole(file=ours, force_terminal=True, width=80))
         emit(payload, True)
     Console(file=theirs, force_terminal=True, width=80).print_json(json.dumps(payload))
     assert ours.getvalue() == theirs.getvalue()

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from lobewatch.show.terminal.show_address import show_address
+from lobewatch.show.terminal.output import show_address
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

@@ -13,13 +13,12 @@ import pytest
 from rich.console import Console
 
 from acquisition import HitFlags
-from lobewatch.show.terminal.keys import letters
-from lobewatch.show.terminal.printer import TapPrinter
-from lobewatch.show.terminal.terminal_screen import TerminalScreen, picture
-from lobewatch.tap.state import Check, Choice, Outcome, ProgramWord, TakenHit, TapState, TapStep
+from lobewatch.show.terminal.tap_printer import TapPrinter
+from lobewatch.show.terminal.terminal_screen import TerminalScreen, normalize_keys, render_state
+from lobewatch.tap.state import Check, Choice, ListedHit, Outcome, ProgramVerdict, TapState, TapStep
 
-GOOD = TakenHit(1, HitFlags.OK, "231 N")
-DOUBLE = TakenHit(
+GOOD = ListedHit(1, HitFlags.OK, "231 N")
+DOUBLE = ListedHit(
     2, HitFlags.DOUBLE_HIT, "310 N", reason="Second peak 12 ms after the first (18 %): let it bounce [back]."
 )
 STATE = TapState(
@@ -50,7 +49,7 @@ class Session:
 
 def seen(state: TapState, width: int = 100, **options: bool) -> str:
     console = Console(file=io.StringIO(), width=width, force_terminal=True, **options)  # type: ignore[arg-type]
-    console.print(picture(state, muted=False))
+    console.print(render_state(state, muted=False))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     return str(text)
 
@@ -104,7 +103,7 @@ def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
     later = plain(replace(STATE, checks=checks))
     assert "disk" not in later
     assert "✗ hum: 1 N rms at 50 Hz" in later
-    words = [ProgramWord("slot (8000 rpm, 2 mm)", "stable")]
+    words = [ProgramVerdict("slot (8000 rpm, 2 mm)", "stable")]
     outcome = Outcome("warn", ["f_n 1700 Hz."], "Tap again.", programs=words)
     done = plain(replace(STATE, word=TapStep.DONE, outcome=outcome, choices=CHOICES))
     lines = [line.strip() for line in done.splitlines() if line.strip()][-4:]
@@ -126,7 +125,7 @@ def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
 def test_keys_between_two_tests_choose_what_comes_next(word: TapStep, keys: str, chosen: list[str]) -> None:
     session = Session(replace(STATE, word=word, choices=() if word is TapStep.TAP else CHOICES))
     screen, _ = screen_of(session)
-    screen.press(keys)
+    screen.handle_key(keys)
     assert session.asked == chosen
 
 
@@ -166,8 +165,8 @@ def test_keys_reach_the_test(terminal: int, key: bytes, asked: str) -> None:
 def test_a_key_held_down_counts_once_and_arrows_for_nothing() -> None:
     session = Session()
     screen = screen_of(session)[0]
-    for key in letters("uuuuu\x1bOq\x1b[1;5Q\x1b[A\xe0uU"):
-        screen.press(key)
+    for key in normalize_keys("uuuuu\x1bOq\x1b[1;5Q\x1b[A\xe0uU"):
+        screen.handle_key(key)
     assert session.asked == ["undo"]
 
 
@@ -176,7 +175,7 @@ def test_undo_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = screen_of(session)[0]
     for now in (10.0, 10.4, 11.2, 12.0):
         monkeypatch.setattr("lobewatch.show.terminal.terminal_screen.time.monotonic", lambda now=now: now)
-        screen.press("u")
+        screen.handle_key("u")
     assert session.asked == ["undo"] * 3
 
 
@@ -193,10 +192,10 @@ def test_the_terminal_is_left_as_it_was(terminal: int) -> None:
 )
 def test_each_verdict_has_its_number_of_bells_unless_muted(terminal: int, word: TapStep, bells: int) -> None:
     screen, file = screen_of(Session())
-    screen.ring(STATE, replace(STATE, word=word))
+    screen.ring_bells(STATE, replace(STATE, word=word))
     assert file.getvalue().count("\a") == bells
-    screen.press("m")
-    screen.ring(STATE, replace(STATE, word=word))
+    screen.handle_key("m")
+    screen.ring_bells(STATE, replace(STATE, word=word))
     assert file.getvalue().count("\a") == bells
 
 
@@ -214,7 +213,7 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     )
     for state in states:
         for _ in range(2):
-            printer.show(state)
+            printer.print_new(state)
     log = console.file.getvalue()  # type: ignore[attr-defined]
     assert log.count("TAPS, 25600 Hz. TAP the tool") == 1
     assert log.count("going on with the test begun today") == 1
@@ -228,8 +227,10 @@ def test_lines_for_a_log_tell_everything_once() -> None:
 def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> None:
     console = Console(file=io.StringIO(), width=200)
     printer = TapPrinter(Session(replace(STATE, hits=())), console)
-    printer.show(replace(STATE, word=TapStep.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
-    printer.show(replace(STATE, word=TapStep.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
+    printer.print_new(
+        replace(STATE, word=TapStep.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=())
+    )
+    printer.print_new(replace(STATE, word=TapStep.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
     log = console.file.getvalue()  # type: ignore[attr-defined]
     assert log.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
 
@@ -237,9 +238,9 @@ def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> Non
 def test_a_log_has_the_checks_that_tell_something_though_all_is_well() -> None:
     console = Console(file=io.StringIO(), width=200)
     printer = TapPrinter(Session(), console)
-    checks = Check("band", True, "modes up to 1280 Hz are heard", tells=True), Check("disk", True, "full of room")
+    checks = Check("band", True, "modes up to 1280 Hz are heard", is_notable=True), Check("disk", True, "full of room")
     for _ in range(2):
-        printer.show(replace(STATE, checks=checks, hits=()))
+        printer.print_new(replace(STATE, checks=checks, hits=()))
     assert console.file.getvalue().splitlines() == ["✓ band: modes up to 1280 Hz are heard"]  # type: ignore[attr-defined]
 
 
@@ -250,6 +251,6 @@ def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int
     second = replace(first, hits=(*first.hits, GOOD))
     bells = []
     for before, state in ((STATE, word), (word, first), (first, second)):
-        screen.ring(before, state)
+        screen.ring_bells(before, state)
         bells.append(file.getvalue().count("\a"))
     assert bells == [1, 1, 2]

@@ -6,8 +6,8 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from lobewatch.decay.trend import TapValue, trend_of
-from lobewatch.show.trends.describe_trend import LINE, POINT, WIDE, chart_lines
+from lobewatch.monitoring.trend import TapValue, fit_trend
+from lobewatch.show.trend import CHART_LINE, CHART_POINT, CHART_WIDTH, chart_lines
 
 START = datetime(2024, 1, 15, 9, tzinfo=UTC)
 
@@ -18,9 +18,11 @@ def test_the_line_runs_through_the_points_of_a_steady_fall_to_the_last() -> None
         TapValue(START + timedelta(days=30 * i), 1700.0 * float(np.exp(percent / 100)), 0.01)
         for i, percent in enumerate(percents)
     ]
-    rows = [line.partition("|")[2].ljust(WIDE) for line in chart_lines(trend_of(taps, taps[-1].time)) if "|" in line]
-    drawn = np.array([[character in (LINE, POINT) for character in row] for row in rows])
+    rows = [
+        line.partition("|")[2].ljust(CHART_WIDTH) for line in chart_lines(fit_trend(taps, taps[-1].time)) if "|" in line
+    ]
+    drawn = np.array([[character in (CHART_LINE, CHART_POINT) for character in row] for row in rows])
     assert np.all(np.any(drawn, axis=0))
     deepest = drawn.shape[0] - 1 - np.argmax(drawn[::-1], axis=0)
-    expected = np.linspace(0, len(rows) - 1, WIDE)
+    expected = np.linspace(0, len(rows) - 1, CHART_WIDTH)
     assert np.max(np.abs(deepest - expected)) <= 1.5

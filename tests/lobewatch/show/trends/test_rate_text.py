@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from lobewatch.decay.forecast import Rate
-from lobewatch.show.trends.describe_trend import rate_text
+from lobewatch.monitoring.forecast import Rate
+from lobewatch.show.trend import rate_text
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from acquisition.emulation import Passage
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
-from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tap.cut_recording import record_cut
 from lobewatch.tap.emulated_cut import emulate_cut
-from lobewatch.tap.listening.record_cut import record_cut
 
 RATE = 12800.0
 CHANNELS = (Channel("force", 2e-3, 5.0), Channel("acceleration", 1e-2, 5.0))
@@ -109,7 +109,7 @@ def test_a_dead_sensor_and_a_missing_one_are_said() -> None:
 def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     folder = MachineFolder(tmp_path / "m")
-    setting = cut_setting(folder.machine, "A: slot at 12 600 rpm", 12600.0, 2.0)
+    setting = find_cut_setting(folder.machine, "A: slot at 12 600 rpm", 12600.0, 2.0)
     passage = Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
     emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage)
     with emulated.device as device, TapsSource(device.port) as source:
@@ -117,6 +117,6 @@ def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path:
         signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
         source.stop()
     (found,) = compare_cuts(Logbook.open(folder.path), setting, signal)
-    assert found.heard.word == "stable"
+    assert found.detected.verdict == "stable"
     assert found.speed_rpm == pytest.approx(emulated.speed_rpm, rel=5e-5)
     assert found.speed_rpm != pytest.approx(setting.speed_rpm, rel=5e-4)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from acquisition import Structure, TapsSource
 from dsm import natural_frequencies
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.emulated_spindle import device_in_step, emulator, with_bearing_stiffness
-from lobewatch.tap.stories.demo import PlannedTap, plan_taps
+from lobewatch.tap.demo import PlannedTap, plan_taps
+from lobewatch.tap.emulated_spindle import make_emulator, open_synchronized_device, set_bearing_stiffness
 
 MONTHS = 24
 NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)
@@ -74,16 +74,16 @@ def test_the_truth_of_a_tap_is_the_spindle_whose_bearings_it_names(folder: Machi
     table = folder.machine.spindle
     assert table is not None
     for tap in plan(folder, 0.001)[::7]:
-        spindle = with_bearing_stiffness(table.build(), tap.truth.bearing_stiffness)
+        spindle = set_bearing_stiffness(table.build(), tap.truth.bearing_stiffness)
         assert tap.truth.frequency == pytest.approx(float(natural_frequencies(spindle, 1)[0]), rel=1e-9)
         assert tap.truth.damping_ratio == table.damping_ratio
         assert (tap.structure.frequency[0], tap.structure.stiffness[0]) == (tap.truth.frequency, tap.truth.stiffness)
 
 
 def test_a_device_in_step_gives_the_samples_of_one_that_runs_free(structure: Structure) -> None:
-    with emulator(structure, np.random.default_rng(5), realtime=False) as device:
+    with make_emulator(structure, np.random.default_rng(5), realtime=False) as device:
         free = codes(TapsSource(device.port))
-    with device_in_step(structure, np.random.default_rng(5)) as open_device:
+    with open_synchronized_device(structure, np.random.default_rng(5)) as open_device:
         held = codes(open_device())
     assert np.array_equal(held, free)
 

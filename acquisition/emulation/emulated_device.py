@@ -1,0 +1,283 @@
+"""Building blocks of an emulated device: signal function, wire and server thread."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+import threading
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel, SensorInput
+from acquisition.errors import DataError
+from acquisition.source import DeviceIdentity, Event
+
+SignalFunction = Callable[[int, int], NDArray[np.float64]]
+"""(first_scan, n_scans) -> values in N and m/s^2, shape (n_channels, n_scans)."""
+
+
+def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDArray[np.int32]:
+    """ADC codes (n_channels, n) of values in N and m/s^2."""
+    return np.stack([channel.encode(values) for channel, values in zip(channels, signal, strict=True)])
+
+
+class SimulatedSource:
+    """Scans of a signal function, as fast as they are asked for.
+
+    >>> sensors = (Channel("force", 2.25e-3, 5.0),)
+    >>> quiet = SimulatedSource(lambda first, n: np.zeros((1, n)), sensors, 10240.0, n_scans=1000)
+    >>> [block.codes.shape for block in quiet.blocks()]  # channels, scans
+    [(1, 512), (1, 512)]
+    """
+
+    identity = DeviceIdentity("simulation")
+    """What it says it is."""
+    follows_clock = False
+    """Its scans come as fast as they are asked for."""
+    loss_detection = ""
+    """No scans can be lost."""
+
+    def __init__(
+        self,
+        signal: SignalFunction,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        n_scans: int,
+        block: int = 512,
+    ) -> None:
+        """A stream of n_scans scans of (first_scan, n) -> N and m/s^2, shape (n_channels, n), cut into blocks."""
+        self.channels = channels
+        """What is on each input."""
+        self.sample_rate = sample_rate
+        """Scans a second (Hz)."""
+        self.events: deque[Event] = deque()
+        """Put in what shall happen."""
+        self._signal, self._n_scans, self._block = signal, n_scans, block
+
+    def __enter__(self) -> Self:
+        """The source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def fault(self) -> str:
+        """Nothing is ever wrong."""
+        return ""
+
+    def start(self) -> None:
+        """Nothing to prepare."""
+
+    def stop(self) -> None:
+        """End at the next block."""
+        self._n_scans = 0
+
+    def close(self) -> None:
+        """End at the next block."""
+        self.stop()
+
+    def blocks(self) -> Iterator[Block]:
+        """The blocks."""
+        first = 0
+        while first < self._n_scans:
+            yield Block(first, quantise(self._signal(first, self._block), self.channels))
+            first += self._block
+
+
+@dataclass(frozen=True)
+class EmulationSetup:
+    """What is on the inputs of an emulated device, and how it is to be served."""
+
+    signal_at: Callable[[float], SignalFunction]
+    """Function that makes, for a sample rate (Hz), the signal that the sensors feel."""
+    inputs: tuple[SensorInput, ...]
+    """The sensors, in the order of the signal's rows."""
+    sample_rate: float
+    """Sample rate of a device that has only one (Hz)."""
+    realtime: bool = True
+    """Whether it sends by the clock; False sends as fast as the host reads."""
+    tcp: bool = False
+    """Whether it serves a TCP port of this computer instead of a pseudo-terminal."""
+    digital_clock: bool = False
+    """Whether a square wave is on digital input 0."""
+
+
+class Wire(Protocol):
+    """Bytes both ways."""
+
+    port: str
+    """Port that the host opens."""
+    pending: bytearray
+    """Bytes that wait to be sent."""
+
+    def exchange(self, timeout: float) -> bytes:
+        """Send what fits of `pending` and return what has come, after at most timeout (s)."""
+        ...
+
+    def close(self) -> None:
+        """Hang up."""
+        ...
+
+
+class PtyWire:
+    """A pseudo-terminal in raw mode."""
+
+    def __init__(self, link: Path | None = None) -> None:
+        """Open it, and make link lead to it; the host's end stays open here too, so that a host may come and go.
+
+        DataError where there is none.
+        """
+        import pty
+        import tty
+
+        try:
+            self._master, self._slave = pty.openpty()
+        except OSError as error:
+            raise DataError(f"no pseudo-terminal can be had here ({error}); go through TCP, with --tcp") from error
+        self._open = [self._slave, self._master]
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        self.pending = bytearray()
+        if link is not None:
+            link.unlink(missing_ok=True)
+            link.symlink_to(self.port)
+
+    def exchange(self, timeout: float) -> bytes:
+        """See Wire."""
+        sending = [self._master] if self.pending else []
+        readable, writable, _ = select.select([self._master], sending, [], timeout)
+        with contextlib.suppress(BlockingIOError):  # the host may flush between select and here
+            if writable:
+                del self.pending[: os.write(self._master, memoryview(self.pending)[:65536].tobytes())]
+            if readable:
+                return os.read(self._master, 65536)
+        return b""
+
+    def close(self) -> None:
+        """See Wire."""
+        while self._open:  # each once: the numbers of closed files are given to others
+            os.close(self._open.pop())
+
+
+class TcpWire:
+    """A listening socket; one host at a time."""
+
+    def __init__(self, number: int = 0, address: str = "127.0.0.1") -> None:
+        """Listen on this port, 0 for a free one, at an address of this computer."""
+        family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        self._listener = socket.create_server((address, number), family=family)
+        self._host: socket.socket | None = None
+        host = f"[{address}]" if ":" in address else address
+        self.port = f"socket://{host}:{self._listener.getsockname()[1]}"
+        self.pending = bytearray()
+
+    @property
+    def has_host(self) -> bool:
+        """Whether one is connected."""
+        return self._host is not None
+
+    def exchange(self, timeout: float) -> bytes:
+        """See Wire."""
+        if self._host is None:
+            return self._accept(timeout)
+        sending = [self._host] if self.pending else []
+        readable, writable, _ = select.select([self._host], sending, [], timeout)
+        try:
+            if writable:
+                del self.pending[: self._host.send(memoryview(self.pending)[:65536].tobytes())]
+            data = self._host.recv(65536) if readable else None
+        except ConnectionError:
+            data = b""
+        if data == b"":
+            self._hang_up()
+        return data or b""
+
+    def close(self) -> None:
+        """See Wire."""
+        self._hang_up()
+        self._listener.close()
+
+    def _accept(self, timeout: float) -> bytes:
+        self.pending.clear()
+        if select.select([self._listener], [], [], timeout)[0]:
+            self._host = self._listener.accept()[0]
+            self._host.setblocking(False)
+        return b""
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._host = None
+
+
+class EmulatorThread(ABC):
+    """A context manager; while it lasts `serve_once` is called over and over."""
+
+    def __init__(self, tcp: bool, link: Path | None = None) -> None:
+        """tcp listens on loopback instead of a pseudo-terminal; link: a name that always leads to that."""
+        self._tcp, self._link = tcp or os.name == "nt", link
+        self.port = ""
+        """What the host opens."""
+        self.plug_in()
+
+    def __enter__(self) -> Self:
+        """Start serving."""
+        self.serve()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Hang up."""
+        self.unplug()
+
+    def plug_in(self) -> None:
+        """A new wire that nobody serves yet: with tcp on the same port as before, if there was one."""
+        self.wire: Wire = TcpWire(int(self.port.rpartition(":")[2] or 0)) if self._tcp else PtyWire(self._link)
+        self.port = self.wire.port
+        self._stopping = False
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name=type(self).__name__, daemon=True)
+
+    def serve(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def unplug(self) -> None:
+        """Pull the cable: the host's port fails, whatever it was doing."""
+        self._stopping = True
+        self._thread.join(timeout=5.0)
+        self.wire.close()
+
+    def wait(self) -> None:
+        """Serve until interrupted or unplugged."""
+        while not self._ended.wait(timeout=0.2):  # an interrupted Thread.join takes the thread for ended
+            pass
+
+    @abstractmethod
+    def serve_once(self) -> bool:
+        """Answer what has come and send what is due; False to hang up."""
+
+    def _serve(self) -> None:
+        try:
+            while not self._stopping and self.serve_once():
+                pass
+            if not self._stopping:
+                self.wire.close()
+        finally:
+            self._ended.set()

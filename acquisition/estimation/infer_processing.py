@@ -1,0 +1,162 @@
+"""Infer unstated processing of an FRF: averages, window, zero padding and smoothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.frf import Frf
+from acquisition.hit import Hit
+from acquisition.hits.pulse import count_pre_hit_samples
+
+COHERENCE_BLOCK_LINES = 32
+"""Lines looked at together."""
+MIN_COHERENCE_BLOCKS = 4
+"""With fewer the answer is too uncertain."""
+MAX_QUARTILE_RATIO = 3.0
+"""Ratio of the upper to the lower quartile of the blocks above which the coherence is not that of the FRF."""
+MIN_INCOHERENCE = 1e-7
+"""1 - coherence below which only rounding is seen."""
+
+
+def infer_averages(frf: Frf) -> int | None:
+    """Number of hits whose scatter from line to line fits the coherence; None where it cannot be told.
+
+    The coherence says how far single hits scatter, |H|^2 (1 - g2)/g2; the mean of n of them scatters by 1/n of that,
+    which third differences of neighbouring lines show. It takes the noise of neighbouring lines as independent: a
+    Hann window or interpolated lines make the answer too large. Its error is some 15 % with 500 lines. Source: variance
+    of H1, Bendat & Piersol, Random Data, ch. 9; n - 1 degrees of freedom of the residual of n hits.
+
+    >>> random = np.random.default_rng(1)
+    >>> noise = random.normal(0.0, 0.1, (2, 2000)) / np.sqrt(2 * 8)  # of a mean of 8
+    >>> frf = Frf(np.arange(1.0, 2001.0), 1 + noise[0] + 1j * noise[1], coherence=np.full(2000, 1 / 1.01))
+    >>> infer_averages(frf)  # some 15 % of error
+    9
+    """
+    if frf.coherence is None:
+        return None
+    g2 = np.clip(frf.coherence, 1e-6, 1.0)[1:-2]
+    of_hits = np.abs(frf.receptance[1:-2]) ** 2 * (1 - g2) / g2
+    of_mean = np.abs(np.diff(frf.receptance, 3)) ** 2 / 20
+    incoherent = _compute_block_means(1 - g2) > MIN_INCOHERENCE
+    ratios = (_compute_block_means(of_hits) / np.maximum(_compute_block_means(of_mean), 1e-300))[incoherent]
+    if ratios.size < MIN_COHERENCE_BLOCKS:
+        return None
+    low, middle, high = np.quantile(ratios, [0.25, 0.5, 0.75])
+    return round(1 + middle) if high < MAX_QUARTILE_RATIO * low and middle > 1.5 else None
+
+
+def _compute_block_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means over some lines each."""
+    return np.asarray(
+        values[: values.size // COHERENCE_BLOCK_LINES * COHERENCE_BLOCK_LINES]
+        .reshape(-1, COHERENCE_BLOCK_LINES)
+        .mean(axis=1)
+    )
+
+
+WINDOW_NOISE_RATIO = 2.0
+"""Times that the noise before the hit is that of the last tenth where a window lies over both; chance reaches 1.3."""
+MIN_WINDOW_SAMPLES = 32
+"""Samples before the hit that are too few to tell."""
+
+
+def infer_window(hits: Sequence[Hit]) -> float | None:
+    """Time constant of the window over the responses of these hits (s), about; None where there is no sign of one.
+
+    Nothing that rings after a hit can make its end quieter than it was before it: a window does. The noise is that of
+    differences of neighbouring samples, which hum hardly enters; the window falls from its middle before the hit to
+    that of the last tenth. An end of zeros is padding and tells nothing.
+    """
+    falls = [fall for fall in map(_measure_noise_drop, hits) if fall is not None]
+    if not falls:
+        return None
+    ratio, apart = np.median(falls, axis=0)
+    return float(apart / np.log(ratio)) if ratio > WINDOW_NOISE_RATIO else None
+
+
+def _measure_noise_drop(hit: Hit) -> tuple[float, float] | None:
+    """Noise before the hit over that at the end, and the time between (s); None where one of them cannot be told."""
+    before, tenth = int(0.8 * count_pre_hit_samples(hit)), hit.acceleration.size // 10
+    if min(before, tenth) < MIN_WINDOW_SAMPLES:
+        return None
+    quiet, end = (np.std(np.diff(part)) for part in (hit.acceleration[:before], hit.acceleration[-tenth:]))
+    apart = (hit.acceleration.size - tenth / 2 - before / 2) / hit.sample_rate
+    return (float(quiet / end), apart) if end > 0 else None
+
+
+TIME_PARTS = 40
+"""Parts of the time that are looked at."""
+PADDING_DROP_RATIO = 10.0
+"""Times that the end of what was recorded is what follows it, and that it falls faster there than just before."""
+MIN_PADDING_LINES = 160
+"""Lines that are too few to tell."""
+MIN_PADDING_LEVEL = 1e-7
+"""Share of the hit below which a level means nothing."""
+
+
+def infer_recorded_share(frf: Frf) -> float:
+    """Share (0 to 1) of one over the line spacing that was recorded; the rest is zeros, and 1 where nothing shows it.
+
+    A record that is filled up with zeros has lines nearer to each other than one over its length, and its impulse
+    response, noise and all, ends at once where the zeros begin; ringing falls no faster there than before. Told of an
+    evenly spaced axis only.
+
+    >>> time = np.arange(1000)
+    >>> decay = np.exp(-time / 200.0) * np.cos(time) + np.random.default_rng(1).normal(0.0, 0.01, 1000)
+    >>> spectrum = np.fft.rfft(np.append(decay, np.zeros(1000)))[1:-1]  # filled up with as many zeros
+    >>> round(infer_recorded_share(Frf(np.arange(1.0, 1000.0), spectrum)), 1)
+    0.5
+    """
+    frf = frf.in_band(frf.usable_band)
+    frequency, steps = frf.frequency, np.diff(frf.frequency)
+    if frequency.size < MIN_PADDING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+        return 1.0
+    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
+    response = np.abs(np.fft.ifft(frf.accelerance * taper))
+    levels = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response, TIME_PARTS)])
+    for end in range(3, TIME_PARTS - 4):
+        last, zeros = levels[end - 1], np.max(levels[end + 1 : -2])
+        before = levels[end - 3] / last
+        if last > max(PADDING_DROP_RATIO * zeros * max(before, 1.0), MIN_PADDING_LEVEL * np.max(response)):
+            return (end + 0.5) / TIME_PARTS
+    return 1.0
+
+
+MIN_SMOOTHING_LINES = 128
+"""Lines that are too few to tell."""
+NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN = (0.85, 0.95), (0.45, 0.55)
+"""Times, as shares of the record, just before the hit comes round again, and as far from it as can be."""
+SMOOTHING_NOISE_RATIO = 2.0
+"""Times that the noise near the hit is that far from it where lines were smoothed; of three it is 2.3 and more."""
+MAX_PRE_HIT_SHARE = 0.1
+"""Share of the hit itself above which what comes before it is no noise: an FRF whose phase is conjugated."""
+TAPER_LEAK_RATIO = 10.0
+"""Least level that means anything, over what the taper lets through of the hit."""
+
+
+def is_smoothed(frf: Frf) -> bool:
+    """Whether the noise of neighbouring lines is alike, as a mean over them, or a Hann window on them, makes it.
+
+    To smooth the lines is to lay a window over the impulse response that falls away from the hit on both sides. What
+    rings decays after the hit, and noise is the same everywhere, so that nothing else leaves more just before the hit
+    than half a record away from it. Told of an evenly spaced axis only, and only where there is noise.
+    Source: Bendat & Piersol, Random Data, ch. 11 (smoothing over frequency as a window over lag).
+    """
+    frf = frf.in_band(frf.usable_band)
+    frequency, steps = frf.frequency, np.diff(frf.frequency)
+    if frequency.size < MIN_SMOOTHING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+        return False
+    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
+    response = np.abs(np.fft.ifft(frf.accelerance * taper)) ** 2
+    near, far = (
+        float(np.mean(response[_make_span_slice(share, response.size)])) for share in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
+    )
+    leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * response.size) ** -10
+    return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(response) < MAX_PRE_HIT_SHARE**2)
+
+
+def _make_span_slice(share: tuple[float, float], size: int) -> slice:
+    return slice(round(share[0] * size), round(share[1] * size))

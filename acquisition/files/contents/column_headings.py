@@ -1,0 +1,212 @@
+"""Infer name, unit and role of columns from their headings or from user input."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from acquisition.files.contents.contents import Role, Signal
+from acquisition.files.contents.description import ImportReport
+from acquisition.files.contents.units import VOLTAGE_UNITS, parse_unit
+
+_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
+_PART_OF_FRF = re.compile(
+    r"((?:re|real|im|imag|imaginary|abs|mag|magnitude|arg|angle|phase)\s*"
+    r"[\[(]\s*(?!hz)(?:h|frf)\w*(?:\(\w+\))?\s*[\])])\s*(.*)",
+    re.IGNORECASE,
+)
+"""Such as Re(H), or imag(FRF) [m/N]."""
+_BEFORE_UNIT = re.compile(r"\s*/\s*|\s*,\s*|\s+in\s+")
+"""Between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
+ANGLE_UNITS = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度"), "deg") | {
+    "rad": "rad",
+    "radians": "rad",
+}
+"""Units of a phase as they are written in lower case."""
+_DECIBEL_NAME = re.compile(r"(?<![^\W_])db(?![^\W\d_])", re.IGNORECASE)
+"""In the name of a level: "Magnitude dB", "Mag_dB"."""
+_FRF_PREFIX = re.compile(r"(frf|receptance|mobility|accelerance|h\d?)(?![^\W_])[\W\d_]*")
+"""What stands before the part of an FRF that a column holds: "H1 real"."""
+_ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
+    (r"time|zeit|temps|tiempo|tempo|时间|時間|t$|x_value$", "time"),
+    (r"freq|frec|频率|頻率|周波数|f$", "frequency"),
+    (r"re\b|real|reel|part\w+ re|实部|実部", "real"),
+    (r"im\b|imag|part\w+ im|虚部", "imag"),
+    (r"coh|koharenz|gamma|相干|コヒーレンス", "coherence"),
+    (r"phase|fase|angle|arg\b|相位|位相", "phase"),
+    (r"mag|ampl|ampiezza|module|modulo|abs\b|betrag|db\b|幅值|振幅", "magnitude"),
+    (_FRF_PREFIX.pattern, "frf"),
+    (r"force|hammer|kraft|fuerza|forza|力", "force"),
+    (r"acc|acel|resp|vel|disp|beschl|加速度|速度|位移|変位", "response"),
+    (r"tacho", "tacho"),
+)
+"""Beginnings of names in lower case and without accents, in seven languages -> what the column is."""
+COLUMN_ROLES: dict[str, tuple[Role, str]] = {
+    "time": ("time", ""),
+    "frequency": ("frequency", ""),
+    "force": ("force", "force"),
+    "response": ("response", ""),
+    "acceleration": ("response", "acceleration"),
+    "velocity": ("response", "velocity"),
+    "displacement": ("response", "displacement"),
+    "frf": ("frf", ""),
+    "receptance": ("frf", "displacement"),
+    "mobility": ("frf", "velocity"),
+    "accelerance": ("frf", "acceleration"),
+    "real": ("real", ""),
+    "imag": ("imag", ""),
+    "magnitude": ("magnitude", ""),
+    "db": ("magnitude", ""),
+    "phase": ("phase", ""),
+    "coherence": ("coherence", ""),
+    "speed": ("speed", ""),
+    "tacho": ("tacho", ""),
+    "-": ("ignored", ""),
+}
+"""What `--columns` may call a column -> its role and quantity."""
+
+
+def split_heading(heading: str) -> tuple[str, str]:
+    """Of "Force [N]", "Force (N)", "Force / N", "force_N" or "Re(H) [m/N]"; no unit where none stands apart."""
+    part = _PART_OF_FRF.fullmatch(heading)
+    if part:
+        return part[1], split_heading(part[2])[1]
+    bracketed = _BRACKETS.fullmatch(heading)
+    if bracketed:
+        return bracketed[1], bracketed[2]
+    for sign in (*re.finditer("_", heading), *_BEFORE_UNIT.finditer(heading)):
+        name, unit = heading[: sign.start()], heading[sign.end() :]
+        if name and is_unit(unit) and not is_unit(name.split()[-1]):
+            return name, unit
+    return heading, ""
+
+
+def is_unit(text: str) -> bool:
+    """Whether it is a unit that is known, of an angle, of a level (dB) or of a voltage, too."""
+    return parse_unit(text) is not None or text.lower() in ANGLE_UNITS | VOLTAGE_UNITS or is_decibel(text)
+
+
+def is_decibel(unit: str) -> bool:
+    """Whether a unit is dB of something."""
+    return unit.lower().startswith("db")
+
+
+def infer_decibel_unit(name: str, unit: str) -> str:
+    """The unit of a column; "dB m/N" where its name says that it is a level of what its unit says."""
+    return f"dB {unit}".strip() if _DECIBEL_NAME.search(name) and not is_decibel(unit) else unit
+
+
+def parse_decibel_reference(unit: str) -> str:
+    """The unit that a level is a multiple of, "1 um/N" of "dB re 1 um/N"; empty where it does not say."""
+    reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?(?:\)\s*[\[(]|[\s,)]*)", "", unit)
+    is_known = parse_unit(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
+    return reference if is_known else ""
+
+
+def infer_role(name: str, unit: str) -> Role:
+    """What a column is by its name and its unit, the unit first; empty where neither tells."""
+    letters = unicodedata.normalize("NFKD", name.strip().lower())
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    plain = (
+        _FRF_PREFIX.sub("", plain, count=1) if _FRF_PREFIX.match(plain) and not _FRF_PREFIX.fullmatch(plain) else plain
+    )
+    by_name = next((role for pattern, role in _ROLE_PATTERNS if re.match(pattern, plain)), "")
+    parsed = parse_unit(unit)
+    quantity = parsed.quantity if parsed else ""
+    if quantity == "frequency" and by_name != "frequency" and parsed == parse_unit("rpm"):
+        return "speed"
+    of_frf = by_name in ("real", "imag", "magnitude", "phase", "coherence", "frf")
+    if quantity in ("time", "frequency", "force") and not (len(name) > 1 and by_name in ("time", "frequency")):
+        return quantity
+    if quantity in ("displacement", "velocity", "acceleration") and not of_frf:
+        return "response"
+    return by_name  # type: ignore[return-value]
+
+
+def assign_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: ImportReport) -> tuple[Signal, ...]:
+    """The signals with the roles and units that `columns` gives them, in its order; what it leaves out is left out.
+
+    "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
+    second column of H.
+    """
+    named = list[Signal]()
+    in_order = not any("=" in text for text in columns)
+    if in_order and len(columns) < len(signals):
+        ledger.faults.append(
+            f"--columns names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}; name all in "
+            'their order, "-" for what is left out, or each as in "real=2"'
+        )
+    for number, text in enumerate(columns):
+        heading, _, name = text.partition("=")
+        signal = _select_signal(signals, name.strip(), number, ledger)
+        word, unit = split_heading(heading.strip())
+        role = COLUMN_ROLES.get(word.strip().lower())
+        if role is None:
+            ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(COLUMN_ROLES)}")
+        elif signal is not None and role[0] != "ignored":
+            unit = infer_decibel_unit(word, unit or signal.unit)
+            if any(signal.values is other.values for other in named):
+                ledger.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
+            named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
+    return tuple(named)
+
+
+def _select_signal(signals: Sequence[Signal], name: str, number: int, ledger: ImportReport) -> Signal | None:
+    if not name and number < len(signals):
+        return signals[number]
+    if name:
+        return find_column(signals, name, "--columns", ledger)
+    ledger.faults.append(f"--columns: no column {number + 1} in the file, which holds {format_signal_names(signals)}")
+    return None
+
+
+def find_column(signals: Sequence[Signal], name: str, option: str, ledger: ImportReport) -> Signal | None:
+    """That of a name, heading, unit or number; None where there is none or are several, which the ledger says."""
+    meant = _match_columns(signals, name)
+    if len(meant) == 1:
+        return meant[0]
+    names = format_signal_names(signals)
+    if meant:
+        numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
+        ledger.faults.append(f"{option}: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
+    else:
+        ledger.faults.append(f"{option}: nothing called {name!r} in the file, which holds {names}")
+    return None
+
+
+def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
+    """Those of a name, else shown so, of this number, of this unit."""
+    unit = parse_unit(name)
+    tests: tuple[Callable[[int, Signal], bool], ...] = (
+        lambda _, signal: signal.name == name,
+        lambda _, signal: (
+            name in (_format_signal_name(signal), f"{_format_signal_name(signal)} ({signal.values.size})")
+        ),
+        lambda _, signal: bool(signal.unit) and split_heading(name) == (signal.name, signal.unit),
+        lambda _, signal: re.fullmatch(rf"{re.escape(name)}:\d+", signal.name) is not None,
+        lambda number, _: name == str(number),
+        lambda _, signal: (
+            bool(signal.unit) and (signal.unit == name or (unit is not None and parse_unit(signal.unit) == unit))
+        ),
+    )
+    for test in tests:
+        if meant := [signal for number, signal in enumerate(signals, 1) if test(number, signal)]:
+            return meant
+    return []
+
+
+def format_signal_names(signals: Sequence[Signal], most: int = 12) -> str:
+    """What a file holds, for a sentence: names with units, and with how long they are where they differ in that."""
+    with_size = len({signal.values.size for signal in signals}) > 1
+    whole = [
+        f"{_format_signal_name(signal)} ({signal.values.size})" if with_size else _format_signal_name(signal)
+        for signal in signals
+    ]
+    return ", ".join(whole[:most]) + (f" and {len(whole) - most} more" if len(whole) > most else "")
+
+
+def _format_signal_name(signal: Signal) -> str:
+    text = f"{signal.name} [{signal.unit}]" if signal.unit else signal.name
+    return re.sub(r"\s+", " ", text)

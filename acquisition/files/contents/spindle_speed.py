@@ -1,0 +1,128 @@
+"""Spindle speed from a speed column or the pulses of a tachometer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.files.contents.column_headings import find_column
+from acquisition.files.contents.contents import Signal
+from acquisition.files.contents.description import Description, ImportReport
+from acquisition.files.contents.units import parse_unit
+
+PULSE_ON_LEVEL, PULSE_OFF_LEVEL = 0.6, 0.4
+"""Share of the range of the signal above which a pulse has begun, and below which it is over; chosen."""
+MAX_TURN_RATIO = 1.4
+"""Time of a turn over that of most beside it, or its inverse, from which on pulses are missing or too many; chosen."""
+MIN_REGULAR_TURNS_SHARE = 0.8
+"""Share of the turns that must be as long as those beside them; chosen."""
+NEIGHBOR_TURNS = 5
+"""Turns on each side that a turn is compared with; chosen."""
+
+
+def compute_speed_from_pulses(signal: NDArray[np.float64], sample_rate: float, pulses: int = 1) -> NDArray[np.float64]:
+    """Spindle speed at each sample (rpm), shape (n,), from a tachometer in any unit, shape (n,); sample_rate in Hz.
+
+    pulses: in a turn; from one turn to the next the speed is constant, NaN before the first, after the last and where
+    a pulse is missing. Its mean over time is the number of turns over their time. ValueError for less than two turns,
+    for pulses that come at no even times, and pulses < 1.
+
+    Example: a pulse of 2 ms each 20 ms.
+
+    >>> pulse = np.where(np.arange(2000) % 200 < 20, 5.0, 0.0)
+    >>> np.unique(compute_speed_from_pulses(pulse, 10e3)[200:1600].round(3)).tolist()
+    [3000.0]
+    """
+    if pulses < 1:
+        raise ValueError(f"{pulses} pulses a turn; give 1 or more")
+    begins = _find_rising_edges(signal)
+    marks = begins[::pulses]
+    if marks.size < 3:
+        raise ValueError(
+            f"{begins.size} pulses in {signal.size / sample_rate:.3g} s, less than two turns of {pulses}; is the "
+            "tachometer connected, and is this its column?"
+        )
+    turn = np.diff(marks)
+    usual = np.array([np.median(turn[max(i - NEIGHBOR_TURNS, 0) : i + NEIGHBOR_TURNS + 1]) for i in range(turn.size)])
+    is_even = np.maximum(turn / usual, usual / turn) < MAX_TURN_RATIO
+    if np.mean(is_even) < MIN_REGULAR_TURNS_SHARE:
+        raise ValueError(f"{begins.size} pulses at no even times; is the tachometer connected, and is this its column?")
+    speed = np.full(signal.size, np.nan)
+    edges = np.ceil(marks).astype(int)
+    for first, last, time in zip(edges[:-1][is_even], edges[1:][is_even], turn[is_even], strict=True):
+        speed[first:last] = 60 * sample_rate / time
+    return speed
+
+
+def _find_rising_edges(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where pulses begin, in samples and parts of them."""
+    low, high = float(np.min(signal)), float(np.max(signal))
+    if not high > low:
+        return np.empty(0)
+    level = (signal - low) / (high - low)
+    state = np.where(level > PULSE_ON_LEVEL, 1, np.where(level < PULSE_OFF_LEVEL, -1, 0))
+    known = np.flatnonzero(state)
+    rises = (state[known[1:]] > 0) & (state[known[:-1]] < 0)
+    after, before = known[1:][rises], known[:-1][rises]
+    share = (PULSE_ON_LEVEL - level[before]) / (level[after] - level[before])
+    return np.asarray(before + share * (after - before), dtype=np.float64)
+
+
+SPEED_ROLES = ("speed", "tacho")
+"""Roles of a column of the speed."""
+
+
+def split_speed_column(
+    signals: Sequence[Signal], description: Description, ledger: ImportReport
+) -> tuple[list[Signal], Signal | None]:
+    """The signals without that of the speed, and that one; None where there is none."""
+    columns = [signal for signal in signals if signal.role in SPEED_ROLES]
+    if description.tacho:
+        named = find_column(signals, description.tacho, "--tacho", ledger)
+        columns = [] if named is None else [named]
+    if len(columns) > 1:
+        names = " and ".join(signal.name for signal in columns)
+        ledger.add_missing(f"which of {names} is the speed of the spindle", f'--tacho "{columns[0].name}"')
+    rest = [
+        signal for signal in signals if not (signal.role in SPEED_ROLES or any(signal is column for column in columns))
+    ]
+    if description.pulses is not None and not columns:
+        ledger.faults.append(f"--pulses {description.pulses}: no column is a tachometer; name it with --tacho")
+    return rest, columns[0] if columns else None
+
+
+def resolve_speed(
+    signal: Signal, sample_rate: float, description: Description, ledger: ImportReport
+) -> NDArray[np.float64] | None:
+    """Spindle speed at each sample (rpm), NaN where it is not known; None where the ledger says what is wrong."""
+    unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
+    if signal.role == "speed" and (unit is None or unit.quantity != "frequency"):
+        ledger.add_missing(f"the unit of the speed in {signal.name}", f'--columns "speed [rpm]={signal.name}"')
+        return None
+    if unit is not None and unit.quantity == "frequency":
+        return _convert_speed(signal, values, 60 * unit.factor, description, ledger)
+    try:
+        return compute_speed_from_pulses(values, sample_rate, 1 if description.pulses is None else description.pulses)
+    except ValueError as error:
+        ledger.faults.append(f"{signal.name}: {error}")
+        return None
+
+
+def _convert_speed(
+    signal: Signal, values: NDArray[np.float64], factor: float, description: Description, ledger: ImportReport
+) -> NDArray[np.float64] | None:
+    """factor: rpm per unit."""
+    if description.pulses is not None:
+        ledger.faults.append(
+            f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit}); leave it out"
+        )
+        return None
+    speed = np.abs(values) * factor
+    if not np.any(speed > 0):
+        ledger.faults.append(
+            f"{signal.name}: stands at 0 {signal.unit} all along; name another column, or leave it out"
+        )
+        return None
+    return np.where(speed > 0, speed, np.nan)

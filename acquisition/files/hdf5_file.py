@@ -1,0 +1,82 @@
+"""Open HDF5 files in memory, limit their unpacked size and protect them with a checksum."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from acquisition.errors import DataError
+
+if TYPE_CHECKING:
+    import h5py
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""First bytes of such a file."""
+
+
+def open_hdf5(memory: io.BytesIO, mode: Literal["r", "r+", "w"]) -> h5py.File:
+    """The file that these bytes are or become; OSError where they are none."""
+    import h5py  # takes longer to import than what a command needs that opens no file
+
+    return h5py.File(memory, mode)
+
+
+MIN_UNPACKED_LIMIT = 100_000_000
+"""Bytes that may be unpacked from any file."""
+MAX_UNPACKED_RATIO = 20
+"""What is larger may be so many times as large as the file: real signals shrink to a half or a quarter."""
+
+
+def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
+    """DataError for a file of `packed` bytes whose data sets are out of proportion; none of them is read."""
+    import h5py  # here already: the file is open
+
+    sizes: list[int] = []
+    try:
+        file.visititems(
+            lambda _, node: sizes.append(_measure_unpacked_size(node)) if isinstance(node, h5py.Dataset) else None
+        )
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
+    if sum(sizes) > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
+        raise DataError(
+            f"{path}: {packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; at most {MIN_UNPACKED_LIMIT / 1e6:g} MB or "
+            f"{MAX_UNPACKED_RATIO} times the file are read; no tap test is like that: take it again from where it was recorded"
+        )
+
+
+def _measure_unpacked_size(data: h5py.Dataset) -> int:
+    """Bytes in memory, in whole chunks, as they are unpacked."""
+    if data.shape is None:
+        return 0
+    chunks = data.chunks or (1,) * len(data.shape)
+    length = math.prod(math.ceil(n / chunk) * chunk for n, chunk in zip(data.shape, chunks, strict=True))
+    return int(length * data.dtype.itemsize)
+
+
+CHECKSUM_MARK = b"\nlobewatch sha256 "
+"""How a seal begins; a file that does not end with one has none."""
+CHECKSUM_SIZE = len(CHECKSUM_MARK) + 64 + 1
+
+
+def append_checksum(content: bytes) -> bytes:
+    """The content and its SHA-256."""
+    return content + _format_checksum(content)
+
+
+def has_wrong_checksum(content: bytes) -> bool:
+    """Whether a file has a seal that does not fit the rest of it: one flipped bit can make HDF5 hang or crash."""
+    seal = content[-CHECKSUM_SIZE:]
+    return seal.startswith(CHECKSUM_MARK) and seal != _format_checksum(content[:-CHECKSUM_SIZE])
+
+
+def has_valid_checksum(content: bytes) -> bool:
+    """Whether a file has a seal that fits the rest of it."""
+    return content[-CHECKSUM_SIZE:] == _format_checksum(content[:-CHECKSUM_SIZE])
+
+
+def _format_checksum(content: bytes) -> bytes:
+    return CHECKSUM_MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"

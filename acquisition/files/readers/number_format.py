@@ -1,0 +1,185 @@
+"""Parse numbers with decimal points or commas and thousands separators.
+
+What a comma or a point is for, a number tells in which it can be one thing only: `0,5` and `1,2e-6` have a decimal
+comma, `1,234.5` and `1,234,567` commas between thousands; `1,234` alone may be either.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+SignUse = Literal["decimal", "thousands", "doubtful"]
+"""What a sign in a number is for."""
+
+_OTHER_SIGN = {",": ".", ".": ","}
+_BLANK_CHARACTERS = " \u00a0\u2009\u202f'\u2019"
+"""Blanks that stand between thousands, some of which do not break or are thin, and apostrophes."""
+_EXPONENT = r"(?:[eEdD][+-]?\d+)?"
+_THOUSANDS_PATTERN = {
+    sign: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{sign}]\d{{3}})+(?:[{other}]\d*)?")
+    for sign, other in _OTHER_SIGN.items()
+}
+_DECIMAL_PATTERN = {
+    sign: re.compile(
+        rf"\(?[+-]?(?:\d*|[1-9]\d{{0,2}}(?:[{_BLANK_CHARACTERS}{other}]\d{{3}})+)[{sign}]\d+{_EXPONENT}(?:[+-][\d.,]+{_EXPONENT}j)?\)?"
+    )
+    for sign, other in _OTHER_SIGN.items()
+}
+_WITH_BLANKS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{_BLANK_CHARACTERS}]\d{{3}})+(?:[.,]\d*)?{_EXPONENT}")
+_IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
+_MISSING_VALUE = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QNAN|SNAN)0*", re.IGNORECASE)
+"""In place of a number, as spreadsheets and older C libraries write it."""
+
+
+@dataclass(frozen=True)
+class NumberFormat:
+    """How the numbers of a file are written."""
+
+    comma: SignUse = "decimal"
+    """What a comma is for."""
+    point: SignUse = "decimal"
+    """What a point is for."""
+
+    @property
+    def non_decimal_signs(self) -> str:
+        """Those of both signs that are no decimal sign, or perhaps none."""
+        return "".join(sign for sign, use in ((",", self.comma), (".", self.point)) if use != "decimal")
+
+    def parse(self, word: str) -> complex:
+        """A word as a number, real where it is; ValueError, as the end of a sentence, where it is none or in doubt."""
+        plain = re.sub(f"[{_BLANK_CHARACTERS}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
+        for sign, use in ((",", self.comma), (".", self.point)):
+            if use != "decimal" and sign in plain:
+                plain = _remove_thousands(plain, sign, use)
+        try:
+            return _parse_number(plain.replace(",", "."))
+        except ValueError:
+            raise ValueError("which is no number") from None
+
+
+PLAIN_NUMBER_FORMAT = NumberFormat()
+"""A decimal point or comma, and nothing between thousands."""
+
+
+def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
+    """A number without what stands between its thousands; ValueError where that is not known, or elsewhere."""
+    if not _THOUSANDS_PATTERN[sign].fullmatch(word):
+        raise ValueError("which is no number")
+    if use == "doubtful":
+        either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
+        raise ValueError(f"which may be {either} (--decimal comma or --decimal point)")
+    return word.replace(sign, "")
+
+
+def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
+    """How the numbers of each column are written: as one of its own tells, else as those of the others do, if alike."""
+    commas, points = ([_infer_sign_use(sign, column) for column in columns] for sign in _OTHER_SIGN)
+    comma, point = _agree_on_use(commas), _agree_on_use(points)
+    if point == "doubtful" and not {"decimal", "doubtful"} & {*commas}:
+        point = "decimal"
+    return [
+        NumberFormat(*uses) for uses in zip(_resolve_uses(commas, comma), _resolve_uses(points, point), strict=True)
+    ]
+
+
+def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
+    """What a sign is for in these words; None where no number has one."""
+    if sign not in "".join(words):
+        return None
+    uses = (use for word in words if sign in word if (use := _classify_sign(sign, word)) is not None)
+    first = next(uses, None)
+    return next((use for use in uses if use != "doubtful"), first) if first == "doubtful" else first
+
+
+def _agree_on_use(uses: Sequence[SignUse | None]) -> SignUse:
+    """What a sign is for in all columns that tell; in doubt where none does, or one other than another."""
+    certain = {use for use in uses if use in ("decimal", "thousands")}
+    return certain.pop() if len(certain) == 1 else "doubtful"
+
+
+def _resolve_uses(uses: Sequence[SignUse | None], agreed: SignUse) -> list[SignUse]:
+    return [agreed if use == "doubtful" else use or "decimal" for use in uses]
+
+
+def _classify_sign(sign: str, word: str) -> SignUse | None:
+    if _THOUSANDS_PATTERN[sign].fullmatch(word):
+        return "thousands" if word.count(sign) > 1 or _OTHER_SIGN[sign] in word else "doubtful"
+    return "decimal" if _DECIMAL_PATTERN[sign].fullmatch(word) else None
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number, however that is written."""
+    try:
+        PLAIN_NUMBER_FORMAT.parse(word)
+    except ValueError:
+        return any(_classify_sign(sign, word) for sign in _OTHER_SIGN)
+    return True
+
+
+def _parse_number(plain: str) -> complex:
+    """A number with a decimal point; ValueError where it is none."""
+    try:
+        return float(plain)
+    except ValueError:
+        if _MISSING_VALUE.fullmatch(plain):
+            return math.nan
+        return complex(plain) if _IMAGINARY.fullmatch(plain) else float(re.sub("[dD]", "e", plain))
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The numbers of a column, up to its last cell that is not empty."""
+
+    values: NDArray[Any]
+    """Numbers, complex where one is, NaN where a cell holds none; shape (n,)."""
+    flaws: Mapping[int, str]
+    """What is wrong with a cell that holds none, as "is empty in line 7", by its place in the column."""
+
+
+def parse_columns(columns: Sequence[Sequence[str]], lines: Sequence[int], decimal_sign: str = "") -> list[Column]:
+    """The numbers in the cells of each column, each cell in a line of its own.
+
+    decimal_sign: a comma or a point where the file says it; the other one stands between thousands then.
+    """
+    by_sign = {",": NumberFormat("decimal", "thousands"), ".": NumberFormat("thousands", "decimal")}
+    written = [by_sign[decimal_sign]] * len(columns) if decimal_sign in by_sign else _infer_formats(columns)
+    return [_parse_column(cells, lines, numerals) for cells, numerals in zip(columns, written, strict=True)]
+
+
+def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFormat) -> Column:
+    n = len(cells)
+    while n and not cells[n - 1]:
+        n -= 1
+    at_once = _parse_fast(cells[:n], numerals)
+    if at_once is not None:
+        return Column(at_once, {})
+    values, flaws = list[complex](), dict[int, str]()
+    for i, (cell, line) in enumerate(zip(cells[:n], lines, strict=False)):
+        try:
+            values.append(numerals.parse(cell))
+            fault = "which is no number" if math.isnan(values[-1].real) else ""
+        except ValueError as error:
+            values.append(math.nan)
+            fault = str(error)
+        if fault:
+            flaws[i] = f"holds {cell!r} in line {line}, {fault}" if cell else f"is empty in line {line}"
+    return Column(np.array(values), flaws)
+
+
+def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> NDArray[np.float64] | None:
+    """The numbers of cells, many times as fast; None where one is complex, missing, or has thousands."""
+    text = "\n".join(cells)
+    if any(sign in text for sign in numerals.non_decimal_signs):
+        return None
+    try:
+        values = np.array([*map(float, text.replace(",", ".").split("\n") if "," in text else cells)])
+    except ValueError:
+        return None
+    return None if np.isnan(values).any() else values

@@ -1,0 +1,79 @@
+"""Read WAV, FLAC and MP3 files with one channel per sensor.
+
+WAV by scipy, FLAC and MP3 by soundfile where that is installed (`pip install "lobewatch[sound]"`).
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents, Format, Signal
+
+MP3_SYNC_BITS = 0xFFE0
+"""First bits of a frame of an MP3 file."""
+
+
+def read_audio(path: Path) -> Contents:
+    """Its channels as shares of the full scale, -1 to 1.
+
+    DataError where it is damaged or cut short, or soundfile is not installed.
+    """
+    with path.open("rb") as file:
+        is_wav = _is_wav(file.read(12))
+    rate, columns = _read_wav(path) if is_wav else _read_flac_or_mp3(path)
+    signals = (
+        Signal(f"channel {i}", column, rate=float(rate), per_full_scale=True) for i, column in enumerate(columns, 1)
+    )
+    return Contents(tuple(signals))
+
+
+def _read_wav(path: Path) -> tuple[int, NDArray[np.float64]]:
+    """Sample rate and channels of a WAV file."""
+    import scipy.io.wavfile  # it takes a while, and few files need it
+
+    content = path.read_bytes()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", message="Chunk .non-data. not understood", category=Warning)
+            rate, values = scipy.io.wavfile.read(io.BytesIO(content))
+    except Exception as error:
+        raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
+    columns = np.atleast_2d(values.T)
+    if values.dtype.kind == "u":
+        columns = columns.astype(np.float64) - 128
+    scale = {"i": 2.0 ** (8 * values.dtype.itemsize - 1), "u": 128.0}.get(values.dtype.kind, 1.0)
+    return rate, columns / scale
+
+
+def _read_flac_or_mp3(path: Path) -> tuple[int, NDArray[np.float64]]:
+    """Sample rate and channels of a FLAC or MP3 file."""
+    try:
+        import soundfile
+    except ImportError as error:
+        raise DataError(
+            f'{path}: FLAC and MP3 are read by soundfile; install it: pip install "lobewatch[sound]", or export WAV'
+        ) from error
+    try:
+        values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
+    except Exception as error:
+        raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
+    return rate, values.T
+
+
+def _is_wav(head: bytes) -> bool:
+    return head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE"
+
+
+def _is_audio(head: bytes, _path: Path) -> bool:
+    is_frame = int.from_bytes(head[:2], "big") & MP3_SYNC_BITS == MP3_SYNC_BITS and head[1] & 0x06 == 0x02
+    return _is_wav(head) or head[:4] == b"fLaC" or head[:3] == b"ID3" or is_frame
+
+
+AUDIO_FORMAT = Format("wav", "WAV, FLAC or MP3 file", (".wav", ".flac", ".mp3"), _is_audio, read_audio)

@@ -1,0 +1,145 @@
+"""Read LabVIEW files: LVM text and TDMS."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.errors import DataError
+from acquisition.files.contents.column_headings import infer_role, split_heading
+from acquisition.files.contents.contents import Contents, Format, Signal, list_distinct_names
+from acquisition.files.readers.number_format import parse_columns
+from acquisition.files.readers.text_file import decode_text, read_text
+
+LVM_MAGIC = "LabVIEW Measurement"
+_LVM_HEADER_END = "***End_of_Header***"
+_LVM_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
+
+
+def read_lvm(path: Path) -> Contents:
+    """The channels of every segment; DataError with the place where it fails."""
+    text = read_text(path)
+    lines = text.splitlines()
+    ends = [i for i, line in enumerate(lines) if line.startswith(_LVM_HEADER_END)]
+    if len(ends) < 2:
+        raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
+    pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator stands in one of them
+    head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
+    starts = [*ends[1:], len(lines)]
+    signals = [
+        signal
+        for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False))
+        for signal in _read_lvm_segment(path, lines, places, head, number)
+    ]
+    if not text.endswith("\n"):
+        raise DataError(f"{path}: its last line has no end, so digits may be missing; the file is cut short")
+    return Contents(tuple(signals), created=_parse_lvm_date(head))
+
+
+def _read_lvm_segment(
+    path: Path, lines: Sequence[str], places: tuple[int, int, int], head: Mapping[str, str], record: int
+) -> list[Signal]:
+    before, end, after = places
+    split = _LVM_SEPARATORS.get(head.get("Separator", "Tab"), "\t")
+    rows = [line.split(split) for line in lines[before + 1 : end]]
+    header = {row[0].strip(): [word.strip() for word in row[1:]] for row in rows if row[0].strip()}
+    several = head.get("X_Columns") == "Multi"
+    try:
+        n_channels = int(header["Channels"][0])
+        columns = [2 * i + 1 if several else i + 1 for i in range(n_channels)]
+        at = [column - 1 for column in columns]
+        samples = [int(_get_word(header["Samples"], i) or 0) for i in at]
+        steps = [float((_get_word(header["Delta_X"], i) or "nan").replace(",", ".")) for i in at]
+    except (KeyError, ValueError, IndexError) as error:
+        place = f"{path}: line {before + 2}: the segment's header lacks Channels, Samples or Delta_X"
+        raise DataError(f"{place} ({error})") from error
+    units = [_get_word(header.get("Y_Unit_Label", []), i) for i in at]
+    names = [_get_word(lines[end + 1].split(split) if end + 1 < after else [], column) for column in columns]
+    table = lines[end + 2 : after]
+    lengths = [None if after == len(lines) else n for n in samples]
+    cells = [[_get_word(row.split(split), i) for row in table[:n]] for i, n in zip(columns, lengths, strict=True)]
+    signals = list[Signal]()
+    for i, found in enumerate(parse_columns(cells, range(end + 3, after + 1), head.get("Decimal_Separator", ""))):
+        if samples[i]:
+            n_there = found.values.size
+            if n_there < samples[i]:
+                raise DataError(f"{path}: {n_there} of {samples[i]} samples are there; the file is cut short")
+            name, by_name = split_heading(names[i] or f"channel {i + 1}")
+            unit = units[i] or by_name
+            rate, role = 1 / steps[i] if steps[i] > 0 else None, infer_role(name, unit)
+            signal = Signal(name, found.values, role, unit, rate=rate, record=record)
+            signals.append(replace(signal, n_rows=len(table), flaws=found.flaws))
+    return signals
+
+
+def _get_word(words: Sequence[str], i: int) -> str:
+    return words[i].strip() if i < len(words) else ""
+
+
+def _parse_lvm_date(head: Mapping[str, str]) -> datetime | None:
+    """Date and Time of the header, in the local time zone; None where it has none that can be read."""
+    clock = head.get("Time", "").replace(",", ".").partition(".")[0]
+    try:
+        return datetime.strptime(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S").astimezone()
+    except ValueError:
+        return None
+
+
+def _is_lvm(head: bytes, _path: Path) -> bool:
+    return decode_text(head).startswith(LVM_MAGIC)
+
+
+LVM_FORMAT = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm)
+
+
+def read_tdms(path: Path) -> Contents:
+    """Its channels of numbers, a record a group; DataError where it is damaged, or npTDMS is not installed."""
+    try:
+        from nptdms import TdmsFile
+    except ImportError as error:
+        raise DataError(f'{path}: TDMS is read by npTDMS; install it: pip install "lobewatch[tdms]"') from error
+    try:
+        file = TdmsFile.read(path)
+        groups = file.groups()
+        held = [list(_make_tdms_signals(group.channels(), i)) for i, group in enumerate(groups)]
+        machines = list_distinct_names(group.name for group, signals in zip(groups, held, strict=True) if signals)
+        created = [_get_tdms_start(channel) for group in groups for channel in group.channels()]
+    except Exception as error:
+        raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
+    return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), machines=machines)
+
+
+def _make_tdms_signals(channels: list[Any], record: int) -> Iterator[Signal]:
+    for channel in channels:
+        values = channel[:]
+        if values.dtype.kind in "fiu" and values.size > 1:
+            name, by_name = split_heading(channel.name)
+            unit = str(
+                channel.properties.get("unit_string", "") or channel.properties.get("NI_UnitDescription", "") or by_name
+            )
+            step = float(channel.properties.get("wf_increment", 0) or 0)
+            rate = 1 / step if step > 0 else None
+            yield Signal(name, values.astype(np.float64), infer_role(name, unit), unit, rate=rate, record=record)
+
+
+def _get_tdms_start(channel: Any) -> datetime | None:
+    """Of the waveform; TDMS has it in UTC."""
+    time = channel.properties.get("wf_start_time")
+    if time is None:
+        return None
+    seconds = np.datetime64(time, "us").astype("int64") / 1e6
+    return datetime.fromtimestamp(float(seconds), UTC)
+
+
+def _is_tdms(head: bytes, _path: Path) -> bool:
+    return head.startswith(b"TDSm")
+
+
+TDMS_FORMAT = Format("tdms", "TDMS file", (".tdms",), _is_tdms, read_tdms)

@@ -1,0 +1,266 @@
+"""Read text tables of numbers and B&K PULSE text.
+
+The separator (tab, semicolon, comma, white space), the decimal comma and the columns are found from the rows. Lines
+above them are headings, of any number; the nearest with a word for each column names columns and units,
+`time_s,force_N,acceleration_g`, `Time (s);Force [N];Acc [m/s^2]`, `Freq (Hz) Real (um/N) Imag (um/N)`, or a line of
+units stands below the names. Lines that begin with # may say `key: value`. Some tap-test programs (.frf) write the
+heading behind the first row of numbers. Complex numbers are read as Python, MATLAB and Fortran write them.
+
+Each row is index, abscissa and value, two numbers where it is complex. The header names the function and its unit, the
+unit of the abscissa, and how many rows a block has.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import DataError
+from acquisition.files.contents.column_headings import infer_decibel_unit, infer_role, is_decibel
+from acquisition.files.contents.contents import Contents, Format, Role, Signal
+from acquisition.files.readers.number_format import Column, is_number
+from acquisition.files.readers.table_layout import (
+    Heading,
+    RowLayout,
+    begins_with_number,
+    detect_row_layout,
+    detect_separator,
+    find_heading_above,
+    find_heading_behind,
+    is_unit_line,
+    normalize_complex,
+    read_columns,
+)
+from acquisition.files.readers.text_file import NumberedLines, decode_text, is_text, number_lines, read_text
+
+_DIGIT = re.compile(r"\d|nan|inf", re.IGNORECASE)
+_LEADING_WORD = re.compile(r"[\s\"']*(?!(?:nan|inf|infinity)\b)[^\W\d_]{2}", re.IGNORECASE)
+"""At the begin of a line that is no row."""
+MIN_TABLE_ROWS = 3
+"""Lines in a row that begin with a number where the rows of a table begin."""
+
+
+def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
+    """The columns of a text file behind its first `skip` lines; DataError with the line where it is no table.
+
+    decimal_sign: a comma or a point; empty: what the numbers show.
+    """
+    text = read_text(path)
+    lines, comments = number_lines(text, skip)
+    lines, footer = _remove_footer(lines)
+    pairs = [(key.strip().lower(), value.strip()) for key, _, value in (comment.partition(":") for comment in comments)]
+    keys, machines = dict(pairs), tuple(dict.fromkeys(value for key, value in pairs if key == "machine" and value))
+    signals, notes = list[Signal](), list[str]()
+    for record, table in enumerate(_split_tables(path, lines)):
+        rows, form, heading = _find_rows(path, table, comments)
+        columns = read_columns(rows, form, str(path), decimal_sign)
+        signals += _name_columns(columns, heading, record)
+        beside = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
+        notes += [f"beside its columns stands {word!r} in the last row" for word in beside]
+    _check_complete(path, keys, rows, columns, text)
+    notes += [f"below its rows stands {line!r}" for line in footer]
+    return replace(_make_table_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
+
+
+def _split_tables(path: Path, lines: NumberedLines) -> Iterator[NumberedLines]:
+    """The table, or those beneath each other where a line above the rows stands again below; with their headings."""
+    texts = lines.texts
+    first = _find_first_row(path, lines)
+    above = {line for line in texts[:first] if _LEADING_WORD.match(line)}
+    again = [i for i in range(first, len(texts)) if texts[i] in above]
+    begins = dict.fromkeys(next(j for j in range(i, 0, -1) if begins_with_number(texts[j - 1])) for i in again)
+    return map(lines.__getitem__, map(slice, [0, *begins], [*begins, len(texts)]))
+
+
+def _remove_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
+    """Lines up to the last that may be a row, and words behind it."""
+    form = detect_separator(lines.texts[-1:] or [""])
+    last = next((i for i in range(len(lines.texts), 0, -1) if _may_be_row(lines.texts[i - 1], form)), 0)
+    return (lines[:last], lines.texts[last:]) if last else (lines, [])
+
+
+def _may_be_row(line: str, form: RowLayout) -> bool:
+    """Whether it has a digit, and more than one number where it begins with a word."""
+    return bool(_DIGIT.search(line)) and (not _LEADING_WORD.match(line) or sum(map(is_number, form.split(line))) > 1)
+
+
+def _name_columns(columns: Sequence[Column], heading: Heading, record: int) -> list[Signal]:
+    """Columns with their names, units and what they therefore are; heading: empty where there is none."""
+    n_rows = max((column.values.size for column in columns), default=0)
+    named = zip(heading or [("", "")] * len(columns), columns, strict=True)
+    return [
+        replace(_make_column_signal(name or f"column {i}", unit, column), record=record, n_rows=n_rows)
+        for i, ((name, unit), column) in enumerate(named, 1)
+    ]
+
+
+def _make_column_signal(name: str, unit: str, column: Column) -> Signal:
+    """Complex numbers are an FRF, and real ones none."""
+    values, flaws = column.values, column.flaws
+    if np.iscomplexobj(values):
+        return Signal(name, values, "frf", unit, flaws=flaws)
+    unit = infer_decibel_unit(name, unit)
+    role = "magnitude" if is_decibel(unit) else infer_role(name, unit)
+    return Signal(name, values, "" if role == "frf" else role, unit, flaws=flaws)
+
+
+def _find_rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowLayout, Heading]:
+    """The rows, how they are written, and the heading above them, behind the first or among comments."""
+    first = _find_first_row(path, lines)
+    begin = max(first - 1, 0)  # of the row that may have the heading behind it
+    plain = NumberedLines([*map(normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
+    form = detect_row_layout(plain.texts[first - begin :])
+    if not form.columns:
+        cure = "pass over what stands above them with --skip"
+        raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
+    width = len(form.split(plain.texts[first - begin :][:2][-1]))
+    if not _begins_in_column(plain.texts[first - begin], form) and is_unit_line(lines.texts[:first], form, width):
+        first += 1  # it holds ranges
+    for at in (first, begin):
+        if heading := find_heading_behind(plain.texts[at - begin], form):
+            return plain[at - begin :], form, heading
+    _reject_broken_row(path, lines[:first], form, width)
+    return plain[first - begin :], form, find_heading_above([*comments, *lines.texts[:first]], form, width)
+
+
+def _begins_in_column(line: str, form: RowLayout) -> bool:
+    """Whether the first of the columns holds a number in this line."""
+    words = form.split(line)
+    return form.columns[0] < len(words) and is_number(words[form.columns[0]])
+
+
+def _find_first_row(path: Path, lines: NumberedLines) -> int:
+    texts = lines.texts
+    begins = [begins_with_number(line) for line in texts[:MIN_TABLE_ROWS]]
+    for i in range(len(texts)):
+        if all(begins[i : i + MIN_TABLE_ROWS]) and len(texts) > 1:
+            return i
+        begins += [begins_with_number(line) for line in texts[i + MIN_TABLE_ROWS : i + MIN_TABLE_ROWS + 1]]
+    if len(texts) < 2:
+        raise DataError(f"{path}: {len(texts)} lines; a heading and rows of numbers are needed")
+    raise DataError(f"{path}: line {lines.numbers[1]}: {texts[1].strip()[:60]!r} is no row of numbers")
+
+
+def _reject_broken_row(path: Path, above: NumberedLines, form: RowLayout, width: int) -> None:
+    """DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
+    words = form.split(normalize_complex(above.texts[-1])) if above.texts else []
+    numbers = sum(map(is_number, words))
+    may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
+    if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):
+        cure = f"mend it, or pass over what stands above the rows with --skip {above.numbers[-1]}"
+        place = f"{path}: line {above.numbers[-1]}"
+        raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")
+
+
+def _check_complete(
+    path: Path, keys: Mapping[str, str], rows: NumberedLines, columns: Sequence[Column], text: str
+) -> None:
+    """DataError where the last row has no line end and lacks a number, or our table is not as its heading says."""
+    last, has_end = f"{path}: line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
+    if not has_end and any(column.values.size == len(rows.texts) - 1 for column in columns):
+        raise DataError(f"{last} ends within its row: the file is cut short; export it anew, or take out that line")
+    rows_written = keys.get("rows")
+    if rows_written is None or keys.get("written by") != "lobewatch":
+        return  # of another program, or of our first versions
+    cure = "convert it anew, or take out the line that begins with # rows"
+    if rows_written != str(len(rows.texts)):
+        raise DataError(f"{last} ends row {len(rows.texts)} of {rows_written}: cut short or altered; {cure}")
+    if not has_end:
+        raise DataError(f"{last} has no line end, so that its last number may be cut short; {cure}")
+
+
+def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[str, str]) -> Contents:
+    averages, recorded, direction, tool = (keys.get(key, "") for key in ("averages", "recorded", "direction", "tool"))
+    try:
+        created = datetime.fromisoformat(recorded).astimezone() if recorded else None
+        n_averages = int(averages) if averages else None
+    except ValueError as error:
+        raise DataError(f"{path}: {error} (lines that begin with #: {dict(keys)})") from error
+    return Contents(signals, n_averages, created, direction, tool, window=keys.get("window", ""))
+
+
+def _is_text_table(head: bytes, _path: Path) -> bool:
+    return is_text(head)
+
+
+TEXT_TABLE_FORMAT = Format(
+    "table", "text table", (".csv", ".txt", ".frf", ".dat", ".asc"), _is_text_table, read_table, read_from=read_table
+)
+
+
+PULSE_MAGIC = "Header Size:"
+_PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), ("M", "%m"), ("dd", "%d"), ("d", "%d"))
+
+
+def read_pulse(path: Path) -> Contents:
+    """The function of every block; DataError with the place where it is cut short or its header says too little."""
+    lines, _ = number_lines(read_text(path), 0)
+    blocks = _find_pulse_blocks(lines)
+    header = _parse_pulse_header(lines.texts[: blocks[0][0]]) if blocks else {}
+    try:
+        is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
+        form, sign = RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
+    except (KeyError, ValueError) as error:
+        raise DataError(f"{path}: its header lacks {error}, or no row follows it; export it anew") from error
+    signals = list[Signal]()
+    for record, (first, after) in enumerate(blocks):
+        columns = read_columns(lines[first:after], form, str(path), sign)
+        n_there = min(column.values.size for column in columns)
+        if n_there != n:
+            place = f"{path}: line {lines.numbers[after - 1]}"
+            raise DataError(f"{place}: {n_there} of {n} rows are there; the file is cut short")
+        axis, *parts = (column.values for column in columns)
+        function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
+        flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
+        name, unit, over = (
+            header.get("title", "function"),
+            header.get("amplitudeunit", ""),
+            header.get("x-axis unit", ""),
+        )
+        signals.append(Signal("abscissa", axis, infer_role("", over), over, record=record, flaws=columns[0].flaws))
+        signals.append(Signal(name, function, _infer_pulse_role(header, unit), unit, record=record, flaws=flaws))
+    return Contents(tuple(signals), created=_parse_pulse_date(header))
+
+
+def _find_pulse_blocks(lines: NumberedLines) -> list[tuple[int, int]]:
+    """Where the rows of each block begin, and the line behind the last."""
+    are_rows = [line.lstrip()[:1].isdigit() for line in lines.texts]
+    edges = np.flatnonzero(np.diff([0, *are_rows, 0])).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _parse_pulse_header(lines: Sequence[str]) -> dict[str, str]:
+    """What stands behind the keys of these lines; keys in lower case."""
+    parts = (line.partition(":") for line in lines)
+    return {key.strip().lower(): value.strip() for key, _, value in parts if value.strip()}
+
+
+def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
+    function = header.get("function", "").lower()
+    if "response" in function:
+        return "frf"
+    return "coherence" if "coherence" in function else infer_role("", unit) if header.get("x-axis unit") == "s" else ""
+
+
+def _parse_pulse_date(header: Mapping[str, str]) -> datetime | None:
+    """Date and time of the first block, in the local time zone; None where it has none that can be read."""
+    pattern = header.get("date format", "")
+    for part, directive in _PULSE_DATE_PARTS:
+        pattern = re.sub(rf"(?<![%\w]){part}(?!\w)", directive, pattern)
+    clock = ":".join(header.get("time", "").split(":")[:3])
+    try:
+        return datetime.strptime(f"{header.get('date', '')} {clock}", f"{pattern} %H:%M:%S").astimezone()
+    except ValueError:
+        return None
+
+
+def _is_pulse(head: bytes, _path: Path) -> bool:
+    return decode_text(head).startswith(PULSE_MAGIC)
+
+
+PULSE_FORMAT = Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse)

@@ -1,0 +1,197 @@
+"""Read data set 58 of a universal file, text or binary."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import DataError
+from acquisition.files.readers.text_file import decode_utf8_or_latin1
+
+_NUMBERS_PER_VALUE = {2: 1, 4: 1, 5: 2, 6: 2}
+"""Type of the ordinate data -> numbers a value: real and complex, single and double."""
+_NUMBER_TOKEN = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?|[+-]?nan|[+-]?inf", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class UffAxis:
+    """Abscissa, ordinate or its denominator."""
+
+    type: int
+    """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
+    unit: str
+    """Unit; empty where the file says none."""
+
+
+@dataclass(frozen=True, eq=False)
+class UffFunction:
+    """One data set 58."""
+
+    lines: tuple[str, ...]
+    """The five lines of identification."""
+    type: int
+    """Code of the function: 1 over time, 4 FRF, 6 coherence."""
+    name: str
+    """Name for people: where it was measured."""
+    response_direction: int
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where it does not say."""
+    reference_direction: int
+    """Direction of the hammer, likewise."""
+    place: tuple[object, ...]
+    """Nodes and directions: the same for an FRF and its coherence."""
+    abscissa: NDArray[np.float64]
+    """Abscissa in its unit, shape (n,)."""
+    step: float
+    """Step of an even abscissa; 0 where it is not even."""
+    values: NDArray[np.float64] | NDArray[np.complex128]
+    """Values of the function in their unit, shape (n,)."""
+    abscissa_axis: UffAxis
+    """Quantity and unit of the abscissa."""
+    ordinate: UffAxis
+    """Quantity and unit of the values."""
+    denominator: UffAxis
+    """Quantity and unit that the values were divided by."""
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """What lines of identification say as `key=value`, as our own files do."""
+        return {key: value for line in self.lines for key, value in re.findall(r"(\w+)=([^;]*)(?:;|$)", line)}
+
+    @property
+    def averages(self) -> int | None:
+        """Hits averaged, where the identification says so."""
+        number = self.keys.get("averages", "") or "".join(
+            re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", " ".join(self.lines))[:1]
+        )
+        return int(number) if number.strip().isdigit() else None
+
+    @property
+    def window(self) -> str:
+        """Over the response, where the identification names one."""
+        match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
+        return match[1].strip() if match else ""
+
+
+def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, int]:
+    """The data set whose first line begins there, and where its values end; place: for errors."""
+    ends = [begin]
+    for _ in range(12):
+        end = content.find(b"\n", ends[-1])
+        if end < 0:
+            raise DataError(f"{place}: {len(ends) - 1} of 12 header lines are there; it is cut short")
+        ends.append(end + 1)
+    lines = [decode_utf8_or_latin1(content[a:b]).rstrip("\r\n") for a, b in pairwise(ends)]
+    try:
+        kind, n, spacing, start, step = _parse_row_seven(lines[7])
+        per_value = _NUMBERS_PER_VALUE[kind]
+    except (ValueError, KeyError, IndexError) as error:
+        raise DataError(f"{place}: line 7 of its header cannot be read ({lines[7].strip()!r})") from error
+    even, width = bool(spacing), per_value + (0 if spacing else 1)
+    if lines[0].split()[0] == "58":
+        numbers, after = _read_text_values(place, content, ends[-1], n * width)
+    else:
+        numbers, after = _read_binary_values(place, lines[0], content, ends[-1], n, (kind, even))
+    table = numbers.reshape(n, width)
+    abscissa = start + step * np.arange(n, dtype=np.float64) if even else table[:, 0]
+    values = table[:, -1] if per_value == 1 else table[:, -2] + 1j * table[:, -1]
+    return _make_function(lines, abscissa, step if even else 0.0, values), after
+
+
+def _parse_row_seven(line: str) -> tuple[int, int, int, float, float]:
+    words = line.split()
+    kind, n, spacing = map(int, words[:3])
+    if n < 1:
+        raise ValueError(line)
+    return kind, n, spacing, float(words[3]), float(words[4])
+
+
+def _make_function(
+    lines: list[str],
+    abscissa: NDArray[np.float64],
+    step: float,
+    values: NDArray[np.float64] | NDArray[np.complex128],
+) -> UffFunction:
+    six = lines[6].ljust(80)
+    response, reference = (_parse_point(six[31:55]), _parse_point(six[56:80]))
+    where = " ".join(
+        filter(None, [_format_point(response), "over" if _format_point(reference) else "", _format_point(reference)])
+    )
+    label = lines[9].ljust(80)[26:46].strip()
+    function = UffFunction(
+        tuple(lines[1:6]),
+        int(six[:5]),
+        where or label or "function",
+        response[2],
+        reference[2],
+        (*response, *reference),
+        abscissa,
+        step,
+        values,
+        *(_parse_axis(line) for line in lines[8:11]),
+    )
+    exact = function.keys.get("step")
+    if exact and step and abs(float(exact) / step - 1) < 1e-4:
+        start = float(function.keys.get("start", abscissa[0]))
+        object.__setattr__(function, "abscissa", start + float(exact) * np.arange(values.size))
+        object.__setattr__(function, "step", float(exact))
+    return function
+
+
+def _parse_point(text: str) -> tuple[str, int, int]:
+    """Name, node and direction."""
+    name = text[:10].strip()
+    node, direction = (re.sub(r"[^\d-]", "", part) for part in (text[10:20], text[20:24]))
+    return ("" if name == "NONE" else name), int(node or 0), int(direction or 0)
+
+
+def _format_point(point: tuple[str, int, int]) -> str:
+    name, node, direction = point
+    sign = (
+        ""
+        if not direction
+        else f"{'-' if direction < 0 else ''}{'xyz'[abs(direction) - 1] if abs(direction) < 4 else ''}"
+    )
+    return " ".join(filter(None, [name, str(node) if node or sign else "", sign]))
+
+
+def _parse_axis(line: str) -> UffAxis:
+    line = line.ljust(80)
+    unit = line[47:67].strip()
+    return UffAxis(int(line[:10].split()[0] if line[:10].split() else 0), "" if unit.upper() == "NONE" else unit)
+
+
+def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[NDArray[np.float64], int]:
+    """n numbers, in columns that may touch each other."""
+    end = content.find(b"\n    -1", begin - 1)
+    body = content[begin : end if end >= 0 else len(content)]
+    numbers = _NUMBER_TOKEN.findall(body)
+    strays = _NUMBER_TOKEN.sub(b"", body).split()
+    if strays:
+        raise DataError(f"{place}: {strays[0][:20]!r} stands among its values")
+    if len(numbers) != n or end < 0:
+        raise DataError(f"{place}: {len(numbers)} of {n} numbers are there; it is cut short or damaged")
+    return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in numbers]), begin + len(body)
+
+
+def _read_binary_values(
+    place: str, head: str, content: bytes, begin: int, n: int, layout: tuple[int, bool]
+) -> tuple[NDArray[np.float64], int]:
+    """n values of the binary form; an uneven abscissa is single precision beside single values, else double."""
+    kind, even = layout
+    words = head.split()
+    order, form = int(words[1]), int(words[2])
+    if form != 2 or order not in (1, 2):
+        raise DataError(f"{place}: binary form {order} {form}; IEEE numbers (1 2 or 2 2) are read")
+    sign, size = "<>"[order - 1], 4 if kind in (2, 5) else 8
+    value = [("value", f"{sign}f{size}", (_NUMBERS_PER_VALUE[kind],))]
+    row = np.dtype(value if even else [("abscissa", f"{sign}f{size}"), *value])
+    body = content[begin : begin + n * row.itemsize]
+    if len(body) < n * row.itemsize:
+        raise DataError(f"{place}: {len(body)} of {n * row.itemsize} bytes of values are there; it is cut short")
+    table = np.frombuffer(body, row)
+    parts = [table["value"]] if even else [table["abscissa"][:, None], table["value"]]
+    return np.hstack(parts).astype(np.float64).ravel(), begin + len(body)

@@ -1,0 +1,245 @@
+"""Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file.
+
+Values have 12 digits, the abscissa 6 as the format has it; all digits of its step stand in a line of identification,
+from which lobewatch reads it back. Source: SDRC Universal File Formats 58, 151, 164.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import DataError
+from acquisition.frf import Frf
+from acquisition.hit import Hit
+
+
+@dataclass(frozen=True)
+class ExportLabels:
+    """Of a tap test that is written for other programs."""
+
+    created: datetime | None = None
+    """Time of recording (timezone-aware)."""
+    direction: str = ""
+    """Direction at the tool tip, x or y."""
+    tool: str = ""
+    """Name of the tool in the spindle."""
+    name: str = "tap test"
+    """Title for people."""
+    window: str = "none"
+    """Window over the response, as it was read: "exponential 0.05 s"."""
+
+    @property
+    def plain_tool(self) -> str:
+        """Without what would end it: line ends and semicolons."""
+        return " ".join(self.tool.replace(";", ",").split())
+
+
+FRF_UNITS = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
+"""Unit of each form of an FRF."""
+
+
+def convert_to_measured_form(frf: Frf) -> tuple[NDArray[np.complex128], str]:
+    """An FRF in the form that its sensors gave, which keeps it exact, and its unit."""
+    values = {"receptance": frf.receptance, "mobility": frf.mobility, "accelerance": frf.accelerance}
+    return values[frf.measured_as], FRF_UNITS[frf.measured_as]
+
+
+def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
+    """Frequency, real and imaginary part, coherence where there is one."""
+    values, unit = convert_to_measured_form(frf)
+    columns = {"frequency [Hz]": frf.frequency, f"real [{unit}]": values.real, f"imag [{unit}]": values.imag}
+    if frf.coherence is not None:
+        columns["coherence"] = frf.coherence
+    return _encode_table(columns, labels, averages=frf.n_averages)
+
+
+def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
+    """Time, force and acceleration of one hit; DataError for several."""
+    if len(hits) != 1:
+        raise DataError(f"{len(hits)} hits: a text table holds one; write them as .uff, .mat or .json, or the FRF")
+    (hit,) = hits
+    time = np.arange(hit.force.size) / hit.sample_rate
+    return _encode_table({"time [s]": time, "force [N]": hit.force, "acceleration [m/s^2]": hit.acceleration}, labels)
+
+
+def _encode_table(columns: dict[str, NDArray[np.float64]], labels: ExportLabels, averages: int | None = None) -> bytes:
+    keys = {
+        "written by": "lobewatch",
+        "recorded": labels.created.isoformat() if labels.created else "",
+        "direction": labels.direction,
+        "tool": labels.plain_tool,
+        "window": labels.window.replace("none", ""),
+        "averages": "" if averages is None else str(averages),
+        "rows": str(next(iter(columns.values())).size),
+    }
+    lines = [f"# {key}: {value}" for key, value in keys.items() if value]
+    lines.append(",".join(columns))
+    lines += [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def encode_mat_frf(frf: Frf, labels: ExportLabels) -> bytes:
+    """frequency (Hz), frf with its unit, coherence, averages."""
+    values, unit = convert_to_measured_form(frf)
+    variables: dict[str, Any] = {"frequency": frf.frequency, "frf": values, "unit": unit, "averages": frf.n_averages}
+    if frf.coherence is not None:
+        variables["coherence"] = frf.coherence
+    return _encode_mat(variables, labels)
+
+
+def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
+    """force (N) and acceleration (m/s^2), a row a hit, and sample_rate (Hz)."""
+    if len({(hit.force.size, hit.sample_rate) for hit in hits}) > 1:
+        raise DataError("the hits differ in length or sample rate; write them as .json")
+    rows = {
+        "force": np.stack([hit.force for hit in hits]),
+        "acceleration": np.stack([hit.acceleration for hit in hits]),
+    }
+    return _encode_mat({**rows, "sample_rate": hits[0].sample_rate}, labels)
+
+
+def _encode_mat(variables: dict[str, Any], labels: ExportLabels) -> bytes:
+    import scipy.io  # it takes a while, and few files need it
+
+    texts = {
+        "written_by": "lobewatch",
+        "recorded": labels.created.isoformat() if labels.created else "",
+        "direction": labels.direction,
+        "tool": labels.tool,
+        "window": labels.window,
+    }
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, texts | variables, oned_as="column")
+    return buffer.getvalue()
+
+
+def encode_sep005_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
+    """Force (N) and acceleration (m/s^2) of each hit, exactly; the group tells the hits apart."""
+    texts = {"start_timestamp": labels.created.isoformat()} if labels.created else {}
+    texts |= {key: value for key, value in (("direction", labels.direction), ("tool", labels.tool)) if value}
+    channels = [
+        {
+            "name": name,
+            "quantity": quantity,
+            "unit_str": unit,
+            "fs": hit.sample_rate,
+            "group": f"hit {number}",
+            **texts,
+            "data": getattr(hit, name).tolist(),
+        }
+        for number, hit in enumerate(hits, 1)
+        for name, quantity, unit in (("force", "f", "N"), ("acceleration", "a", "m/s^2"))
+    ]
+    return json.dumps(channels, allow_nan=False).encode("utf-8")
+
+
+_UFF_NO_QUANTITY = (0, "NONE", "NONE")
+_UFF_FORCE = (13, "Force", "N")
+_UFF_TIME = (17, "Time", "s")
+_UFF_ORDINATES = {
+    "receptance": (8, "Displacement", "m"),
+    "mobility": (11, "Velocity", "m/s"),
+    "accelerance": (12, "Acceleration", "m/s^2"),
+}
+MAX_STEP_DIFFERENCE = 1e-9
+"""Relative difference of two frequency steps that are taken for the same."""
+
+
+def encode_uff_frf(frf: Frf, labels: ExportLabels) -> bytes:
+    """The FRF as function type 4, its coherence as type 6."""
+    values, _ = convert_to_measured_form(frf)
+    ordinate = _UFF_ORDINATES[frf.measured_as]
+    axis = _Abscissa(frf.frequency, (18, "Frequency", "Hz"))
+    averages = f"averages={frf.n_averages}"
+    sets = [_format_data_set_58(4, axis, values, (ordinate, _UFF_FORCE), labels, averages)]
+    if frf.coherence is not None:
+        sets.append(_format_data_set_58(6, axis, frf.coherence, (_UFF_NO_QUANTITY, _UFF_NO_QUANTITY), labels, averages))
+    return _encode_uff(sets, labels)
+
+
+def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
+    """Force and acceleration of each hit as function type 1."""
+    sets = []
+    for number, hit in enumerate(hits, 1):
+        axis = _Abscissa(np.arange(hit.force.size) / hit.sample_rate, _UFF_TIME, 1 / hit.sample_rate)
+        for values, ordinate in ((hit.force, _UFF_FORCE), (hit.acceleration, _UFF_ORDINATES["accelerance"])):
+            sets.append(_format_data_set_58(1, axis, values, (ordinate, _UFF_NO_QUANTITY), labels, f"hit={number}"))
+    return _encode_uff(sets, labels)
+
+
+class _Abscissa:
+    """An abscissa with its step, where it has one."""
+
+    def __init__(self, values: NDArray[np.float64], what: tuple[int, str, str], step: float | None = None) -> None:
+        self.values, self.what = values, what
+        self.step = step or float(values[-1] - values[0]) / (values.size - 1)
+        even = values[0] + self.step * np.arange(values.size)
+        self.is_even = bool(np.max(np.abs(values - even)) <= MAX_STEP_DIFFERENCE * abs(self.step))
+
+
+def _format_data_set_58(
+    kind: int,
+    axis: _Abscissa,
+    values: NDArray[np.float64] | NDArray[np.complex128],
+    ordinates: tuple[tuple[int, str, str], tuple[int, str, str]],
+    labels: ExportLabels,
+    extra: str,
+) -> list[str]:
+    """One data set 58."""
+    node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
+    exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
+    recorded = f"window={labels.window}" + (f";recorded={labels.created.isoformat()}" if labels.created else "")
+    stamp = f"{labels.created:%d-%b-%y %H:%M:%S}" if labels.created else "NONE"
+    lines = [f"{58:6d}", labels.name, exact + extra, stamp, recorded, f"tool={labels.plain_tool}"]
+    lines[1:6] = [_check_identification_line(text) for text in lines[1:6]]
+    point = f" {'NONE':10s}{1:10d}{node:4d}"
+    lines.append(f"{kind:5d}{0:10d}{0:5d}{0:10d}{point}{point}")
+    is_complex, n = np.iscomplexobj(values), values.size
+    start, step = (axis.values[0], axis.step) if axis.is_even else (0.0, 0.0)
+    spacing = int(axis.is_even)
+    lines.append(f"{6 if is_complex else 4:10d}{n:10d}{spacing:10d}{start:13.5E}{step:13.5E}{0.0:13.5E}")
+    lines += [
+        f"{t:10d}{0:5d}{0:5d}{0:5d} {name:20s} {unit:20s}"
+        for t, name, unit in (axis.what, *ordinates, _UFF_NO_QUANTITY)
+    ]
+    lines += _format_values(axis, values)
+    return lines
+
+
+def _check_identification_line(text: str) -> str:
+    """Of identification: 80 characters; DataError where more would be lost."""
+    if len(text.encode("utf-8")) > 80:
+        raise DataError(f"{text!r} has more than the 80 characters of a line of a universal file")
+    return text or "NONE"
+
+
+def _format_values(axis: _Abscissa, values: NDArray[np.float64] | NDArray[np.complex128]) -> Iterator[str]:
+    """Even: 20 characters a number, four a line (complex: two pairs). Uneven: the abscissa (13) before each value."""
+    parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
+    numbers = np.stack(parts, axis=1)
+    if axis.is_even:
+        flat = numbers.ravel()
+        for first in range(0, flat.size, 4):
+            yield "".join(f"{value:20.11E}" for value in flat[first : first + 4])
+        return
+    for x, row in zip(axis.values, numbers, strict=True):
+        yield f"{x:13.5E}" + "".join(f"{value:20.11E}" for value in row)
+
+
+def _encode_uff(sets: Sequence[list[str]], labels: ExportLabels) -> bytes:
+    written = labels.created or datetime.now(UTC)
+    day = f"{written:%d-%b-%y}{written:%H:%M:%S}".ljust(20)
+    header = [f"{151:6d}", _check_identification_line(labels.name), "NONE", "lobewatch", day, day, "lobewatch", day]
+    units = [f"{164:6d}", f"{1:10d}{'SI: Meter (newton)':20s}{2:10d}"]
+    units += [f"{1.0:25.17E}{1.0:25.17E}{1.0:25.17E}", f"{273.15:25.17E}"]
+    mark = "    -1"
+    lines = [line for data_set in (header, units, *sets) for line in (mark, *data_set, mark)]
+    return ("\n".join(lines) + "\n").encode("utf-8")

@@ -1,0 +1,270 @@
+"""Measure the sample rate and the channel skew of a DAQ."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acquisition.errors import DeviceError, Remark
+from acquisition.source import Source
+
+RATE_TOLERANCE = 0.002
+"""Share by which the measured rate may differ from the nominal one."""
+ACCURATE_RATE_STD = RATE_TOLERANCE / 4
+"""Standard error of the rate, as a share of it, up to which it is sure ..."""
+MAX_RATE_STD = RATE_TOLERANCE
+"""... and above which nothing can be said."""
+MIN_RATE_BLOCKS = 10
+"""Arrivals needed for a slope and its error."""
+USB_POLL_INTERVAL = 1e-3
+"""A USB host asks its devices once a millisecond: neither end of the time is known better (s)."""
+RATE_STRETCHES = 20
+"""Stretches of the stream; of each only the least delayed block counts."""
+
+
+@dataclass(frozen=True)
+class MeasuredRate:
+    """The rate of a stream of scans.
+
+    >>> MeasuredRate(rate=25600.2, std=0.5, n_scans=128000, seconds=5.0).is_sure
+    True
+    """
+
+    rate: float
+    """Scans a second (Hz)."""
+    std: float
+    """Standard error of the rate (Hz)."""
+    n_scans: int
+    """Scans between the first and the last block."""
+    seconds: float
+    """Time between them (s)."""
+
+    @property
+    def is_accurate(self) -> bool:
+        """Whether it is known to 0.05 %."""
+        return self.std <= ACCURATE_RATE_STD * self.rate
+
+
+def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic) -> MeasuredRate:
+    """Start a source, count its scans against the clock (s) for so many seconds, and stop it.
+
+    A block can arrive late, never early. The stream is cut into 20 stretches; of each the block with the least delay
+    is kept, stretches that are late as a whole (a busy computer) are left out, and time is regressed on the scan count.
+    The standard error is that of the slope, enlarged where neighbouring residuals are alike (lag-1 correlation), and
+    joined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
+
+    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive or the stream ends
+    before, and what the source raises.
+
+    >>> fast = SimulatedSource(lambda first, n: np.zeros((1, n)), (Channel("force", 2.25e-3, 5.0),), 10240.0, 10**6)
+    >>> ticks = iter(np.arange(10**6) * 0.05)  # s: a clock by which a block of 512 scans comes every 50 ms
+    >>> round(measure_rate(fast, seconds=5.0, clock=lambda: next(ticks)).rate)  # Hz
+    10240
+    """
+    if not (np.isfinite(seconds) and seconds > 0):
+        raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
+    arrived: list[float] = []
+    scans: list[int] = []
+    source.start()
+    for block in source.blocks():
+        arrived.append(clock())
+        scans.append(block.first_scan + block.codes.shape[1])
+        if arrived[-1] - arrived[0] >= seconds:
+            break
+    source.stop()
+    elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
+    if len(scans) < MIN_RATE_BLOCKS or elapsed < seconds:
+        raise DeviceError(
+            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s",
+            f"to measure its rate, at least {MIN_RATE_BLOCKS} over {seconds:g} s are needed: check its sample rate "
+            "and the cable",
+        )
+    period, scatter = _fit_scan_period(np.array(scans, dtype=np.float64), np.array(arrived))
+    std = float(np.hypot(scatter, USB_POLL_INTERVAL / np.sqrt(6) / n_scans) / period**2)
+    return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
+
+
+def check_rate(measured: MeasuredRate, nominal: float) -> None:
+    """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz); where it is not sure,
+    by two standard errors more. DeviceError, too, where the standard error exceeds 0.2 %.
+
+    >>> check_rate(MeasuredRate(25600.2, 0.5, 128000, 5.0), nominal=25600.0)
+    >>> check_rate(MeasuredRate(24000.0, 0.5, 120000, 5.0), nominal=25600.0)
+    Traceback (most recent call last):
+        ...
+    acquisition.errors.DeviceError: the DAQ delivers 24000.00 ± 0.50 scans a second, not 25600: every ...
+    """
+    if measured.std > MAX_RATE_STD * measured.rate:
+        raise DeviceError(
+            f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({measured.rate:.6g} Hz "
+            f"± {measured.std / measured.rate:.2%}, needed ± {MAX_RATE_STD:.2%})",
+            "close other programs and try again",
+        )
+    off = nominal / measured.rate - 1
+    if abs(measured.rate / nominal - 1) > RATE_TOLERANCE + (0 if measured.is_accurate else 2 * measured.std / nominal):
+        raise DeviceError(
+            f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: every "
+            f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}",
+            "correct the DAQ's sample rate or work with the measured one",
+        )
+
+
+def rate_remark(measured: MeasuredRate) -> Remark | None:
+    """Remark on a rate that is not sure; None where it is."""
+    if measured.is_accurate:
+        return None
+    share = measured.std / measured.rate
+    text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
+    return Remark("rate-not-sure", "", text, "close other programs and run lobewatch sensors, which measures it again")
+
+
+def _fit_scan_period(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[float, float]:
+    """Seconds a scan and standard error, from the least delayed block of each stretch."""
+    period = (arrived[-1] - arrived[0]) / (scans[-1] - scans[0])
+    std = 0.0
+    stretches = np.array_split(np.arange(scans.size), min(RATE_STRETCHES, scans.size))
+    for _ in range(4):  # which block is the least delayed depends on the period
+        delay = arrived - arrived[0] - period * (scans - scans[0])
+        best = np.array([stretch[np.argmin(delay[stretch])] for stretch in stretches])
+        correction, std = _fit_robust_slope(scans[best], delay[best])
+        period += correction
+    return period, std
+
+
+def _fit_robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Least-squares slope and standard error without the points that lie far above the others."""
+    rough = y - _median_slope(x, y) * x
+    above = rough - np.median(rough)
+    spread = 1.4826 * np.median(np.abs(above))
+    keep = above <= 4 * spread + 1e-9
+    x, y = x[keep] - np.mean(x[keep]), y[keep] - np.mean(y[keep])
+    slope = float(x @ y / (x @ x))
+    residual = y - slope * x
+    energy = float(residual @ residual)
+    alike = float(np.clip(residual[1:] @ residual[:-1] / energy, 0.0, 0.9)) if energy > 0 else 0.0
+    variance = energy / (x.size - 2) / float(x @ x) * (1 + alike) / (1 - alike)
+    return slope, float(np.sqrt(variance))
+
+
+def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median of the slopes of all pairs of points (Theil and Sen); x rises."""
+    first, second = np.triu_indices(x.size, 1)
+    return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
+
+
+SKEW_SEGMENT_SAMPLES = 1024
+"""Samples of a segment."""
+MIN_SKEW_SEGMENTS = 16
+"""Segments needed for a coherence and a standard error."""
+MIN_SKEW_COHERENCE = 0.9
+"""Least coherence of a line that counts."""
+MIN_COHERENT_SHARE = 0.1
+"""Least share of the lines that must count: one hum line fixes no delay."""
+CORRELATION_OVERSAMPLING = 16
+"""Of the correlation whose maximum is the first guess."""
+
+
+@dataclass(frozen=True)
+class MeasuredSkew:
+    """Delay of the second channel's samples."""
+
+    skew: float
+    """The second channel samples so much later than the first (s); the value for Channel.skew."""
+    std: float
+    """Standard error of the skew (s)."""
+    coherent_share: float
+    """Share of the frequency lines that counted (-)."""
+
+
+def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> MeasuredSkew:
+    """Skew of two channels (n,) that were fed with one broad-band signal, in any unit, at a sample rate (Hz).
+
+    The second channel takes y_k = x(t_k + s), so that conj(X) Y has the phase 2 pi f s. The phase of the mean over
+    Hann-windowed segments is fitted by a line through zero, weighted by g2 / (1 - g2) with the coherence g2, the
+    reciprocal of its variance (Bendat & Piersol, Random Data, ch. 9); the standard error is a jackknife over the
+    segments. The second record is then shifted back by the skew and the rest fitted again, twice: windows that do not
+    fall on the same piece of the signal, and lines that leak into their neighbours, would bend the phase a little.
+
+    Raises ValueError for records that differ in length, are shorter than 16 segments of 1024 or hold NaN or inf, for
+    two signals that are not the same one (coherence), and for a second channel of opposite sign.
+
+    >>> noise = np.random.default_rng(1).normal(size=32769)
+    >>> skew = measure_skew(noise[:-1], noise[1:], 51200.0)  # the second channel is a sample late
+    >>> f"{skew.skew * 1e6:.2f} us, {1e6 / 51200:.2f} us"
+    '19.53 us, 19.53 us'
+    """
+    if not (np.isfinite(sample_rate) and sample_rate > 0):
+        raise ValueError(f"sample_rate={sample_rate} Hz is not > 0")
+    records = _check_records(first, second)
+    fit = _fit_phase_slope(records, records[1])
+    for _ in range(2):
+        correction = _fit_phase_slope(records, _shift_back(records[1], fit.skew))
+        fit = replace(correction, skew=fit.skew + correction.skew)
+    return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
+
+
+def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) -> MeasuredSkew:
+    """Skew of records[0] and second, in samples."""
+    cross, power = _segment_spectra(np.stack([records[0], second]))
+    mean = np.mean(cross, axis=0)
+    g2 = np.abs(mean) ** 2 / np.maximum(np.prod(np.mean(power, axis=1), axis=0), np.finfo(float).tiny)
+    counts = (g2 > MIN_SKEW_COHERENCE) & (np.arange(g2.size) > 0)
+    share = float(np.mean(counts))
+    if share < MIN_COHERENT_SHARE:
+        raise ValueError(
+            f"the two channels do not carry one broad-band signal (coherence over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the "
+            f"lines, {MIN_COHERENT_SHARE:.0%} are needed); join both inputs with a T-piece and feed noise or taps"
+        )
+    omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
+    rough = _find_correlation_peak(np.where(counts, mean, 0.0))
+    turned = cross[:, counts] * np.exp(-1j * omega * rough)
+    if np.sum(turned).real < 0:
+        raise ValueError("the second channel has the opposite sign of the first; swap its two wires or its polarity")
+    weight = omega * g2[counts] / np.maximum(1 - g2[counts], 1e-9)
+    weight /= weight @ omega
+    n = cross.shape[0]
+    without_one = (n * np.mean(turned, axis=0) - turned) / (n - 1)
+    std = np.sqrt((n - 1) * np.var(np.angle(without_one) @ weight))
+    return MeasuredSkew(rough + float(np.angle(np.mean(turned, axis=0)) @ weight), float(std), share)
+
+
+def _shift_back(record: NDArray[np.float64], samples: float) -> NDArray[np.float64]:
+    """The record as it would have been taken so many samples earlier; its ends are not right."""
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(record.size) * samples)
+    return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
+
+
+def _check_record(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    record = np.asarray(values, dtype=np.float64)
+    if record.ndim != 1 or record.size < MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES or not np.all(np.isfinite(record)):
+        raise ValueError(
+            f"the {name} record has shape {record.shape} or holds NaN or inf; "
+            f"at least {MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES} finite samples are needed"
+        )
+    return record - np.mean(record)
+
+
+def _check_records(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+    records = [_check_record(first, "first"), _check_record(second, "second")]
+    if records[0].size != records[1].size:
+        raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
+    return np.stack(records)
+
+
+def _segment_spectra(records: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """conj(X) Y of every segment but the two at the ends (n, lines), and |X|^2, |Y|^2 (2, n, lines)."""
+    n = records.shape[1] // SKEW_SEGMENT_SAMPLES
+    segments = records[:, : n * SKEW_SEGMENT_SAMPLES].reshape(2, n, SKEW_SEGMENT_SAMPLES)[:, 1:-1]
+    spectra = np.fft.rfft((segments - segments.mean(axis=2, keepdims=True)) * np.hanning(SKEW_SEGMENT_SAMPLES))
+    return np.conj(spectra[0]) * spectra[1], np.abs(spectra) ** 2
+
+
+def _find_correlation_peak(cross: NDArray[np.complex128]) -> float:
+    """Skew, to a fraction of a sample, where the correlation of both channels is largest in size."""
+    size = CORRELATION_OVERSAMPLING * SKEW_SEGMENT_SAMPLES
+    lag = int(np.argmax(np.abs(np.fft.irfft(cross, size))))
+    return -(lag - size if lag > size // 2 else lag) / CORRELATION_OVERSAMPLING

@@ -1,0 +1,46 @@
+"""Run fragile code in a subprocess with limits on time and memory."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+if os.name != "nt":
+    import resource
+
+SUBPROCESS_TIMEOUT = 60.0
+"""Time that such a program may take (s)."""
+
+
+def run_in_subprocess(module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT) -> bytes:
+    """What a module writes to its standard output as a program of its own, which imports from where this one does.
+
+    Raises subprocess.SubprocessError where that fails, crashes or takes longer than `patience` (s).
+    """
+    command = [sys.executable, "-P", "-Wignore", "-m", module, *arguments]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.run(command, env=environment, capture_output=True, timeout=patience, check=True).stdout
+
+
+def limit_resources(seconds: float, memory: float) -> None:
+    """From now on so much time of the processor (s), after which it is ended, and so much more memory (bytes), beyond
+    which MemoryError is raised; a crash leaves no image of the memory behind. Windows knows none of these limits, macOS
+    not that of memory."""
+    if os.name == "nt":
+        return
+    _lower_limit(resource.RLIMIT_CORE, 0)
+    _lower_limit(resource.RLIMIT_CPU, time.process_time() + seconds)
+    sizes = Path("/proc/self/statm")
+    if sizes.exists():
+        taken = int(sizes.read_text("ascii").split()[0]) * resource.getpagesize()
+        _lower_limit(resource.RLIMIT_AS, taken + memory)
+
+
+def _lower_limit(limit: int, value: float) -> None:
+    highest = resource.getrlimit(limit)[1]
+    wanted = math.ceil(value)
+    resource.setrlimit(limit, (wanted if highest == resource.RLIM_INFINITY else min(wanted, highest), highest))

@@ -1,0 +1,183 @@
+"""Decode the text lines or binary frames that a board prints, and count lost scans.
+
+The payload is a scan: the counter (u16), where there is one, and a value (i16) a sensor, little-endian. The checksum is
+the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
+"""Where counters of boards begin anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class PrintedRows:
+    """Rows of numbers that came one after the other without a broken one between them."""
+
+    rows: NDArray[np.float64]
+    """Numbers, shape (n_scans, n_columns)."""
+    broken_before: int = 0
+    """Broken lines or frames before them."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScanRun:
+    """Consecutive scans."""
+
+    values: NDArray[np.float64]
+    """Values as printed, a row a sensor, shape (n_sensors, n_scans)."""
+    lost_before: int = 0
+    """Scans lost before them: by the counter, else the broken lines or frames, which is the least there can be."""
+
+
+class ScanCounter:
+    """Takes the counter off, where there is one, and tells by it what is lost."""
+
+    def __init__(self, values: int = 2) -> None:
+        """values: in a row, beside the counter. No scan has come yet."""
+        self._values = values
+        self._last: int | None = None
+        self._largest = 0
+
+    def split_runs(self, printed: PrintedRows) -> Iterator[ScanRun]:
+        """Runs of consecutive scans in rows of values, or of a counter and values."""
+        values = printed.rows[:, -self._values :].T
+        if printed.rows.shape[1] == self._values:
+            yield ScanRun(values, printed.broken_before)
+            return
+        counts = printed.rows[:, 0].astype(np.int64)
+        lost = self._lost(counts)
+        for run in np.split(np.arange(counts.size), np.flatnonzero(lost[1:]) + 1):
+            yield ScanRun(values[:, run], int(lost[run[0]]))
+
+    def _lost(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Scans lost before each row. The counter begins anew at the least modulus above all counts so far."""
+        self._largest = max(self._largest, int(counts.max()))
+        modulus = next((modulus for modulus in COUNTER_MODULI if modulus > self._largest), COUNTER_MODULI[-1])
+        before = counts[0] - 1 if self._last is None else self._last
+        self._last = int(counts[-1])
+        return (np.diff(counts, prepend=before) - 1) % modulus
+
+
+NUMBER_SEPARATORS = bytes.maketrans(b";\t ", b",,,")
+"""What may stand between numbers beside a comma."""
+MAX_LINE_BYTES = 200
+"""Bytes of a line; what is longer is no line of numbers."""
+
+
+class LineDecoder:
+    """Finds rows of numbers in a stream of text."""
+
+    def __init__(self, counts: Container[int] = (2, 3)) -> None:
+        """counts: of numbers that a line may have. What stands before the first line end is not counted."""
+        self._rest, self._begun, self._columns, self._broken, self._counts = b"", False, 0, 0, counts
+
+    def feed(self, data: bytes) -> Iterator[PrintedRows]:
+        """The rows that are complete."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        self._rest = self._rest[-MAX_LINE_BYTES:]
+        if lines and not self._begun:
+            self._begun, lines = True, lines[1:]
+        rows: list[list[float]] = []
+        for line in lines:
+            row = _parse_numbers(line)
+            row = row if len(row) in self._counts else []
+            self._columns = self._columns or len(row)
+            if row and len(row) == self._columns:
+                rows.append(row)
+            elif line.strip():
+                if rows:
+                    yield self._printed(rows)
+                rows, self._broken = [], self._broken + 1
+        if rows:
+            yield self._printed(rows)
+
+    def _printed(self, rows: list[list[float]]) -> PrintedRows:
+        printed, self._broken = PrintedRows(np.array(rows), self._broken), 0
+        return printed
+
+
+def _parse_numbers(line: bytes) -> list[float]:
+    """Finite numbers of a line; none where it holds anything else."""
+    words = [word for word in line.strip().translate(NUMBER_SEPARATORS).split(b",") if word]
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        return []
+    return numbers if np.isfinite(numbers).all() else []
+
+
+@dataclass(frozen=True)
+class FrameFormat:
+    """How a frame is built."""
+
+    start: bytes
+    """Bytes with which a frame begins."""
+    counter: bool = False
+    """Whether a counter (u16) stands before the values."""
+    checksum: bool = True
+    """Whether a checksum follows."""
+
+
+class SimpleFrameDecoder:
+    """Finds rows of numbers in a stream of frames."""
+
+    def __init__(self, form: FrameFormat, values: int = 2) -> None:
+        """values: in a frame, beside the counter. What stands before the first whole frame is not counted."""
+        self._form, self._rest, self._broken, self._begun = form, b"", 0, False
+        self._payload = 2 * (values + form.counter)
+        self._size = len(form.start) + self._payload + form.checksum
+
+    def feed(self, data: bytes) -> Iterator[PrintedRows]:
+        """The rows that are complete; bytes between frames, and a wrong checksum, are a broken frame."""
+        form, received, place = self._form, self._rest + data, 0
+        rows: list[tuple[int, ...]] = []
+        while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= self._size:
+            payload = received[begin + len(form.start) :][: self._payload]
+            good = not form.checksum or received[begin + self._size - 1] == sum(payload) & 0xFF
+            if self._begun and (begin > place or not good):
+                if rows:
+                    yield self._printed(rows)
+                rows, self._broken = [], self._broken + 1
+            if good:
+                rows.append(_parse_payload(payload, form.counter))
+            self._begun, place = self._begun or good, begin + (self._size if good else 1)
+        self._rest = received[place:]
+        if rows:
+            yield self._printed(rows)
+
+    def _printed(self, rows: list[tuple[int, ...]]) -> PrintedRows:
+        printed, self._broken = PrintedRows(np.array(rows, np.float64), self._broken), 0
+        return printed
+
+
+def _parse_payload(payload: bytes, counter: bool) -> tuple[int, ...]:
+    words = tuple(int(word) for word in np.frombuffer(payload, "<i2"))
+    return (words[0] & 0xFFFF, *words[1:]) if counter else words
+
+
+DEFAULT_BAUD_RATE = 115200
+"""Of a port that is no USB device itself (baud), where none is asked for."""
+
+
+@dataclass(frozen=True)
+class OutputFormat:
+    """Numbers, what holds them, and how fast they come."""
+
+    adc_bits: int | None = None
+    """Bits of the converter whose codes, from 0 on, stand in the lines; None where volts do."""
+    frame: FrameFormat | None = None
+    """Frames; None where it prints lines."""
+    baud_rate: int = DEFAULT_BAUD_RATE
+    """Of a serial port that is no USB device itself (baud)."""
+
+    @property
+    def bits(self) -> int:
+        """Bits of the codes that are made of the numbers: 24 of volts, so that nothing is lost."""
+        return self.adc_bits or (16 if self.frame else 24)

@@ -1,0 +1,155 @@
+"""Read scans from a board that prints its samples."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel, SensorInput
+from acquisition.errors import DeviceError
+from acquisition.ports.serial_ports import SerialLink, find_usb_identity
+from acquisition.source import DeviceIdentity, Event
+from acquisition.text_boards.decoders import LineDecoder, OutputFormat, ScanCounter, SimpleFrameDecoder
+
+BOARD_LISTEN_TIME = 1.0
+"""Time for which is listened (s)."""
+MIN_NUMBER_LINES = 20
+"""Lines of as many numbers without a broken one between them that make a board of it."""
+MAX_NUMBERS_PER_LINE = 5
+"""Numbers in a line: counter, force and three axes of acceleration, or fewer."""
+
+
+def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
+    """Who prints there, told by listening alone; None where nobody does. It has no serial number of its own."""
+    decoders = {count: LineDecoder((count,)) for count in range(1, MAX_NUMBERS_PER_LINE + 1)}
+    lines = dict.fromkeys(decoders, 0)
+    deadline = time.monotonic() + BOARD_LISTEN_TIME
+    while max(lines.values()) < MIN_NUMBER_LINES and (left := deadline - time.monotonic()) > 0:
+        heard = link.read(left)
+        for count, decoder in decoders.items():
+            for printed in decoder.feed(heard):
+                lines[count] = len(printed.rows) + (0 if printed.broken_before else lines[count])
+    likeliest = max(lines, key=lambda count: lines[count])
+    if lines[likeliest] < MIN_NUMBER_LINES:
+        return None
+    return DeviceIdentity(f"a board that prints {likeliest} number{'s' * (likeliest > 1)} a line")
+
+
+BOARD_SILENCE_TIMEOUT = 3.0
+"""A board that prints no samples for so long has failed (s); one that is reset by the opening of its port needs two."""
+
+
+class TextBoardSource:
+    """Listens; the board prints by itself and is never written to. A context manager.
+
+    The order is that of the inputs, with a counter before them where one number more comes than there are inputs. The
+    numbers are volts, or, where adc_bits is given, codes of a converter from 0 to 2^adc_bits - 1 whose middle is 0 V.
+    What cannot be known: whole lines that are lost where no counter is printed, and whether both sensors were sampled
+    at once.
+    """
+
+    follows_clock = True
+    """Its rate is measured against the clock, and known no better than that."""
+    fault = ""
+    """It tells of no faults."""
+
+    def __init__(
+        self,
+        port: str,
+        inputs: Sequence[SensorInput],
+        sample_rate: float | None,
+        printing: OutputFormat | None = None,
+    ) -> None:
+        """Open a port. ValueError without a sample rate (Hz), DeviceError where there is no port."""
+        self.sample_rate = check_text_board(inputs, sample_rate)
+        self.events: deque[Event] = deque()
+        self.loss_detection = "broken lines"
+        self._printing = printing or OutputFormat()
+        self.channels: tuple[Channel, ...] = tuple(
+            replace(sensor.channel, adc_bits=self._printing.bits) for sensor in inputs
+        )
+        self._rows = [sensor.number for sensor in inputs]
+        self._running = False
+        self._link = SerialLink(port, self._printing.baud_rate)
+        usb = find_usb_identity(port)
+        self.identity = DeviceIdentity("lines", usb[1] if usb else port)
+
+    def __enter__(self) -> Self:
+        """The connected source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def start(self) -> None:
+        """Count scans from the next whole line on."""
+        while self._link.read(0.0):
+            pass
+        frame, values = self._printing.frame, len(self.channels)
+        self._decoder = SimpleFrameDecoder(frame, values) if frame else LineDecoder((values, values + 1))
+        self._counter = ScanCounter(values)
+        self._running = True
+
+    def stop(self) -> None:
+        """Listen no more; the board goes on."""
+        self._running = False
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._running = False
+        self._link.close()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks as they arrive; DeviceError where the board is unplugged, or prints nothing that it should."""
+        scan, heard, overruns = 0, time.monotonic(), self._link.overruns
+        while self._running:
+            runs = [
+                run for printed in self._decoder.feed(self._link.read(0.2)) for run in self._counter.split_runs(printed)
+            ]
+            for run in runs:
+                late, overruns = self._link.overruns - overruns, self._link.overruns
+                lost = max(run.lost_before, late)
+                scan += lost
+                yield Block(scan, self._codes(run.values), lost_before=lost)
+                scan, heard = scan + run.values.shape[1], time.monotonic()
+            if time.monotonic() - heard > BOARD_SILENCE_TIMEOUT:
+                wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
+                raise DeviceError(
+                    f"the board on {self._link.port} has printed no samples for {BOARD_SILENCE_TIMEOUT:g} s",
+                    f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
+                )
+
+    def _codes(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Codes of the converter, one row a channel."""
+        rows = values[self._rows]
+        if self._printing.frame is None and self._printing.adc_bits is None:
+            volts = zip(self.channels, rows, strict=True)
+            return np.array([channel.encode(row / channel.sensitivity) for channel, row in volts], np.int32)
+        low, high = self.channels[0].rails
+        zero = 0 if self._printing.frame else -low
+        codes: NDArray[np.int32] = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
+        return codes
+
+
+def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -> float:
+    """The sample rate (Hz); ValueError where it is missing, or inputs are no columns."""
+    if sample_rate is None:
+        raise ValueError(
+            'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '
+            "lines a second that it was made for: it is measured against the clock"
+        )
+    if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
+        before = ", ".join(map(str, range(len(inputs) - 1)))
+        last = f"the inputs {before} and {len(inputs) - 1}" if before else "input 0, and there is one alone"
+        raise ValueError(f"input: the numbers after the counter are {last}; correct [[daq.channel]]")
+    return sample_rate

@@ -1,0 +1,193 @@
+"""USB audio devices through PortAudio, with the calibration in a Modal Shop device name.
+
+The name holds model, format, serial number, for each input the counts of a 24-bit converter per volt (format 2; format
+3: 20 times as many) or per m/s^2 (format 1), and the date as yymmdd. Source: The Modal Shop, MAN-0343, USB audio
+interface guide, 2021.
+"""
+
+from __future__ import annotations
+
+import queue
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from acquisition.channel import Channel, SensorInput
+from acquisition.errors import DeviceError
+from acquisition.source import DeviceAddress, DeviceIdentity
+from acquisition.vendor_drivers.library_device import (
+    LibraryDevice,
+    VoltageBlock,
+    check_input_numbers,
+    find_library,
+    load_library,
+)
+
+MODAL_SHOP_MODEL_PATTERN = r"(?P<model>(?:485B|333D|633A|SDC0)\w\w)"
+MODAL_SHOP_NAME_PATTERN = re.compile(
+    MODAL_SHOP_MODEL_PATTERN + r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\d{6})"
+)
+
+
+@dataclass(frozen=True)
+class NameCalibration:
+    """What stands in the name of a device of The Modal Shop."""
+
+    model: str
+    """Model."""
+    serial: str
+    """Serial number."""
+    date: str
+    """Date of the calibration (ISO 8601)."""
+    full_scales: tuple[float, ...]
+    """Full scale of each input (V; m/s^2 of a device that measures acceleration itself)."""
+    is_accelerometer: bool
+    """Whether it measures acceleration itself."""
+
+
+def parse_name_calibration(name: str) -> NameCalibration | None:
+    """Calibration in the name of a device; None where there is none."""
+    match = MODAL_SHOP_NAME_PATTERN.search(name)
+    if match is None:
+        return None
+    kind, counts = match["format"], match["counts"]
+    half = len(counts) // 2
+    factor = 20 if kind == "3" else 1
+    scales = tuple(2.0**23 / (factor * int(part)) for part in (counts[:half], counts[half:]))
+    year, month, day = (int(match["date"][k : k + 2]) for k in (0, 2, 4))
+    date = f"20{year:02d}-{month:02d}-{day:02d}"
+    return NameCalibration(match["model"], match["serial"], date, scales, kind == "1")
+
+
+AUDIO_DEFAULT_RATE = 48000.0
+"""Sample rate where none is asked for (Hz)."""
+AUDIO_BLOCK_TIME = 0.02
+"""Length of a block (s)."""
+FULL_SCALE_CODE = 2.0**31
+"""Codes of 32 bits from 0 to full scale; devices of 24 bits fill the upper ones."""
+PORTAUDIO_INVALID_RATE = -9997
+"""PortAudio's error for a rate that a device does not have."""
+MAX_RANGE_DEVIATION = 0.2
+"""Share by which range_v may differ from the calibration in the name; more is a mistake."""
+
+
+def search_audio() -> Sequence[DeviceAddress]:
+    """Sound devices with at least two inputs."""
+    library = find_library("sounddevice", "audio")
+    return (
+        [_make_address(entry) for entry in library.query_devices() if entry["max_input_channels"] >= 2]
+        if library
+        else []
+    )
+
+
+def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
+    """The sound device "audio:NAME", "audio:PART OF ITS NAME" or "audio:NUMBER", sampled by its own clock."""
+    library = load_library("sounddevice", "audio")
+    entry = _find_sound_device(library.query_devices(), port.removeprefix("audio:"))
+    numbers = tuple(sensor.number for sensor in inputs)
+    check_input_numbers(numbers, entry["max_input_channels"], entry["name"])
+    rate, calibration = sample_rate or AUDIO_DEFAULT_RATE, parse_name_calibration(entry["name"])
+    channels = tuple(_calibrate_channel(sensor.channel, sensor.number, calibration) for sensor in inputs)
+    try:
+        library.check_input_settings(entry["index"], max(numbers) + 1, "int32", samplerate=rate)
+        reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
+    except library.PortAudioError as error:
+        if error.args[1:2] == (PORTAUDIO_INVALID_RATE,):
+            text = f"sample_rate_hz={rate:g}: {entry['name']} has no such rate ({error}); try 48000"
+            raise ValueError(text) from error
+        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
+    return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
+
+
+class AudioReader:
+    """Reads blocks that PortAudio hands over in a thread of its own."""
+
+    def __init__(
+        self, library: Any, index: int, numbers: tuple[int, ...], rate: float, full_scales: Sequence[float]
+    ) -> None:
+        """The device with this index; numbers: its inputs in order; full_scales: of those (V)."""
+        self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
+        self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
+        self._pieces = queue.SimpleQueue[VoltageBlock]()
+        self._stream = library.InputStream(
+            rate, round(rate * AUDIO_BLOCK_TIME), index, max(numbers) + 1, "int32", callback=self._keep
+        )
+        if abs(self._stream.samplerate / rate - 1) > 1e-3:
+            actual = self._stream.samplerate
+            self._stream.close()
+            raise DeviceError(
+                f"the sound device samples at {actual:g} Hz where {rate:g} Hz was asked",
+                "name its rate as sample_rate_hz in [daq]",
+            )
+
+    def start(self) -> None:
+        """See Reader."""
+        self._pieces = queue.SimpleQueue()
+        self._stream.start()
+
+    def read(self, timeout: float) -> VoltageBlock | None:
+        """See Reader."""
+        try:
+            return self._pieces.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+    def stop(self) -> None:
+        """See Reader."""
+        self._stream.stop()
+
+    def close(self) -> None:
+        """See Reader."""
+        self._stream.close()
+
+    def fault(self) -> str:
+        """Nothing: a sound device does not tell."""
+        return ""
+
+    def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
+        volts = np.asarray(data, np.float64).T[self._numbers] * self._volts
+        self._pieces.put(VoltageBlock(volts, lost_before=int(bool(status.input_overflow))))
+
+
+def _make_address(entry: dict[str, Any]) -> DeviceAddress:
+    calibration = parse_name_calibration(entry["name"])
+    identity = DeviceIdentity(entry["name"], entry["name"])
+    if calibration:
+        identity = DeviceIdentity(calibration.model, calibration.serial)
+    return DeviceAddress(f"audio:{entry['name']}", identity, f"{entry['max_input_channels']} inputs")
+
+
+def _find_sound_device(devices: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
+    """The one sound device with inputs of this name or number, or whose name holds it."""
+    inputs = [entry for entry in devices if entry["max_input_channels"]]
+    exact = [entry for entry in inputs if wanted in (entry["name"], str(entry["index"]))]
+    listed = exact or [entry for entry in inputs if wanted.casefold() in entry["name"].casefold()]
+    if len(listed) == 1:
+        return listed[0]
+    names = ", ".join(f"{entry['index']}: {entry['name']}" for entry in listed or inputs) or "none"
+    reason = f"{len(listed)} sound devices fit" if listed else "no sound device fits"
+    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', "plug it in, or give its number, as in audio:3")
+
+
+def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
+    """A channel of 24 bits with the full scale of the calibration where the name has it, else range_v.
+
+    An accelerometer that is a sound device has no volts: those of its sensitivity stand for its m/s^2.
+    """
+    if calibration is None:
+        return replace(channel, adc_bits=24)
+    scale = calibration.full_scales[number]
+    if calibration.is_accelerometer:
+        if channel.quantity == "force":
+            raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
+        scale *= abs(channel.sensitivity)
+    if abs(channel.full_scale / scale - 1) > MAX_RANGE_DEVIATION:
+        raise ValueError(
+            f"range_v={channel.full_scale:g}: the calibration of {calibration.model} says {scale:.4g} V for input "
+            f"{number}; write that"
+        )
+    return replace(channel, adc_bits=24, full_scale=scale)

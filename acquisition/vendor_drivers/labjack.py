@@ -1,0 +1,121 @@
+"""LabJack T7 and T8 devices through LJM."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import SensorInput
+from acquisition.errors import DeviceError
+from acquisition.source import DeviceAddress, DeviceIdentity
+from acquisition.vendor_drivers.library_device import (
+    LibraryDevice,
+    VoltageBlock,
+    check_input_numbers,
+    find_library,
+    load_library,
+)
+
+LJM_EXTRA = "ljm"
+T7_DEFAULT_RATE = 40000.0
+"""Sample rate where none is asked for (Hz): two inputs of a T7, which samples 100 000 values a second."""
+T7_BLOCK_TIME = 0.02
+"""Length of a block (s)."""
+SKIPPED_SAMPLE_VALUE = -9999.0
+"""Value that LJM puts in place of a sample that the device had no room for."""
+T7_INPUT_COUNT = 14
+"""Of a T7, AIN0 to AIN13."""
+T7_RANGES = (10.0, 1.0, 0.1, 0.01)
+"""Of a T7 (V)."""
+
+
+def search_ljm() -> Sequence[DeviceAddress]:
+    """T7 and T8 on USB and in the network."""
+    library = find_library("labjack.ljm", LJM_EXTRA)
+    if library is None:
+        return []
+    constants = library.constants
+    names = {constants.dtT7: "LabJack T7", constants.dtT8: "LabJack T8"}
+    count, kinds, _, numbers, _ = library.listAll(constants.dtANY, constants.ctANY)
+    listed = {numbers[k]: names[kinds[k]] for k in range(count) if kinds[k] in names}
+    return [DeviceAddress(f"ljm:{number}", DeviceIdentity(name, str(number)), name) for number, name in listed.items()]
+
+
+def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
+    """The device "ljm:SERIAL NUMBER" (or its IP address or name); the rate is the nearest that it has."""
+    library = load_library("labjack.ljm", LJM_EXTRA)
+    numbers = [sensor.number for sensor in inputs]
+    check_input_numbers(numbers, T7_INPUT_COUNT, "a LabJack T7")
+    for sensor in inputs:
+        if sensor.channel.full_scale not in T7_RANGES:
+            listed = ", ".join(f"{scale:g}" for scale in T7_RANGES)
+            raise ValueError(f"range_v={sensor.channel.full_scale:g} is none of {listed}, the ranges of a LabJack T7")
+    handle = None
+    try:
+        handle = library.openS("ANY", "ANY", port.removeprefix("ljm:"))
+        for sensor in inputs:
+            library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
+        reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
+        serial = library.getHandleInfo(handle)[2]
+        firmware = library.eReadName(handle, "FIRMWARE_VERSION")
+    except library.LJMError as error:
+        if handle is not None:
+            library.close(handle)
+        raise DeviceError(f"{port} cannot be opened ({error})", "`lobewatch ports` lists what there is") from error
+    identity = DeviceIdentity("LabJack", str(serial), f"{firmware:.4f}")
+    channels = tuple(replace(sensor.channel, adc_bits=16) for sensor in inputs)
+    return LibraryDevice(port, reader, identity, channels, reader.rate, "skipped samples")
+
+
+class LjmReader:
+    """Reads a stream."""
+
+    def __init__(self, library: Any, handle: int, numbers: Sequence[int], rate: float) -> None:
+        """The opened device; its rate is found by starting it once (Hz)."""
+        self.errors: tuple[type[Exception], ...] = (library.LJMError,)
+        self._library, self._handle = library, handle
+        self._inputs = library.namesToAddresses(len(numbers), [f"AIN{number}" for number in numbers])[0]
+        self.rate = rate
+        """Sample rate that the device has (Hz), known once it was started."""
+        self.start()
+        self.stop()
+
+    def start(self) -> None:
+        """See Reader."""
+        self._lost, self._pieces = 0, deque[VoltageBlock]()
+        size = round(self.rate * T7_BLOCK_TIME)
+        self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
+
+    def read(self, _timeout: float) -> VoltageBlock | None:
+        """See Reader; LJM waits by itself, and tells by its error where nothing comes."""
+        if not self._pieces:
+            self._pieces.extend(self._runs(np.array(self._library.eStreamRead(self._handle)[0])))
+        return self._pieces.popleft() if self._pieces else None
+
+    def _runs(self, values: NDArray[np.float64]) -> Iterator[VoltageBlock]:
+        """The runs of scans without a skipped sample."""
+        volts = values.reshape(-1, len(self._inputs)).T
+        whole = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)
+        for run in np.split(np.arange(whole.size), np.flatnonzero(np.diff(whole)) + 1):
+            if whole[run[0]]:
+                yield VoltageBlock(volts[:, run], self._lost)
+                self._lost = 0
+            else:
+                self._lost += run.size
+
+    def stop(self) -> None:
+        """See Reader."""
+        self._library.eStreamStop(self._handle)
+
+    def close(self) -> None:
+        """See Reader."""
+        self._library.close(self._handle)
+
+    def fault(self) -> str:
+        """Nothing: the device does not tell."""
+        return ""

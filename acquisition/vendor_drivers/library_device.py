@@ -1,0 +1,176 @@
+"""Devices read through the Python library of their vendor."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel
+from acquisition.errors import DeviceError
+from acquisition.source import DeviceIdentity, Event
+
+
+def load_library(module: str, extra: str) -> Any:  # a module without types
+    """A module of a library; DeviceError with the command that installs it where it cannot be imported.
+
+    OSError is what libraries raise whose own C library is missing.
+    """
+    try:
+        return import_module(module)
+    except (ImportError, OSError) as error:
+        package = module.partition(".")[0]
+        raise DeviceError(
+            f"the library {package} cannot be used ({' '.join(str(error).split())})",
+            f"pip install 'lobewatch[{extra}]', and what its maker says it needs (docs/devices.md)",
+        ) from error
+
+
+def find_library(module: str, extra: str) -> Any | None:  # as above
+    """The same for a search; None where it cannot be imported."""
+    try:
+        return load_library(module, extra)
+    except DeviceError:
+        return None
+
+
+def check_input_numbers(numbers: Sequence[int], count: int, device: str) -> None:
+    """ValueError for an input that a device does not have."""
+    for number in numbers:
+        if number >= count:
+            raise ValueError(f"input={number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]")
+
+
+LIBRARY_SILENCE_TIMEOUT = 3.0
+"""A started device that gives no scans for so long has failed (s)."""
+LIBRARY_READ_TIMEOUT = 0.2
+"""Time for which a reader is asked to wait (s)."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoltageBlock:
+    """Consecutive scans as a library gives them."""
+
+    volts: NDArray[np.float64]
+    """Voltages at the inputs (V), shape (n_channels, n_scans)."""
+    lost_before: int = 0
+    """Scans lost between the piece before and this one; 1 where the library says that, but not how many."""
+
+
+class LibraryReader(Protocol):
+    """What a maker's library is asked for; its own errors are those of `errors`."""
+
+    errors: tuple[type[Exception], ...]
+    """Errors that the library raises."""
+
+    def start(self) -> None:
+        """Begin to sample."""
+
+    def read(self, timeout: float) -> VoltageBlock | None:
+        """The scans that have come, waiting for at most timeout (s); None where none came."""
+
+    def stop(self) -> None:
+        """End sampling; harmless where it has ended."""
+
+    def close(self) -> None:
+        """Give the device back."""
+
+    def fault(self) -> str:
+        """Sentence on a sensor that is not connected; empty where all is well or the library cannot tell."""
+
+
+@dataclass
+class LibraryDevice:
+    """An `acquisition.Device` made of a reader; codes are the voltages in steps of each channel's converter."""
+
+    address: str
+    """Address as [daq] port names it."""
+    reader: LibraryReader
+    """What reads its scans."""
+    identity: DeviceIdentity
+    """Model, serial number and firmware."""
+    channels: tuple[Channel, ...]
+    """Its channels, in the order of the reader's rows."""
+    sample_rate: float
+    """Scans a second (Hz)."""
+    loss_detection: str
+    """How lost scans are found, in two words."""
+    follows_clock: bool = True
+    """Whether its scans follow the clock."""
+    events: deque[Event] = field(default_factory=deque)
+    """What has happened at it: such a device has no button."""
+    _running: bool = False
+
+    @property
+    def fault(self) -> str:
+        """One sentence on what is wrong with a sensor while that lasts."""
+        with self._named():
+            return self.reader.fault()
+
+    def __enter__(self) -> Self:
+        """The device itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def start(self) -> None:
+        """Begin to sample."""
+        with self._named():
+            self.reader.start()
+        self._running = True
+
+    def stop(self) -> None:
+        """End the stream; blocks() ends too."""
+        self._running = False
+        with self._named():
+            self.reader.stop()
+
+    def close(self) -> None:
+        """Stop, and give the device back; a device that is gone is no error here."""
+        self._running = False
+        for end in (self.reader.stop, self.reader.close):
+            with suppress(*self.reader.errors):
+                end()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks as they arrive; DeviceError where the device goes away or falls silent."""
+        scan, heard = 0, time.monotonic()
+        while self._running:
+            with self._named():
+                piece = self.reader.read(LIBRARY_READ_TIMEOUT)
+            if piece is not None:
+                scan += piece.lost_before
+                yield Block(scan, self._codes(piece.volts), lost_before=piece.lost_before)
+                scan, heard = scan + piece.volts.shape[1], time.monotonic()
+            elif time.monotonic() - heard > LIBRARY_SILENCE_TIMEOUT:
+                raise DeviceError(
+                    f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s",
+                    "unplug it and plug it in again",
+                )
+
+    def _codes(self, volts: NDArray[np.float64]) -> NDArray[np.int32]:
+        rows = zip(self.channels, volts, strict=True)
+        return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Errors of the library as one of ours, with the address."""
+        try:
+            yield
+        except self.reader.errors as error:
+            words = " ".join(str(error).split())
+            raise DeviceError(
+                f"the DAQ {self.address} has failed ({words})", "check its cable and that no other program uses it"
+            ) from error

@@ -1,0 +1,236 @@
+"""Measurement Computing devices: MCC 172 through daqhats, USB devices through uldaq."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import SensorInput
+from acquisition.errors import DeviceError
+from acquisition.source import DeviceAddress, DeviceIdentity
+from acquisition.vendor_drivers.library_device import (
+    LibraryDevice,
+    VoltageBlock,
+    check_input_numbers,
+    find_library,
+    load_library,
+)
+
+MCC172_EXTRA = "mcc172"
+MCC172_MAX_RATE = 51200.0
+"""Highest rate (Hz); the others are it divided by 2 to 256."""
+MCC172_FULL_SCALE = 5.0
+"""The only range (V)."""
+MCC172_BLOCK_TIME = 0.02
+"""Length of a block (s)."""
+MCC172_SYNC_TIMEOUT = 2.0
+"""Time within which its converters are in step (s); 128 clock cycles by its documentation."""
+
+
+def search_mcc172() -> Sequence[DeviceAddress]:
+    """Boards on this Raspberry Pi."""
+    library = find_library("daqhats", MCC172_EXTRA)
+    if library is None:
+        return []
+    boards = library.hat_list(filter_by_id=library.HatIDs.MCC_172)
+    return [
+        DeviceAddress(f"mcc172:{board.address}", DeviceIdentity("MCC 172"), f"{board.product_name}, 2 inputs")
+        for board in boards
+    ]
+
+
+def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
+    """The board "mcc172:ADDRESS", 0 to 7; of its rates the nearest is taken."""
+    library = load_library("daqhats", MCC172_EXTRA)
+    address = port.removeprefix("mcc172:")
+    if not address.isdigit():
+        raise ValueError(f"port={port!r}: mcc172: is followed by the address of the board, 0 to 7, as in mcc172:0")
+    check_input_numbers([sensor.number for sensor in inputs], 2, "an MCC 172")
+    for sensor in inputs:
+        if sensor.channel.full_scale != MCC172_FULL_SCALE:
+            raise ValueError(f"range_v={sensor.channel.full_scale:g}: an MCC 172 has {MCC172_FULL_SCALE:g} V alone")
+    try:
+        board = library.mcc172(int(address))
+        for sensor in inputs:
+            board.iepe_config_write(sensor.number, int(sensor.iepe))
+        rate = _set_mcc172_rate(library, board, sample_rate or MCC172_MAX_RATE)
+        identity = DeviceIdentity("MCC 172", board.serial(), board.firmware_version().version)
+    except library.HatError as error:
+        words = " ".join(str(error).split())
+        raise DeviceError(f"{port} cannot be opened ({words})", "`lobewatch ports` lists what there is") from error
+    channels = tuple(replace(sensor.channel, adc_bits=24) for sensor in inputs)
+    reader = Mcc172Reader(library, board, [sensor.number for sensor in inputs], rate)
+    return LibraryDevice(port, reader, identity, channels, rate, "buffer overrun")
+
+
+class Mcc172Reader:
+    """Reads a continuous scan of both inputs."""
+
+    def __init__(self, library: Any, board: Any, numbers: Sequence[int], rate: float) -> None:
+        """The opened board; numbers: its inputs in order; rate (Hz)."""
+        self.errors: tuple[type[Exception], ...] = (library.HatError,)
+        self._library, self._board, self._numbers = library, board, list(numbers)
+        self._size = round(rate * MCC172_BLOCK_TIME)
+
+    def start(self) -> None:
+        """See Reader."""
+        self._board.a_in_scan_start(0b11, 0, self._library.OptionFlags.CONTINUOUS)
+
+    def read(self, timeout: float) -> VoltageBlock | None:
+        """See Reader; a scan that has overrun its buffer has ended: DeviceError."""
+        scan = self._board.a_in_scan_read_numpy(self._size, timeout)
+        if scan.hardware_overrun or scan.buffer_overrun:
+            raise DeviceError("the MCC 172 has lost scans and stopped", "end other programs on this Raspberry Pi")
+        volts = scan.data.reshape(-1, 2).T[self._numbers]
+        return VoltageBlock(volts) if volts.size else None
+
+    def stop(self) -> None:
+        """See Reader."""
+        self._board.a_in_scan_stop()
+        self._board.a_in_scan_cleanup()
+
+    def close(self) -> None:
+        """Switch the supply of the sensors off."""
+        for number in self._numbers:
+            self._board.iepe_config_write(number, 0)
+
+    def fault(self) -> str:
+        """Nothing: the board does not tell."""
+        return ""
+
+
+def _set_mcc172_rate(library: Any, board: Any, rate: float) -> float:
+    """Set the clock to the rate nearest to this (Hz) and wait until the converters are in step; that rate (Hz)."""
+    board.a_in_clock_config_write(library.SourceType.LOCAL, rate)
+    deadline = time.monotonic() + MCC172_SYNC_TIMEOUT
+    while not (clock := board.a_in_clock_config_read()).synchronized:
+        if time.monotonic() > deadline:
+            raise DeviceError("the converters of the MCC 172 do not come into step", "restart the Raspberry Pi")
+        time.sleep(0.005)
+    return float(clock.sample_rate_per_channel)
+
+
+ULDAQ_EXTRA = "uldaq"
+ULDAQ_DEFAULT_RATE = 50000.0
+"""Sample rate where none is asked for (Hz)."""
+ULDAQ_RING_TIME = 2.0
+"""Length of the ring of scans (s); whoever reads later than that has lost some."""
+ULDAQ_POLL_INTERVAL = 0.01
+"""Time between two looks whether scans have come (s)."""
+
+
+def search_uldaq() -> Sequence[DeviceAddress]:
+    """Devices on USB."""
+    library = find_library("uldaq", ULDAQ_EXTRA)
+    if library is None:
+        return []
+    devices = library.get_daq_device_inventory(library.InterfaceType.USB)
+    return [
+        DeviceAddress(f"uldaq:{entry.unique_id}", _read_uldaq_identity(entry), entry.product_name) for entry in devices
+    ]
+
+
+def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
+    """The device "uldaq:SERIAL NUMBER". Both inputs have one range; the rate is the nearest that it has."""
+    library = load_library("uldaq", ULDAQ_EXTRA)
+    wanted = port.removeprefix("uldaq:")
+    entries = [
+        entry
+        for entry in library.get_daq_device_inventory(library.InterfaceType.USB)
+        if entry.unique_id.casefold() == wanted.casefold()
+    ]
+    if not entries:
+        raise DeviceError(f"{wanted!r} is not plugged in", "`lobewatch ports` lists what there is")
+    device = library.DaqDevice(entries[0])
+    try:
+        device.connect()
+        reader = UldaqReader(library, device, inputs, sample_rate or ULDAQ_DEFAULT_RATE)
+    except library.ULException as error:
+        device.release()
+        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
+    except BaseException:
+        device.release()
+        raise
+    channels = tuple(replace(sensor.channel, adc_bits=reader.bits) for sensor in inputs)
+    return LibraryDevice(port, reader, _read_uldaq_identity(entries[0]), channels, reader.rate, "scan count")
+
+
+class UldaqReader:
+    """Reads the ring that a continuous scan fills."""
+
+    def __init__(self, library: Any, device: Any, inputs: Sequence[SensorInput], rate: float) -> None:
+        """The connected device; ValueError for inputs or ranges that it does not have."""
+        self.errors: tuple[type[Exception], ...] = (library.ULException,)
+        self._library, self._device, self._inputs = library, device, device.get_ai_device()
+        info = self._inputs.get_info()
+        numbers = [sensor.number for sensor in inputs]
+        self._mode = library.AiInputMode.SINGLE_ENDED
+        check_input_numbers(numbers, info.get_num_chans_by_mode(self._mode), device.get_descriptor().product_name)
+        self._range = _find_uldaq_range(
+            library, info.get_ranges(self._mode), {sensor.channel.full_scale for sensor in inputs}
+        )
+        self._first, self._last = min(numbers), max(numbers)
+        self._rows = [number - self._first for number in numbers]
+        self.bits = int(info.get_resolution())
+        """Resolution of the converter."""
+        self._size = round(rate * ULDAQ_RING_TIME)
+        self._ring = library.create_float_buffer(self._last - self._first + 1, self._size)
+        self._read = 0
+        self.rate = rate
+        """Sample rate that the device has (Hz), known once it was started."""
+        self.start()
+        self.stop()
+
+    def start(self) -> None:
+        """See Reader."""
+        self._read = 0
+        options = self._library.ScanOption.CONTINUOUS, self._library.AInScanFlag.DEFAULT
+        place = self._first, self._last, self._mode, self._range
+        self.rate = float(self._inputs.a_in_scan(*place, self._size, self.rate, *options, self._ring))
+
+    def read(self, timeout: float) -> VoltageBlock | None:
+        """See Reader."""
+        deadline = time.monotonic() + timeout
+        while (come := self._inputs.get_scan_status()[1].current_scan_count) == self._read:
+            if time.monotonic() > deadline:
+                return None
+            time.sleep(ULDAQ_POLL_INTERVAL)
+        lost = max(come - self._read - self._size // 2, 0)  # half of the ring: the rest may be written meanwhile
+        places = np.arange(self._read + lost, come) % self._size
+        self._read = come
+        volts: NDArray[np.float64] = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
+        return VoltageBlock(volts, lost)
+
+    def stop(self) -> None:
+        """See Reader."""
+        self._inputs.scan_stop()
+
+    def close(self) -> None:
+        """See Reader."""
+        self._device.disconnect()
+        self._device.release()
+
+    def fault(self) -> str:
+        """Nothing: the device does not tell."""
+        return ""
+
+
+def _read_uldaq_identity(entry: Any) -> DeviceIdentity:
+    return DeviceIdentity(entry.product_name, entry.unique_id)
+
+
+def _find_uldaq_range(library: Any, ranges: Sequence[Any], wanted: set[float]) -> Any:
+    """The range of the device with this full scale (V); ValueError for two, or for one it does not have."""
+    volts = {scale: f"BIP{scale:g}VOLTS" for scale in wanted}
+    names = {entry.name for entry in ranges}
+    if len(wanted) == 1 and names.issuperset(volts.values()):
+        return getattr(library.Range, *volts.values())
+    bipolar = sorted(name.removeprefix("BIP").removesuffix("VOLTS") for name in names if name.startswith("BIP"))
+    listed = ", ".join(bipolar)
+    given = " and ".join(f"{scale:g}" for scale in sorted(wanted))
+    raise ValueError(f"range_v={given}: both inputs need one range of this device: {listed} V")

@@ -1,1 +1,0 @@
-"""Receptance and static stiffness, and tools coupled to them."""

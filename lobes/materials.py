@@ -1,0 +1,185 @@
+"""Published cutting-force coefficients, and their lookup by material name.
+
+A material of materials.csv has the specific forces of its group of VDI 3323, of its CMC code and of its own name in
+specific_cutting_forces.csv, and the ratio Kr/Kt of force_ratios.csv of its group of VDI 3323, else of ISO 513.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+
+import numpy as np
+
+from lobes.coefficients import CuttingCoefficients, SpecificForce
+
+MIN_TESTS_FOR_RANGE = 2
+"""Number of tests of an alloy from which on their range counts."""
+
+
+@cache
+def milling_tests() -> tuple[CuttingCoefficients, ...]:
+    """All that come with this package, with the range over the tests of the same alloy; the spread is large."""
+    text = (files("lobes") / "cutting_coefficients.csv").read_text(encoding="utf-8")
+    tests = [_read_test(row) for row in csv.DictReader(text.splitlines())]
+    return tuple(_with_range(test, [other for other in tests if other.alloy == test.alloy]) for test in tests)
+
+
+def _read_test(row: dict[str, str]) -> CuttingCoefficients:
+    return CuttingCoefficients(
+        material=row["material"],
+        tangential=float(row["Ktc_MPa"]) * 1e6,
+        radial=float(row["Krc_MPa"]) * 1e6,
+        tangential_edge=float(row["Kte_N_per_mm"] or "nan") * 1e3,
+        radial_edge=float(row["Kre_N_per_mm"] or "nan") * 1e3,
+        note=row["note"],
+        source=row["source"],
+        alloy=row["alloy"],
+        iso_group=row["iso_group"],
+    )
+
+
+def _with_range(test: CuttingCoefficients, alike: Sequence[CuttingCoefficients]) -> CuttingCoefficients:
+    if len(alike) < MIN_TESTS_FOR_RANGE:
+        return test
+    tangential = [other.tangential for other in alike]
+    ratio = [other.radial / other.tangential for other in alike]
+    return replace(test, tangential_range=(min(tangential), max(tangential)), ratio_range=(min(ratio), max(ratio)))
+
+
+REFERENCE_CHIP_THICKNESS = 1e-4
+"""Chip thickness that Kt and Kte are said at (m) ..."""
+CHIP_THICKNESS_RANGE = (0.5e-4, 2e-4)
+"""... and those that their range reaches over: of mills with 0.05 to 0.3 mm a tooth."""
+MIN_COEFFICIENT_RANGE = 0.25
+"""Least half-width of the range of Kt: what one source is taken to be off by."""
+
+
+@cache
+def listed_materials() -> tuple[CuttingCoefficients, ...]:
+    """All that come with this package, in the order of ISO 513."""
+    return tuple(_material_coefficients(row) for row in _csv_rows("materials.csv"))
+
+
+def _csv_rows(name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader((files("lobes") / name).read_text(encoding="utf-8").splitlines()))
+
+
+@cache
+def _specific_forces_by_group() -> dict[str, list[SpecificForce]]:
+    """By what they are of."""
+    by_name: dict[str, list[SpecificForce]] = {}
+    for row in _csv_rows("specific_cutting_forces.csv"):
+        force = SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"])
+        by_name.setdefault(row["of"], []).append(force)
+    return by_name
+
+
+@cache
+def _force_ratios() -> dict[str, dict[str, str]]:
+    return {row["of"]: row for row in _csv_rows("force_ratios.csv")}
+
+
+def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
+    vdi, cmc = f"VDI {row['vdi_3323_group']}", f"CMC {row['cmc_code']}"
+    forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces_by_group().get(name, ())]
+    tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
+    ratio = _force_ratios().get(vdi) or _force_ratios()[row["iso_group"]]
+    tangential = np.mean(
+        [force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + [test.tangential for test in tests]
+    )
+    edge = np.mean(
+        [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces] + [test.tangential_edge for test in tests]
+    )
+    return CuttingCoefficients(
+        material=row["material"],
+        tangential=float(tangential),
+        radial=float(tangential) * float(ratio["middle"]),
+        tangential_edge=float(edge),
+        source="; ".join(_source_texts(forces, tests, ratio["source"])),
+        alloy=row["alloy"],
+        iso_group=row["iso_group"],
+        vdi_3323_group=row["vdi_3323_group"],
+        equivalents=tuple(row["equivalents"].split(";")),
+        tangential_range=_coefficient_range(float(tangential), forces, tests),
+        ratio_range=(float(ratio["low"]), float(ratio["high"])),
+        specific_forces=tuple(forces),
+    )
+
+
+def _coefficient_range(
+    middle: float, forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients]
+) -> tuple[float, float]:
+    """Over all publications and chip thicknesses."""
+    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + [
+        test.tangential for test in tests
+    ]
+    return min(*published, (1 - MIN_COEFFICIENT_RANGE) * middle), max(*published, (1 + MIN_COEFFICIENT_RANGE) * middle)
+
+
+def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:
+    """One a number: kc1.1 with mc, tests, Kr/Kt."""
+    of_forces = [f"kc1.1 {force.at_1_mm / 1e6:.0f}, mc {force.exponent:.2f}: {force.source}" for force in forces]
+    return [*of_forces, *(f"Kt {test.tangential / 1e6:.0f}: {test.source}" for test in tests), f"Kr/Kt: {ratio}"]
+
+
+def all_cutting_coefficients() -> tuple[CuttingCoefficients, ...]:
+    """All coefficients that are known: those measured by milling, then the materials listed by name.
+
+    These have theirs from published specific cutting forces. Each names its source.
+    """
+    return (*milling_tests(), *listed_materials())
+
+
+def fold_material_name(name: str) -> str:
+    """A name of a material without what is forgiven: case and blanks.
+
+    >>> fold_material_name("Al 7075-T6") == fold_material_name("AL7075-t6")
+    True
+    """
+    return "".join(name.split()).casefold()
+
+
+@cache
+def materials_by_name() -> Mapping[str, CuttingCoefficients]:
+    """The coefficients by each of their names, as `fold_material_name` writes them.
+
+    >>> materials_by_name()[fold_material_name("AA 7075")].names
+    ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')
+    """
+    known = ((name, one) for one in all_cutting_coefficients() for name in one.names)
+    return MappingProxyType({fold_material_name(name): one for name, one in known})
+
+
+def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
+    """The known name, as it is written, that is most like one that is not; by_name: materials by folded names.
+
+    >>> nearest_material_name("AA 7057", materials_by_name())
+    'AA 7075'
+    """
+    nearest = difflib.get_close_matches(fold_material_name(name), by_name, n=1, cutoff=0.0)[0]
+    return next(known for known in by_name[nearest].names if fold_material_name(known) == nearest)
+
+
+def find_materials(word: str) -> list[CuttingCoefficients]:
+    """Those of a group of ISO 513 (one letter), else those that have the word in one of their names; "": all.
+
+    Case and blanks do not count. Raises ValueError where there are none.
+
+    >>> sorted({material.alloy for material in find_materials("7075")})
+    ['Al 7075']
+    >>> len(find_materials("N")) >= 10  # group N of ISO 513: all that is not ferrous
+    True
+    """
+    folded, known = fold_material_name(word), all_cutting_coefficients()
+    of_group = [one for one in known if folded and one.iso_group.casefold() == folded]
+    matching = of_group or [one for one in known if any(folded in fold_material_name(name) for name in one.names)]
+    if not matching:
+        near = nearest_material_name(word, materials_by_name())
+        raise ValueError(f"no material has {word!r} in a name; is {near!r} meant? Without a word all are listed")
+    return matching

@@ -1,0 +1,130 @@
+"""Options shared by several commands: facts about a file, edited modes, numbers."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import acquisition
+
+
+def number(text: str | float) -> float:
+    """A number as it is typed; typer.BadParameter for what is none, with the point for a decimal comma."""
+    try:
+        return float(text)
+    except ValueError:
+        comma = re.fullmatch(r"\s*([+-]?\d+),(\d+)\s*", str(text))
+        hint = f"; write {comma[1]}.{comma[2]} with a point" if comma else ""
+        raise typer.BadParameter(f"{text!r} is no number{hint}") from None
+
+
+Command = Callable[..., None]
+AddedModes = Annotated[
+    list[str] | None, typer.Option(help="Fit a further mode near this frequency (Hz); may be repeated.")
+]
+DroppedModes = Annotated[
+    list[str] | None, typer.Option(help="Leave out the mode at this frequency (Hz); may be repeated.")
+]
+FixedModes = Annotated[
+    list[str] | None, typer.Option(help="Hold a mode at Hz:zeta, as in 1500:0.03, and fit its K alone.")
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """Options on a recorded file; the fields are the options, in the order of the help pages."""
+
+    columns: Annotated[
+        str,
+        typer.Option(
+            help='Of its columns: "frequency,real,imag", "time [s],force [N],acceleration [g]", "frequency=F,frf=H:2".'
+        ),
+    ] = ""
+    """Headings of the columns, separated by commas."""
+    quantity: Annotated[str, typer.Option(help="Of the response: displacement, velocity or acceleration.")] = ""
+    """Quantity of the response."""
+    unit: Annotated[str, typer.Option(help="Of the response (m/s^2, g), or of an FRF (m/N, um/N, g/N).")] = ""
+    """Unit of the response or of the FRF."""
+    force_unit: Annotated[str, typer.Option(help="Of the force (N, lbf).")] = ""
+    """Unit of the force."""
+    skip: Annotated[int | None, typer.Option(min=1, help="Lines of a text that are passed over above its rows.")] = None
+    """Number of lines above the rows."""
+    decimal: Annotated[
+        str, typer.Option(help="Decimal sign of a text where its numbers leave that in doubt: comma or point.")
+    ] = ""
+    """Decimal sign."""
+    spacing: Annotated[
+        float | None, typer.Option(help="Hz from line to line of an FRF that the file holds without its frequencies.")
+    ] = None
+    """Spacing of the lines (Hz)."""
+    start: Annotated[float | None, typer.Option(help="Hz of the first of these lines; 0 where not given.")] = None
+    """Frequency of the first line (Hz)."""
+    force: Annotated[
+        Path | None, typer.Option(help="File that holds the force, where FILE holds only the response.")
+    ] = None
+    """File of the force."""
+    rate: Annotated[float | None, typer.Option(help="Samples a second (Hz).")] = None
+    """Sample rate (Hz)."""
+    averages: Annotated[
+        int | None,
+        typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says."),
+    ] = None
+    """Number of hits that an FRF was averaged from."""
+    response: Annotated[int | None, typer.Option(help="Which of several responses, from 1.")] = None
+    """Number of the response, from 1."""
+    full_scale: Annotated[str, typer.Option(help='Of each channel of a sound file, in its unit: "500,50".')] = ""
+    """Full scales of the channels, separated by commas."""
+    sensitivity: Annotated[str, typer.Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')] = ""
+    """Sensitivities of the channels, separated by commas."""
+
+    def description(self, **fields: Any) -> acquisition.Description:
+        """The description that these options make, with other fields; ValueError for a full scale that is no number."""
+        try:
+            scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()
+        except ValueError as error:
+            text = f'--full-scale {self.full_scale}: give a number for each channel, as in "500,50"'
+            raise ValueError(text) from error
+        lists = {
+            "columns": _split_words(self.columns),
+            "full_scale": scales,
+            "sensitivity": _split_words(self.sensitivity),
+        }
+        return acquisition.Description(**vars(self) | lists | fields)
+
+
+def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Command]:
+    """Give a command these options in place of its keyword parameter `file_options: FileOptions`, but for some."""
+    options = inspect.signature(FileOptions, eval_str=True).parameters
+    shared = {name: option for name, option in options.items() if name not in without}
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def run(**values: Any) -> None:
+            command(file_options=FileOptions(**{name: values.pop(name) for name in shared}), **values)
+
+        parameters: list[inspect.Parameter] = []
+        for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
+            keyword = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            parameters += shared.values() if name == "file_options" else [keyword]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return run
+
+    return decorate
+
+
+def reject_file_options(options: FileOptions, **others: Any) -> None:
+    """ValueError where one of these options is given though nothing has to be said of a file."""
+    for name, value in (vars(options) | others).items():
+        if value is not None and value not in ("", False):
+            raise ValueError(f"--{name.replace('_', '-')}: says how a file is read; a stored tap test says it itself")
+
+
+def _split_words(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",")) if text else ()

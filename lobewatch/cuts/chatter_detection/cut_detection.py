@@ -1,0 +1,249 @@
+"""Find the cuts in a recording, and the air before and after them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+CUT_PIECE_LENGTH = 0.04
+"""Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
+MIN_CUT_LOUDNESS = 0.2
+"""A cut is so much louder than air, in log10 of the power."""
+POWER_STEP_MARGIN = 1.0
+"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10): chatter
+of few lines is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
+MIN_AIR_SHARE = 0.1
+"""Share of a recording that is air, at least; or air is the quietest part."""
+N_QUIET_PIECES = 5
+"""Pieces in a row that the quietest part has; chosen."""
+MAX_POWER_OVER_AIR = 1e3
+"""Largest power at one frequency, over that in air, that counts."""
+MIN_LOUDNESS_FREQUENCY = 100.0
+"""Frequency above which it is compared how loud pieces are (Hz): below it floors and pumps sound; chosen."""
+N_SMOOTHED_PIECES = 3
+"""Pieces over which the power in air is smoothed; chosen."""
+MAX_THRESHOLD_STEPS = 50
+"""Steps after which the threshold stands."""
+ENTRY_LOUDNESS_STEP = 0.3
+"""Entry and exit are so much louder or quieter than most of a cut, in log10 of the power: twice."""
+MIN_CUT_LENGTH_SHARE = 1 / 6
+"""What has so much of the length of the longest cut beside it is none; chosen."""
+MAX_ENTRY_TIME = 2.0
+"""Longest entry or exit (s)."""
+MAX_PAUSE_TIME = 0.1
+"""Pauses up to this belong to a cut (s)."""
+MAX_KNOCK_TIME = 0.15
+"""Time up to which what is louder is a knock, not a cut (s)."""
+MIN_AIR_TIME = 0.15
+"""Shortest air (s)."""
+CUT_SETTLING_TIME = 0.1
+"""Time after the beginning of a cut from which it is listened to (s)."""
+MIN_CUT_TIME = 0.3
+"""Time that is listened to, at least (s) ..."""
+MAX_CUT_TIME = 2.0
+"""... and at most, its end: no spindle is so steady that more is of use (s)."""
+KNOCK_PEAK_RATIO = 4.0
+"""A piece of a cut with a peak so many times those around it is a knock."""
+N_KNOCK_NEIGHBORS = 6
+"""Pieces on each side that a piece is compared with ..."""
+KNOCK_PEAK_QUANTILE = 0.75
+"""... by this quantile of their peaks; chosen."""
+
+
+class CutParts(NamedTuple):
+    """Where a cut is; or why it cannot be said, a code."""
+
+    reason: str
+    """Code of what is wrong; empty where all is well."""
+    air: slice = slice(0, 0)
+    """Samples of the spindle turning in air."""
+    cut: slice = slice(0, 0)
+    """Samples that are listened to: the end of its steady part."""
+    begin: float = np.nan
+    """Time at which the cut begins (s)."""
+    end: float = np.nan
+    """Time at which it ends (s)."""
+    steady_begin: float = np.nan
+    """Time at which its entry is over (s)."""
+    steady_end: float = np.nan
+    """Time at which its exit begins (s)."""
+
+
+WHOLE_SIGNAL = CutParts("")
+"""Of a cut that is given by itself, not found in a recording."""
+
+
+def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]:
+    """The cuts in a recording, one at least: without a cut it stands for why there is none.
+
+    signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; turn: of the spindle (s).
+
+    A cut is louder than halfway, in log, between what is quiet and what is loud. What is too short to be told, or a
+    sixth of the longest, is none of its own: a chip, an edge that rubs on its way out. Reasons: "too-short", "no-cut",
+    "no-air", "knock".
+
+    Example: a second of noise that gets 20 times as loud for a second.
+
+    >>> noise = np.random.default_rng(0).normal(size=30_000)
+    >>> noise[10_000:20_000] *= 20
+    >>> [(round(parts.begin, 1), round(parts.end, 1)) for parts in find_cuts(noise, 10e3, 0.005)]
+    [(1.0, 2.0)]
+    """
+    axes = np.atleast_2d(signal)
+    count, size = axes.shape[1], round(max(CUT_PIECE_LENGTH, 2 * turn) * sample_rate)
+    step = size // 2
+    if count < (MIN_AIR_TIME + CUT_SETTLING_TIME + MIN_CUT_TIME) * sample_rate or count < 4 * size:
+        return [CutParts("too-short")]
+    pieces = np.lib.stride_tricks.sliding_window_view(axes, size, axis=1)[:, ::step]
+    sounds = np.any(np.ptp(pieces, axis=2) > 0, axis=0)
+    if np.count_nonzero(sounds) < 2 * N_QUIET_PIECES:
+        return [CutParts("no-cut")]
+    is_loud = np.zeros(sounds.size, dtype=np.bool_)
+    is_loud[sounds] = _find_loud_pieces([_piece_power(axis[sounds], sample_rate) for axis in pieces])
+    loud = _find_stretches(is_loud)
+    joined = _join_stretches(loud, MAX_PAUSE_TIME * sample_rate / step)
+    stretches = [(first, last) for first, last in joined if (last - first) * step > MAX_KNOCK_TIME * sample_rate]
+    if not stretches:
+        return [CutParts("no-cut")]
+    air = _find_longest_air(_find_stretches(is_loud | ~sounds), sounds.size, step)
+    power = np.log10(np.sum(np.var(pieces, axis=2), axis=0) + np.finfo(np.float64).tiny)
+    cuts = [_build_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
+    longest = max(cuts, key=lambda parts: parts.end - parts.begin)
+    least = MIN_CUT_LENGTH_SHARE * (longest.end - longest.begin)
+    kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
+    return kept or [longest]
+
+
+def _find_loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
+    """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
+
+    axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
+    """
+    loudness = np.max([_loudness(power) for power in axes], axis=0)
+    power = np.log10(np.sum([np.sum(power, axis=1) for power in axes], axis=0))
+    is_loud, is_strong = (level > _loudness_threshold(level) for level in (loudness, power))
+    is_clearer = _loudness_step(power, is_strong) > _loudness_step(loudness, is_loud) + POWER_STEP_MARGIN
+    return np.asarray(is_strong if is_clearer else is_loud)
+
+
+def _loudness_step(level: Floats, is_loud: NDArray[np.bool_]) -> float:
+    """By how much what is loud is louder than what is not, in the mean."""
+    is_split = np.any(is_loud) and not np.all(is_loud)
+    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
+
+
+def _loudness_threshold(level: Floats) -> float:
+    """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
+    smooth = scipy.ndimage.uniform_filter1d(level, N_QUIET_PIECES)
+    beside = N_QUIET_PIECES // 2
+    least = threshold = float(np.min(smooth[beside:-beside])) + MIN_CUT_LOUDNESS
+    for _ in range(MAX_THRESHOLD_STEPS):
+        above = smooth > threshold
+        if np.all(above) or not np.any(above):
+            break
+        threshold = max(least, float(np.mean(smooth[above]) + np.mean(smooth[~above])) / 2)
+    return threshold
+
+
+def _build_parts(
+    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
+) -> CutParts:
+    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it; size: of a piece (samples)."""
+    step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
+    begin, end = (stretch[0] + 1) * step, stretch[1] * step
+    first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
+    entry, leaving = _find_entry_and_exit(
+        power[slice(*stretch)], MAX_PAUSE_TIME * sample_rate / step, MAX_ENTRY_TIME * sample_rate / step
+    )
+    steady = max(first, begin + step + entry * step), last - leaving * step
+    if steady[1] - steady[0] >= longest:
+        first, last = steady
+    settled = slice(max(first, last - longest), max(first, last))
+    times = (place / sample_rate for place in (begin, end, first, last))
+    parts = CutParts("", air, settled, *times)
+    return parts._replace(reason=_find_cut_fault(axes, parts, sample_rate, step))
+
+
+def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
+    """How many pieces at the beginning and at the end of a cut stand beside its longest part of one loudness.
+
+    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself changes.
+    """
+    smooth = scipy.ndimage.uniform_filter1d(power, N_QUIET_PIECES)
+    usual = _join_stretches(_find_stretches(np.abs(smooth - np.median(smooth)) < ENTRY_LOUDNESS_STEP), join)
+    first, last = max(usual, key=lambda stretch: stretch[1] - stretch[0])
+    entry, leaving = (n if n <= min(power.size / 4, most) else 0 for n in (first, power.size - last))
+    return entry, leaving
+
+
+def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+    """Why parts cannot be listened to, a code; empty where they can."""
+    if parts.cut.stop - parts.cut.start < MIN_CUT_TIME * sample_rate:
+        return "too-short"
+    if parts.air.stop - parts.air.start < MIN_AIR_TIME * sample_rate:
+        return "no-air"
+    return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
+
+
+def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
+    """The power of pieces at the frequencies above `LOWEST`; pieces: shape (pieces, size)."""
+    size = pieces.shape[1]
+    pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
+    power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(MIN_LOUDNESS_FREQUENCY * size / sample_rate) + 1 :]) ** 2
+    return np.asarray(power + np.finfo(np.float64).tiny)
+
+
+def _loudness(power: Floats) -> Floats:
+    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies.
+
+    Mean over frequency, not of logarithms: a light cut is heard in few lines. power: shape (pieces, frequencies).
+    """
+    smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
+    beside = N_QUIET_PIECES // 2
+    quiet = int(
+        np.argmin(scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)[beside:-beside])
+    )
+    least = np.minimum(
+        np.quantile(smooth, MIN_AIR_SHARE, axis=0), np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)
+    )
+    return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
+
+
+def _find_stretches(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First piece and the one after the last of each stretch."""
+    edge = np.diff(np.concatenate(([0], loud.astype(np.int8), [0])))
+    return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))
+
+
+def _join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
+    """Stretches with short pauses between them as one; gap: longest pause (pieces)."""
+    joined: list[tuple[int, int]] = []
+    for begin, end in stretches:
+        if joined and begin - joined[-1][1] <= gap:
+            joined[-1] = joined[-1][0], end
+        else:
+            joined.append((begin, end))
+    return joined
+
+
+def _find_longest_air(loud: Sequence[tuple[int, int]], count: int, step: int) -> slice:
+    """The longest part without a cut or a knock."""
+    ends, begins = [0, *(end + 1 for _, end in loud)], [*(begin for begin, _ in loud), count]
+    begin, end = max(zip(ends, begins, strict=True), key=lambda gap: gap[1] - gap[0])
+    return slice(begin * step, max(end, begin) * step)
+
+
+def _has_knock(signal: Floats, step: int) -> bool:
+    """Whether single pieces stand out of those around them: a hammer, a dropped part."""
+    count = signal.size // step
+    peak = np.max(np.abs(signal[: count * step].reshape(count, step)), axis=1)
+    wide = np.lib.stride_tricks.sliding_window_view(
+        np.pad(peak, N_KNOCK_NEIGHBORS, mode="reflect"), 2 * N_KNOCK_NEIGHBORS + 1
+    )
+    return bool(np.any(peak > KNOCK_PEAK_RATIO * np.quantile(wide, KNOCK_PEAK_QUANTILE, axis=1)))

@@ -1,0 +1,343 @@
+"""Evaluate recorded cuts: stable, chatter, flip, or the reason why it cannot be told.
+
+The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
+(docs/cuts.md, How often it is right).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
+from lobewatch.cuts.chatter_detection.peak_classification import (
+    MIN_TOOTH_HARMONICS,
+    PEAK_TOLERANCE,
+    ChatterPeaks,
+    PeaksByOrigin,
+    add_air_tones,
+    classify_peaks,
+    estimate_unsteadiness,
+    find_chatter_peaks,
+    find_cut_peaks,
+    has_sidebands,
+    is_undersampled,
+)
+from lobewatch.cuts.chatter_detection.spectrum import (
+    Floats,
+    SpectralPeaks,
+    Spectrum,
+    compute_spectra,
+    compute_spectrum,
+    find_peaks,
+    fold_frequency,
+    remove_skirts,
+)
+from lobewatch.cuts.chatter_detection.spindle_speed import (
+    check_tachometer_speed,
+    find_distant_speed,
+    find_speed_of_spectra,
+)
+from lobewatch.machine.journal.cut_entry import CutVerdict
+
+MIN_CHATTER_ENERGY = 5e-4
+"""Energy of what is left over that of the comb: above it, with side bands, a cut chatters ..."""
+MIN_SINGLE_PEAK_ENERGY = 1e-2
+"""... without side bands above this ..."""
+MAX_STABLE_ENERGY = 2e-4
+"""... and below this it is stable."""
+MIN_COMB_ENERGY = 1e-9
+"""Least energy that the comb is taken to have, over that of what is left."""
+MIN_SIDEBANDS = 3
+"""Number of lines of a family that is chatter for sure."""
+FLIP_TOLERANCE = 0.003
+"""Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
+MAX_UNEVEN_ENERGY = 5.0
+"""Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
+MAX_RUNOUT_ENERGY = 8.0
+"""... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
+SLOT_IMMERSION = 0.95
+"""Immersion from which on tooth passing nearly vanishes."""
+END_PEAK_TOLERANCE = 1.0
+"""Distance of a line at the end of a cut up to which it is that of the whole cut (bins)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CutEvaluation:
+    """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
+
+    verdict: CutVerdict
+    """Word for what the cut sounded like."""
+    reason: str
+    """Code of why it cannot be told; empty where it can."""
+    parts: CutParts = WHOLE_SIGNAL
+    """Parts of the recording that are the cut, and air."""
+    spindle_speed: SpindleSpeed | None = None
+    """True speed of the spindle."""
+    energy_ratio: float = np.nan
+    """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
+    chatter: ChatterPeaks | None = None
+    """Lines of chatter."""
+    peaks: PeaksByOrigin | None = None
+    """All lines, by where they come from."""
+    spectrum: Spectrum | None = None
+    """Spectrum of the cut."""
+    distant_rpm: float = np.nan
+    """Speed further from the one that was set that the lines fit (rpm); NaN without one, or where one is near."""
+    tone: float = np.nan
+    """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
+    axis: int = 0
+    """Which of several axes the word rests on, from 0."""
+    measured_rpm: float | None = None
+    """Speed by the tachometer in the cut (rpm), NaN where it gave none there; None without a tachometer."""
+
+    @property
+    def speed_rpm(self) -> float:
+        """True spindle speed (rpm); NaN where it was not found."""
+        return np.nan if self.spindle_speed is None else 60 * self.spindle_speed.frequency
+
+
+def evaluate_cut(
+    cut: Floats,
+    air: Floats,
+    sample_rate: float,
+    teeth: int,
+    immersion: float,
+    commanded_rpm: float,
+    measured_rpm: float | None = None,
+) -> CutEvaluation:
+    """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
+
+    air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
+    commanded_rpm as it was set; measured_rpm by a tachometer, which the lines must not contradict
+    ("tacho-contradicts"); None without one. All axes have one speed, and the word is that of the loudest evidence: of
+    the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
+    "speed-not-found", "no-air" (also where only lines that are there in air make a speed, which is named),
+    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
+    "unexplained-tone" (a line without side bands), "slow-sampling" (fewer than three multiples of tooth passing are
+    heard, folded ones too).
+
+    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+
+    >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
+    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
+    >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
+    >>> heard = evaluate_cut(cut, air, 10e3, 4, 0.5, 6020.0)
+    >>> heard.word, round(heard.speed_rpm)
+    ('stable', 6000)
+    """
+    spectra = compute_spectra(cut, sample_rate)
+    if not air.shape[-1]:
+        return replace(_evaluate_without_air(spectra, teeth, commanded_rpm / 60), reason="no-air")
+    quiet = compute_spectra(air, sample_rate)
+    is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
+    turning = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    if isinstance(turning, CutEvaluation):
+        return turning
+    axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
+    sounds = [
+        replace(_evaluate_axis(*axis, turning, teeth, immersion), axis=number) for number, axis in enumerate(axes)
+    ]
+    sound = max(sounds, key=_rank_evidence)
+    if is_measured or sound.verdict == "stable" or sound.peaks is None or not len(sound.peaks.unexplained):
+        return sound
+    elsewhere = 60 * find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.peaks.unexplained)
+    return sound if np.isnan(elsewhere) else _speed_not_found(spectra[0], elsewhere)
+
+
+def _evaluate_axis(
+    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
+) -> CutEvaluation:
+    """The word on an axis; a tone alone is looked for in pieces of the air too."""
+    lines = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
+    unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin_width)
+    by_origin = classify_peaks(lines, spectrum, quiet, turning, teeth, unsteady)
+    sound = CutEvaluation("stable", "", spindle_speed=turning, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
+    judged = _evaluate_peaks(sound, cut, teeth, immersion)
+    if judged.reason != "unexplained-tone":
+        return judged
+    tones = add_air_tones(quiet, air, by_origin.unexplained.frequency)
+    by_origin = classify_peaks(lines, spectrum, tones, turning, teeth, unsteady)
+    return _evaluate_peaks(replace(sound, peaks=by_origin), cut, teeth, immersion)
+
+
+def _find_speed(
+    spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
+) -> SpindleSpeed | CutEvaluation:
+    """The speed of the spindle, or the sound of a cut in which it is not known; commanded in Hz."""
+    if measured_rpm is None:
+        turning = find_speed_of_spectra(spectra, quiet, teeth, commanded)
+        if turning is not None:
+            return turning
+        elsewhere = 60 * find_distant_speed(spectra, quiet, teeth, commanded, None)
+        return (
+            _speed_not_found(spectra[0], elsewhere)
+            if np.isfinite(elsewhere)
+            else _evaluate_without_air(spectra, teeth, commanded)
+        )
+    turning, other = check_tachometer_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
+    if np.isfinite(other):
+        return CutEvaluation("cannot tell", "tacho-contradicts", spectrum=spectra[0], distant_rpm=60 * other)
+    return turning or _speed_not_found(spectra[0], np.nan)
+
+
+def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
+    """What is told where nothing is known of air, or where it sounds as the cut does: the speed, and no word."""
+    silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
+    turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
+    if turning is None:
+        return _speed_not_found(spectra[0], np.nan)
+    lines = find_cut_peaks(spectra, silence)
+    beside = lines[fold_frequency(lines.frequency, turning.frequency) > PEAK_TOLERANCE * spectra[0].bin_width]
+    elsewhere = 60 * find_distant_speed(spectra, silence, teeth, commanded, turning, beside) if len(beside) else np.nan
+    if np.isfinite(elsewhere):
+        return _speed_not_found(spectra[0], elsewhere)
+    return CutEvaluation("cannot tell", "no-air", spindle_speed=turning, spectrum=spectra[0])
+
+
+def _speed_not_found(spectrum: Spectrum, elsewhere: float) -> CutEvaluation:
+    """Of a speed that is not near the one that was set; elsewhere: that which the lines fit (rpm), NaN without one."""
+    return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=elsewhere)
+
+
+def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
+    """What the word rests on: chatter before anything else, then how loud it is."""
+    if sound.peaks is None:
+        return False, 0.0
+    if sound.chatter is not None:
+        return True, sound.chatter.peaks.energy
+    return False, sound.peaks.comb.energy
+
+
+def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
+    """The word on an axis whose lines are known."""
+    lines, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
+    if lines is None or turning is None or spectrum is None:
+        raise ValueError("a cut whose lines are not known cannot be judged")
+    if (
+        is_undersampled(spectrum, turning, teeth)
+        and np.count_nonzero(lines.tooth_order == 0) + len(lines.folded) < MIN_TOOTH_HARMONICS
+    ):
+        return replace(sound, verdict="cannot tell", reason="slow-sampling")
+    if not len(lines.unexplained):
+        return _evaluate_without_chatter(sound, teeth, immersion)
+    tooth = turning.frequency * teeth
+    chatter = find_chatter_peaks(lines.unexplained, tooth, spectrum.bin_width)
+    end = compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
+    still = min(
+        float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0]) / _chatter_power(chatter), 1.0
+    )
+    ratio = still * lines.unexplained.energy / max(lines.comb.energy, MIN_COMB_ENERGY * lines.unexplained.energy)
+    sound = replace(sound, energy_ratio=ratio)
+    if ratio < MAX_STABLE_ENERGY:
+        return _evaluate_without_chatter(sound, teeth, immersion)
+    if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
+        return replace(sound, verdict="cannot tell", reason="faint")
+    if not has_sidebands(lines.unexplained, chatter, turning.frequency, spectrum.bin_width):
+        return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
+    half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
+    return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _chatter_power(chatter: ChatterPeaks) -> float:
+    """Power of the line that names it."""
+    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
+    return float(chatter.peaks.amplitude[at] ** 2)
+
+
+def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
+    """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
+    if sound.peaks is None:
+        return sound
+    power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
+    tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
+    uneven = float(np.sum(power[~run_out & ~tooth]))
+    is_odd = uneven > MAX_UNEVEN_ENERGY * float(np.sum(power[run_out & ~tooth])) and uneven > MAX_STABLE_ENERGY * float(
+        np.sum(power)
+    )
+    is_loud = immersion < SLOT_IMMERSION and float(np.sum(power[~tooth])) > MAX_RUNOUT_ENERGY * float(
+        np.sum(power[tooth])
+    )
+    return replace(sound, verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
+
+
+def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
+    """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
+    lines, chatter = sound.peaks, sound.chatter
+    named: dict[str, SpectralPeaks] = {}
+    if lines is not None:
+        tooth = lines.tooth_order == 0
+        named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.air}
+    if chatter is not None:
+        named["chatter"] = chatter.peaks
+    return {name: kind for name, kind in named.items() if len(kind)}
+
+
+class CutRecording(NamedTuple):
+    """A recording that is to be listened to."""
+
+    signal: Floats
+    """Acceleration of the housing (m/s^2), shape (n,), or (axes, n) where several axes hear one spindle."""
+    sample_rate: float
+    """Sample rate (Hz)."""
+    teeth: int
+    """Number of teeth of the cutter."""
+    immersion: float
+    """Radial depth over diameter (-)."""
+    commanded_rpm: float
+    """Spindle speed as it was set (rpm)."""
+    clipped: NDArray[np.bool_] | None = None
+    """Overload of the sensor or its input, shape (n,); None: nowhere."""
+    lost_scans: int = 0
+    """Number of scans that are missing."""
+    measured_rpm: Floats | None = None
+    """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
+
+
+def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
+    """Tell each cut in a recording; one sound at least, which says why where there is no cut.
+
+    Reasons why one cannot be told are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
+    """
+    return [
+        _evaluate_parts(recording, parts)
+        for parts in find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
+    ]
+
+
+def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+    reason = _find_signal_fault(recording, parts)
+    if reason and reason != "no-air":
+        return CutEvaluation("cannot tell", reason, parts)
+    measured = None if recording.measured_rpm is None else _mean_speed(recording.measured_rpm[parts.cut])
+    axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    sound = evaluate_cut(
+        axes[:, parts.cut],
+        axes[:, parts.air if not reason else slice(0, 0)],
+        recording.sample_rate,
+        recording.teeth,
+        recording.immersion,
+        recording.commanded_rpm,
+        measured,
+    )
+    return replace(sound, parts=parts, measured_rpm=measured)
+
+
+def _mean_speed(speed: Floats) -> float:
+    """Over the time in which it is known; NaN where it is known in less than half of it."""
+    known = speed[np.isfinite(speed)]
+    return float(np.mean(known)) if 2 * known.size > speed.size else np.nan
+
+
+def _find_signal_fault(recording: CutRecording, parts: CutParts) -> str:
+    """Why the signal cannot be trusted, a code; empty where it can."""
+    if parts.reason == "too-short":
+        return parts.reason
+    if recording.clipped is not None and np.any(recording.clipped if parts.reason else recording.clipped[parts.cut]):
+        return "overload"
+    return "lost-scans" if recording.lost_scans else parts.reason

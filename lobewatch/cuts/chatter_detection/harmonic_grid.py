@@ -1,0 +1,101 @@
+"""Fit a grid of spindle harmonics and sidebands to spectral peaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.spectrum import Floats, SpectralPeaks
+
+MAX_SIDEBAND_FAMILIES = 4
+"""Largest number of frequencies that are no multiples, with their side bands."""
+MAX_GRID_ERRORS = 10.0
+"""Standard errors that a line is away that does not belong to the lattice."""
+GRID_TOLERANCES = 1.2, 0.6, 0.6, 0.6
+"""Distances from the lattice (bins) up to which lines belong to it, one for each step of the least squares; chosen: the
+first as wide as a line (`sorted_lines.WIDE`), since a speed by votes is off, then half of that."""
+MAX_SPEED_CHANGE = 0.005
+"""Relative change of the spindle frequency by which least squares have run away; chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class SidebandFamily:
+    """Lines at sign * r + k f, f the frequency of the spindle."""
+
+    indices: NDArray[np.intp]
+    """Places of its lines among all, shape (n,)."""
+    sign: Floats
+    """Sign of r in each line, shape (n,); 0 where r is 0."""
+    order: Floats
+    """Order k of each line, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class SpindleSpeed:
+    """How fast the spindle turns."""
+
+    frequency: float
+    """Turns a second (Hz)."""
+    error: float
+    """Standard error (Hz); inf where it does not follow from several lines."""
+    share: float
+    """Share of the lines looked at that it explains."""
+    agreeing: int
+    """Lines that agree on it, beyond those that it is worked out from."""
+    misfit: float
+    """Mean square distance of all lines from it, in standard errors of each, at most `STRAY` squared."""
+
+
+def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
+    """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
+    speed = SpindleSpeed(frequency, np.inf, 0.0, 0, MAX_GRID_ERRORS**2)
+    for tolerance in GRID_TOLERANCES:
+        families = find_sideband_families(speed.frequency, lines, tolerance * bin_)
+        rows = np.concatenate([_design_rows(family, number, len(families)) for number, family in enumerate(families)])
+        places = np.concatenate([family.indices for family in families])
+        if np.linalg.matrix_rank(rows) < len(families):
+            return speed
+        root = 1 / lines[places].frequency_error(bin_)
+        scaled, measured = rows * root[:, np.newaxis], lines.frequency[places] * root
+        solution = np.linalg.lstsq(scaled, measured, rcond=None)[0]
+        if abs(solution[0] / frequency - 1) > MAX_SPEED_CHANGE:
+            return speed
+        error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
+        away = np.minimum(np.abs(scaled @ solution - measured), MAX_GRID_ERRORS)
+        misfit = float(np.sum(away**2) + (len(lines) - places.size) * MAX_GRID_ERRORS**2) / len(lines)
+        share, agreeing = places.size / len(lines), places.size - len(families)
+        speed = SpindleSpeed(float(solution[0]), error, share, agreeing, misfit)
+    return speed
+
+
+def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
+    """Multiples of a frequency (Hz), then the families of the clearest lines that are left; tolerance in Hz."""
+    order = np.round(lines.frequency / frequency)
+    comb = (np.abs(lines.frequency - order * frequency) < tolerance) & (order > 0)
+    families = [SidebandFamily(np.flatnonzero(comb), np.zeros(int(comb.sum())), order[comb])]
+    left = ~comb
+    for _ in range(MAX_SIDEBAND_FAMILIES):
+        if not np.any(left):
+            break
+        anchor = lines.frequency[np.flatnonzero(left)[np.argmax(lines.clearness[left])]]
+        beyond, mirrored = lines.frequency - anchor, lines.frequency + anchor
+        up, down = np.round(beyond / frequency), np.round(mirrored / frequency)
+        off, off_mirrored = np.abs(beyond - up * frequency), np.abs(mirrored - down * frequency)
+        members = left & (np.minimum(off, off_mirrored) < tolerance)
+        sign = np.where(off <= off_mirrored, 1.0, -1.0)
+        if np.count_nonzero(members) > 1:
+            families.append(
+                SidebandFamily(np.flatnonzero(members), sign[members], np.where(sign > 0, up, down)[members])
+            )
+        left &= ~members
+    return families
+
+
+def _design_rows(family: SidebandFamily, number: int, count: int) -> Floats:
+    """What its lines say of f and of the r of each family, shape (n, count)."""
+    rows = np.zeros((family.indices.size, count))
+    rows[:, number] = family.sign
+    rows[:, 0] = family.order
+    return rows

@@ -1,0 +1,274 @@
+"""Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
+from lobewatch.cuts.chatter_detection.spectrum import (
+    Floats,
+    SpectralPeaks,
+    Spectrum,
+    compute_power,
+    compute_spectrum,
+    find_peaks,
+    fold_frequency,
+    join_peaks,
+    remove_skirts,
+    sideband_distance,
+)
+
+N_STEADINESS_PARTS = 4
+"""Parts that a cut is divided into."""
+N_STEADINESS_PEAKS = 8
+"""Multiples that are looked at."""
+MAX_UNSTEADINESS = 2e-3
+"""Largest change that is looked for, relative."""
+MIN_UNSTEADINESS = 1e-4
+"""Change that every spindle varies by, relative; chosen."""
+UNSTEADINESS_FACTOR = 3.0
+"""Change of the speed over that of the means of the parts: within a part it varies too; chosen."""
+MIN_STEADINESS_PEAKS = 3
+"""Multiples that must have changed alike."""
+
+
+def estimate_unsteadiness(
+    signal: Floats, sample_rate: float, lines: SpectralPeaks, turning: SpindleSpeed, bin_: float
+) -> float:
+    """By how much the speed varies, relative; signal of the cut, its lines and their bin (Hz)."""
+    order = np.round(lines.frequency / turning.frequency)
+    comb = (
+        np.abs(lines.frequency - order * turning.frequency)
+        < bin_ + MAX_UNSTEADINESS * lines.frequency / UNSTEADINESS_FACTOR
+    ) & (order > 1)
+    loudest = lines[comb].loudest(N_STEADINESS_PEAKS)
+    if not len(loudest):
+        return MIN_UNSTEADINESS
+    orders = np.round(loudest.frequency / turning.frequency)
+    changes = []
+    for part in np.array_split(signal, N_STEADINESS_PARTS):
+        heard = find_peaks(compute_spectrum(part, sample_rate)).frequency
+        if heard.size:
+            nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
+            changes.append(_speed_change(nearest / (orders * turning.frequency) - 1))
+    return max(MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
+
+
+def _speed_change(off: Floats) -> float:
+    """Change of the speed in one part: what most of its multiples agree on, else 0; off: of each, relative."""
+    near = off[np.abs(off) < MAX_UNSTEADINESS]
+    if near.size < max(MIN_STEADINESS_PEAKS, off.size / 2):
+        return 0.0
+    low, middle, high = np.quantile(near, [0.25, 0.5, 0.75])
+    return abs(float(middle)) if high - low < abs(middle) else 0.0
+
+
+PEAK_TOLERANCE = 1.2
+"""A line belongs to a frequency that is no further away than this (bins)."""
+MAX_AIR_POWER_RATIO = 9.0
+"""Power of a line over that which it has in air, below which it comes from elsewhere."""
+AIR_PEAK_TOLERANCE = 2.0
+"""Distance up to which a line of the air part is the same (bins of its own)."""
+AIR_PIECE_LENGTH = 0.5
+"""Length of the pieces of air in which tones are looked for that come and go (s); each begins in the middle of the one
+before it; chosen ..."""
+MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
+"""... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
+once in 1000 airs of 10 s; chosen."""
+MAX_FOLDED_RATES = 2.0
+"""Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
+UPPER_BAND_SHARE = 0.7
+"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
+MAX_HARMONICS = 16
+"""... or than any, where fewer than this are below half the sample rate; chosen."""
+MIN_TOOTH_HARMONICS = 3
+"""Multiples of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
+FOLDED_PEAK_SLACK = 1e-3
+"""... and so much further off, relative: from few lines the speed is no better known."""
+MAX_FOLDED_AMPLITUDE = 1.5
+"""Amplitude of a folded multiple over that of the loudest multiple, at most."""
+MAX_WAVERING_ENERGY = 0.05
+"""Energy of all that is left over that of the multiples up to which lines as near to these as `steadiness.MOST` are of
+a speed that wavers; chosen, with a stable cut that a microphone has heard in sight."""
+MAX_SPEED_ERRORS = 3.0
+"""Standard errors of the spindle frequency within which its multiples may lie; chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class PeaksByOrigin:
+    """All lines of a cut."""
+
+    comb: SpectralPeaks
+    """Multiples of the frequency of the spindle, the first left out: it is there in air."""
+    tooth_order: NDArray[np.int64]
+    """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
+    air: SpectralPeaks
+    """Lines that are there in air."""
+    folded: SpectralPeaks
+    """Lines where multiples above half the sample rate are folded to."""
+    unexplained: SpectralPeaks
+    """Lines that are left: chatter, where there is any."""
+
+
+def is_in_air(lines: SpectralPeaks, air: Spectrum) -> NDArray[np.bool_]:
+    """Whether lines are there in air too."""
+    return np.asarray(
+        lines.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(lines.frequency, AIR_PEAK_TOLERANCE)
+    )
+
+
+def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
+    """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
+
+    signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
+    does what passes by 40 Hz in a piece or faster, as a multiple of a spindle that is slowing down.
+    """
+    size = round(AIR_PIECE_LENGTH * air.sample_rate)
+    step, level = air.sample_rate / size, np.zeros(frequency.size)
+    near, around = (
+        _bins_around(frequency / step, bins, size // 2) for bins in (round(AIR_PEAK_TOLERANCE), TONE_NOISE_BINS)
+    )
+    for begin in range(0, signal.size - size + 1, size // 2):
+        power = compute_power(signal[begin : begin + size], size)
+        tone, noise = np.max(power[near], axis=1), np.median(power[around], axis=1) / np.log(2)
+        level = np.maximum(level, np.where(tone > MIN_TONE_POWER_RATIO * noise, tone, 0.0))
+    power = air.power.copy()
+    np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)
+    return replace(air, power=power)
+
+
+def _bins_around(middle: Floats, reach: int, last: int) -> NDArray[np.intp]:
+    """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
+    places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
+    return np.asarray(np.clip(places, 0, last))
+
+
+def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
+    """The lines of all axes that are not there in air, without skirts."""
+    lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
+
+
+def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
+    """Whether fewer than three multiples of tooth passing are below half the sample rate."""
+    return spectrum.sample_rate / 2 < MIN_TOOTH_HARMONICS * teeth * turning.frequency
+
+
+def classify_peaks(
+    lines: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
+) -> PeaksByOrigin:
+    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
+
+    unsteady: by how much the speed varies, relative: multiples are so much wider.
+    """
+    order = np.round(lines.frequency / turning.frequency)
+    away = np.abs(lines.frequency - order * turning.frequency)
+    unsure = order * (MAX_SPEED_ERRORS * turning.error + unsteady * turning.frequency)
+    comb = (away < PEAK_TOLERANCE * spectrum.bin_width + unsure) & (order > 0)
+    foreign = ~comb & is_in_air(lines, air)
+    half = spectrum.sample_rate / 2
+    upper = comb & (lines.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
+    loudest = float(np.max(lines.amplitude[upper], initial=0.0))
+    is_bounded = lines.amplitude <= MAX_FOLDED_AMPLITUDE * loudest
+    back = _is_near_folded(lines, spectrum, turning, teeth, unsteady) & (
+        is_bounded | is_undersampled(spectrum, turning, teeth)
+    )
+    back &= ~(comb | foreign)
+    kept = comb & (order > 1)
+    tooth = (order[kept] % teeth).astype(np.int64)
+    left = _remove_wavering(lines[~(comb | foreign | back)], lines[kept], spectrum, turning)
+    return PeaksByOrigin(lines[kept], tooth, lines[foreign], lines[back], left)
+
+
+def _remove_wavering(
+    left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed
+) -> SpectralPeaks:
+    """What is left but for faint lines that are multiples of a speed that wavers faster than is seen in its lines."""
+    if left.energy > MAX_WAVERING_ENERGY * comb.energy:
+        return left
+    away = fold_frequency(left.frequency, turning.frequency)
+    return left[away > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * spectrum.bin_width]
+
+
+def _is_near_folded(
+    lines: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
+) -> NDArray[np.bool_]:
+    """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
+    rate = spectrum.sample_rate
+    orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
+    if not orders.size:
+        return np.zeros(len(lines), dtype=np.bool_)
+    folded = fold_frequency(np.asarray(orders * turning.frequency), rate)
+    slack = np.where(is_undersampled(spectrum, turning, teeth) & (orders % teeth == 0), FOLDED_PEAK_SLACK, 0.0)
+    unsure = orders * (MAX_SPEED_ERRORS * turning.error + (unsteady + slack) * turning.frequency)
+    away = np.abs(lines.frequency[:, np.newaxis] - folded) - unsure
+    return np.asarray(np.min(away, axis=1, initial=np.inf) < PEAK_TOLERANCE * spectrum.bin_width)
+
+
+MIN_CHATTER_AMPLITUDE = 0.1
+"""Share of the loudest amplitude that a line has that names chatter ..."""
+MIN_FAMILY_AMPLITUDE = 1e-3
+"""... and one that belongs to it."""
+MAX_CHATTER_ANCHORS = 12
+"""Lines whose families are compared."""
+CHATTER_HARMONICS = 3
+"""Multiples of a frequency that are looked for."""
+DISPLACEMENT_WEIGHT = 0.3
+"""Weight of the displacement of a family beside the lines that it explains; chosen ..."""
+MIN_FAMILY_ENERGY = 0.25
+"""... which has this share of the energy of the largest at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChatterPeaks:
+    """One family."""
+
+    frequency: float
+    """Frequency of the line with the largest displacement (Hz)."""
+    error: float
+    """Standard error of the frequency (Hz)."""
+    peaks: SpectralPeaks
+    """All lines f_c + k tooth passing."""
+
+
+def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float) -> ChatterPeaks:
+    """The family that chatter is named by; left: one line at least. All in Hz.
+
+    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
+    taken whose multiples explain the most, and whose displacement, amplitude over frequency squared, is large.
+    """
+    part = left.amplitude > MIN_FAMILY_AMPLITUDE * np.max(left.amplitude)
+    weight = np.where(part, (left.amplitude / left.frequency**2) ** 2, 0.0)
+    named = np.where(left.amplitude >= MIN_CHATTER_AMPLITUDE * np.max(left.amplitude), weight, 0.0)
+    anchors = [i for i in np.argsort(-named)[:MAX_CHATTER_ANCHORS] if named[i] > 0]
+    clear = np.where(part, np.log10(left.clearness), 0.0)
+    families = [
+        sideband_distance(left.frequency, left.frequency[i], tooth_frequency) < PEAK_TOLERANCE * bin_ for i in anchors
+    ]
+    energy = np.array([np.sum(weight[family]) for family in families])
+    explained = np.array([_find_explained(left, left.frequency[i], tooth_frequency, bin_) @ clear for i in anchors])
+    large = energy / np.max(energy)
+    score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
+    best = families[int(np.argmax(score))]
+    top = int(np.argmax(np.where(best, named, 0.0)))
+    error = float(left.frequency_error(bin_)[top])
+    return ChatterPeaks(float(left.frequency[top]), error, left[best & part])
+
+
+def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_: float) -> bool:
+    """Whether it has another line k tooth passings away, or one turn: a cut makes them, a pump has none. In Hz."""
+    apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
+    return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_))
+
+
+def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
+    """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
+    explained = np.zeros(len(left))
+    for order in range(1, CHATTER_HARMONICS + 1):
+        apart = sideband_distance(left.frequency, order * frequency, tooth_frequency)
+        explained[apart < PEAK_TOLERANCE * bin_ * max(1.0, order / 2)] = 1.0
+    return explained

@@ -1,0 +1,298 @@
+"""Find the true spindle speed of a cut, with or without a tachometer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
+from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
+from lobewatch.cuts.chatter_detection.spectrum import (
+    Floats,
+    SpectralPeaks,
+    Spectrum,
+    compute_spectra,
+    find_peaks,
+    fold_frequency,
+    join_peaks,
+    remove_skirts,
+)
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
+    MAX_COMB_PEAKS,
+    find_comb,
+    find_comb_by_sum,
+    find_distant_comb,
+    list_distant_centers,
+    refine_comb,
+)
+
+COMB_SPEED_TOLERANCE = 0.05
+"""Relative distance from the speed that was set up to which a plain comb is looked for ..."""
+USUAL_SPEED_TOLERANCE = 0.002
+"""... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
+SAME_SPEED_TOLERANCE = 1e-3
+"""... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
+many lines: it has one unknown, they have one more for each family of side bands."""
+MIN_SURE_VOTES = 6
+"""Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all of them."""
+VOTE_SPEED_TOLERANCE = 0.021
+"""Relative distance from the speed that was set up to which votes are counted."""
+MAX_VOTE_HARMONIC = 60
+"""Multiples of the frequency of the spindle by which two of them may differ."""
+VOTE_WIDTH = 0.25
+"""Standard deviation of a line in the count of votes (bins)."""
+VOTE_GRID_STEP, FINEST_VOTE_HARMONIC = 0.25, 40
+"""Step of the grid of speeds, over the standard deviation of the vote of this multiple; chosen."""
+OWN_PEAK_TOLERANCE = 0.5
+"""Distance up to which a line is that of the turning spindle (bins); chosen."""
+VOTE_REACH = 2
+"""Standard deviations up to which a vote is spread."""
+MIN_OWN_PEAK_VOTES = 0.2
+"""A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+MAX_SPEED_MISFIT = 4.0
+"""A speed with a larger misfit is compared with others ..."""
+MAX_RIVAL_SPEEDS = 12
+"""... so many that have the most votes ..."""
+VOTE_PEAK_WIDTH = 9
+"""... of as many steps of the grid around each."""
+MIN_GRID_SHARE = 0.5
+"""Share of the lines that must belong to the lattice, and must have a neighbour one or two turns or teeth away ..."""
+MIN_AGREEING_PEAKS = 3
+"""... and number of them that must agree: a pump that is switched on has lines of its own."""
+
+
+def find_spindle_speed(
+    cut: Floats, air: Floats, sample_rate: float, teeth: int, commanded_rpm: float
+) -> SpindleSpeed | None:
+    """Turns a second in the steady part of a cut, near the speed that was set (rpm); None where too few lines agree.
+
+    cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
+
+    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+
+    >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
+    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
+    >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
+    >>> speed = find_spindle_speed(cut, air, 10e3, 4, 6020.0)
+    >>> round(60 * speed.frequency)
+    6000
+    """
+    return find_speed_of_spectra(
+        compute_spectra(cut, sample_rate), compute_spectra(air, sample_rate), teeth, commanded_rpm / 60
+    )
+
+
+def find_speed_of_spectra(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
+) -> SpindleSpeed | None:
+    """`find_spindle_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
+    lines, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
+    summed = find_comb_by_sum(spectra, air, lines, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
+    if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
+        return voted or summed
+    rival = refine_speed(summed.frequency, lines, spectra[0].bin_width)
+    return summed if rival.agreeing >= voted.agreeing else voted
+
+
+def _find_speed_by_peaks(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
+) -> SpindleSpeed | None:
+    """The speed by what stands clear of the noise."""
+    lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    of_cut, first = find_cut_peaks(spectra, air), spectra[0]
+    voted = find_speed_by_votes(of_cut, join_peaks(lines), first, teeth, commanded)
+    comb = find_comb(of_cut, first.bin_width, first.sample_rate, teeth, commanded, COMB_SPEED_TOLERANCE)
+    if comb is None:
+        return (
+            voted
+            if voted is not None and (voted.misfit < MAX_SPEED_MISFIT or voted.agreeing >= MIN_SURE_VOTES)
+            else None
+        )
+    if voted is None or comb.agreeing >= voted.agreeing:
+        is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE
+        return voted if is_same else comb if comb.share >= MIN_GRID_SHARE else None
+    return voted
+
+
+def find_speed_by_votes(
+    cut_lines: SpectralPeaks, all_lines: SpectralPeaks, spectrum: Spectrum, teeth: int, commanded: float
+) -> SpindleSpeed | None:
+    """Turns a second, near those that were set (Hz); None where too few lines agree.
+
+    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two lines, each
+    sum and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice:
+    chatter f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    """
+    loudest = cut_lines.loudest(MAX_COMB_PEAKS)
+    if len(loudest) < 2:
+        return None
+    grid = commanded * (
+        1
+        + np.arange(
+            -VOTE_SPEED_TOLERANCE,
+            VOTE_SPEED_TOLERANCE,
+            VOTE_GRID_STEP * VOTE_WIDTH * spectrum.bin_width / (FINEST_VOTE_HARMONIC * commanded),
+        )
+    )
+    votes = _count_votes(loudest, grid, teeth, VOTE_WIDTH * spectrum.bin_width)
+    if not np.any(votes):
+        return None
+    turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < VOTE_SPEED_TOLERANCE]
+    near = np.any(np.abs(grid[:, np.newaxis] - turning) < OWN_PEAK_TOLERANCE * spectrum.bin_width, axis=1)
+    best = int(np.argmax(votes))
+    heard = int(np.argmax(np.where(near, votes, 0.0)))
+    best = heard if near[heard] and votes[heard] > MIN_OWN_PEAK_VOTES * votes[best] else best
+    speed = refine_speed(float(grid[best]), loudest, spectrum.bin_width)
+    if speed.misfit > MAX_SPEED_MISFIT:
+        rivals = [
+            refine_speed(frequency, loudest, spectrum.bin_width) for frequency in grid[_vote_peaks(votes)].tolist()
+        ]
+        speed = min((speed, *rivals), key=lambda rival: rival.misfit)
+    is_sure = min(speed.share, _spaced_share(loudest, speed.frequency, teeth, spectrum.bin_width)) >= MIN_GRID_SHARE
+    is_sure &= speed.agreeing >= MIN_AGREEING_PEAKS
+    return speed if is_sure else None
+
+
+def _spaced_share(lines: SpectralPeaks, frequency: float, teeth: int, bin_: float) -> float:
+    """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
+    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
+    steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
+    return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
+
+
+def _vote_peaks(votes: Floats) -> NDArray[np.intp]:
+    """Where there are more votes than beside, the most first."""
+    places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, VOTE_PEAK_WIDTH) == votes) & (votes > 0))
+    return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]
+
+
+def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:
+    """Votes for each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    weight, step = np.log10(lines.clearness), grid[1] - grid[0]
+    i, j = np.triu_indices(len(lines), 1)
+    spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
+    spaced, weight = (
+        np.concatenate([spaced, lines.frequency]),
+        np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight]),
+    )
+    votes = np.zeros(grid.size)
+    for order in range(1, MAX_VOTE_HARMONIC + 1):
+        place = np.round((spaced / order - grid[0]) / step).astype(int)
+        inside = (place >= 0) & (place < grid.size)
+        if np.any(inside):
+            counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
+            votes += _smooth_votes(counted.astype(np.float64), np.sqrt(2) * sharpness / order / step)
+    return votes
+
+
+def _smooth_votes(votes: Floats, width: float) -> Floats:
+    """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
+    reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
+    spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    return np.convolve(votes, spread, "same")
+
+
+TACHOMETER_TOLERANCE = 2e-3
+"""Relative difference up to which a tachometer and the lines say one speed: a column may be rounded; chosen."""
+TACHOMETER_ERROR = 5e-5
+"""Relative standard error of a tachometer: a sample at each end of a second or two; chosen."""
+PULSE_RATIO_TOLERANCE = 0.02
+"""Relative distance from a whole number within which a tachometer over the speed that was set, or the inverse, speaks
+of pulses that were counted wrong; chosen."""
+
+
+def check_tachometer_speed(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, measured: float
+) -> tuple[SpindleSpeed | None, float]:
+    """Turns a second (Hz) by lines near those of a tachometer, and those that contradict it; NaN: none do.
+
+    commanded: as it was set, measured: by the tachometer (Hz). Where it is more than 5 % off what was set, it is
+    followed if the lines fit it alone and it is no multiple of that. Where no lines say a speed near it, it is the
+    speed by itself, if three of them are its multiples.
+    """
+    is_near = abs(measured / commanded - 1) < COMB_SPEED_TOLERANCE
+    at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
+    if at_set is not None:
+        return None, at_set.frequency
+    heard = find_speed_of_spectra(spectra, air, teeth, measured)
+    if heard is not None and abs(heard.frequency / measured - 1) > TACHOMETER_TOLERANCE:
+        return None, heard.frequency
+    if not is_near and (heard is None or is_pulse_multiple(measured / commanded)):
+        return None, commanded
+    return heard or _use_tachometer_speed(spectra, air, measured), np.nan
+
+
+def is_pulse_multiple(ratio: float) -> bool:
+    """Whether a tachometer over the speed that was set is a whole number above 1, or one over it."""
+    whole = max(ratio, 1 / ratio)
+    return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
+
+
+def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
+    """The speed of the tachometer, of which the lines make none; None where hardly one is a multiple of it."""
+    lines, bin_ = find_cut_peaks(spectra, air), spectra[0].bin_width
+    own = fold_frequency(lines.frequency, measured) < PEAK_TOLERANCE * bin_
+    if np.count_nonzero(own) < MIN_AGREEING_PEAKS:
+        return None
+    beside = refine_speed(measured, lines.loudest(MAX_COMB_PEAKS), bin_)
+    return SpindleSpeed(measured, TACHOMETER_ERROR * measured, beside.share, int(np.count_nonzero(own)), beside.misfit)
+
+
+HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
+"""Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
+MIN_DISTANT_SHARE = 0.5
+"""Share of the lines beside the multiples of a speed, or of their energy, on another that takes its place; chosen."""
+
+
+def find_distant_speed(
+    spectra: Sequence[Spectrum],
+    air: Sequence[Spectrum],
+    teeth: int,
+    commanded: float,
+    heard: SpindleSpeed | None,
+    beside: SpectralPeaks | None = None,
+) -> float:
+    """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
+
+    heard: the speed that was found, and beside: lines that are no multiples of it. Only a comb whose multiples
+    they are, and on which more lines agree, is one then. That of half of it is none, which chatter of period two makes;
+    the mains hum at multiples of theirs.
+    """
+    lines, first = find_cut_peaks(spectra, air), spectra[0]
+    about = first.bin_width, first.sample_rate, teeth
+    clearest = find_distant_comb(lines, *about, commanded, COMB_SPEED_TOLERANCE)
+    if heard is None or beside is None:
+        return np.nan if clearest is None else clearest.frequency
+    mains = [find_comb(lines, *about, hum, HUM_TOLERANCE) for hum in HUM_FREQUENCIES if not _is_mains_speed(heard, hum)]
+    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= heard.agreeing]
+    centres = list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
+    sums = (find_comb_by_sum(spectra, air, lines, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
+    loudest = lines.loudest(MAX_COMB_PEAKS)
+    agreeing = refine_speed(heard.frequency, loudest, first.bin_width).agreeing
+    summed = [
+        comb for comb in sums if comb and refine_speed(comb.frequency, loudest, first.bin_width).agreeing > agreeing
+    ]
+    better = [comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, heard, beside, first.bin_width)]
+    return max(better, key=lambda frequency: _rank_comb(frequency, loudest, first.bin_width)) if better else np.nan
+
+
+def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPeaks, bin_: float) -> bool:
+    """Whether most of what is beside the multiples of a speed is on another comb, not that of half of it."""
+    belongs = fold_frequency(beside.frequency, comb.frequency) < PEAK_TOLERANCE * bin_
+    is_half = abs(2 * comb.frequency / heard.frequency - 1) < SAME_SPEED_TOLERANCE
+    share = np.count_nonzero(belongs) / len(beside), beside[belongs].energy / beside.energy
+    return not is_half and max(share) > MIN_DISTANT_SHARE
+
+
+def _rank_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> tuple[float, float]:
+    """Of a comb among others: the tenths of the lines that are its multiples, then its frequency: half has as many."""
+    comb = refine_comb(frequency, lines, bin_)
+    return (0.0 if comb is None else round(10 * comb.share), frequency)
+
+
+def _is_mains_speed(speed: SpindleSpeed, hum: float) -> bool:
+    """Whether a spindle turns as fast as a hum (Hz), or twice: its multiples, or those of period two, are the same."""
+    return any(abs(speed.frequency / (times * hum) - 1) < HUM_TOLERANCE for times in (1, 2))

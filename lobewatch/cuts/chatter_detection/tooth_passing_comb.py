@@ -1,0 +1,271 @@
+"""Find the comb of spindle harmonics in spectral peaks, or by a harmonic sum."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
+from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
+from lobewatch.cuts.chatter_detection.spectrum import (
+    Floats,
+    SpectralPeaks,
+    Spectrum,
+    find_peaks,
+    fold_frequency,
+    join_peaks,
+)
+
+COMB_TOLERANCE = 1.2
+"""Distance from a multiple up to which a line belongs to it (bins): as wide as a line (`sorted_lines.WIDE`)."""
+COMB_SPEED_WAVER = 1e-4
+"""Change of every speed, relative (`steadiness.LEAST`): by so much multiples are unsure."""
+MAX_COMB_PEAKS = 40
+"""Lines that are looked at ..."""
+MAX_COMB_ANCHORS = 16
+"""... and those that a comb is looked for from; chosen."""
+COMB_FIT_STEPS = 3
+"""Steps of the least squares."""
+MAX_COMB_CHANCE = 1e-4
+"""A comb that as many lines as random would have more often than this, over all combs that are tried, is none."""
+MAX_PEAK_WEIGHT = 3.0
+"""Most that one line counts, in log10 of its clearness: a loud one is no more than a line; chosen."""
+MIN_COMB_SHARE = 0.5
+"""Share of the lines that a comb far from the speed that was set explains at least."""
+MIN_COMB_HARMONICS = 3
+"""Multiples that a comb has at least: any two lines have one."""
+
+
+class Comb(NamedTuple):
+    """A frequency, and the lines that are its multiples."""
+
+    frequency: float
+    """Frequency (Hz)."""
+    is_member: NDArray[np.bool_]
+    """Which lines are multiples, shape (n,)."""
+    order: Floats
+    """Order of each, shape (n,)."""
+    offset: Floats
+    """Distance of each from its multiple (Hz), as that is folded, shape (n,)."""
+
+
+def find_comb(
+    lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
+) -> SpindleSpeed | None:
+    """The comb near a frequency (Hz), up to `around` from it, relative, that explains the most; None without one.
+
+    lines: of all axes, without skirts; bin_: of the spectrum (Hz). Each line is a vote for the frequencies that it is a
+    multiple of; those of the loudest are compared, after least squares, by the lines that they explain.
+    """
+    lines = lines.loudest(MAX_COMB_PEAKS)
+    few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
+    for images in (_folded_images(lines, sample_rate)[:1], *([_folded_images(lines, sample_rate)] if few else [])):
+        best = _find_best_comb(lines, images, bin_, frequency, around)
+        if best is not None and _comb_chance(best, lines, images, bin_, teeth, around) < MAX_COMB_CHANCE:
+            return _comb_speed(best, lines, bin_)
+    return None
+
+
+def find_distant_comb(
+    lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
+) -> SpindleSpeed | None:
+    """The comb that explains the most, half or twice the frequency (Hz) at most and further than `around` from it.
+
+    Of those that explain as many tenths of the lines that of which all are tooth passing, else the highest; none of
+    which all multiples have an order in common that the teeth have not: that is a part of another.
+    """
+    lines, best, rank = lines.loudest(MAX_COMB_PEAKS), None, (0.0, False, 0.0)
+    for centre in list_distant_centers(frequency, around):
+        comb = find_comb(lines, bin_, sample_rate, teeth, centre, around)
+        if comb is None or comb.share < MIN_COMB_SHARE:
+            continue
+        order = np.round(lines.frequency / comb.frequency).astype(int)
+        common = int(np.gcd.reduce(order[np.abs(lines.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_]))
+        ranked = round(comb.share, 1), common == teeth, comb.frequency
+        if common and teeth % common == 0 and ranked > rank:
+            best, rank = comb, ranked
+    return best
+
+
+def list_distant_centers(frequency: float, around: float) -> list[float]:
+    """Frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
+    steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
+    return [float(centre) for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps]))]
+
+
+def refine_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed | None:
+    """A frequency (Hz) made exact by least squares over its multiples among lines; None where there are none."""
+    comb = _fit_comb(frequency, lines, lines.frequency[np.newaxis], bin_)
+    return _comb_speed(comb, lines, bin_) if np.any(comb.is_member) else None
+
+
+def _folded_images(lines: SpectralPeaks, sample_rate: float) -> Floats:
+    """What may have been folded to each line (Hz), itself first; shape (images, n)."""
+    heard = lines.frequency
+    return np.stack([heard, sample_rate - heard, sample_rate + heard, 2 * sample_rate - heard])
+
+
+def _find_best_comb(lines: SpectralPeaks, images: Floats, bin_: float, frequency: float, around: float) -> Comb | None:
+    weight, best, most = np.minimum(np.log10(lines.clearness), MAX_PEAK_WEIGHT), None, 0.0
+    for candidate in _candidate_frequencies(lines, frequency, around):
+        comb = _fit_comb(float(candidate), lines, images, bin_)
+        score = float(np.sum(weight[comb.is_member]))
+        if score > most and abs(comb.frequency / frequency - 1) <= around:
+            best, most = comb, score
+    return best
+
+
+def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float) -> Floats:
+    """Frequencies (Hz) that the loudest lines are multiples of."""
+    loudest = lines.frequency[:MAX_COMB_ANCHORS]
+    orders = np.arange(1, int(np.max(loudest, initial=0.0) / frequency / (1 - around)) + 1)
+    parts = (loudest[:, np.newaxis] / orders).ravel()
+    return np.asarray(parts[np.abs(parts / frequency - 1) <= around])
+
+
+def _fit_comb(frequency: float, lines: SpectralPeaks, images: Floats, bin_: float) -> Comb:
+    """A frequency made exact by least squares over its multiples."""
+    comb = _build_comb(frequency, images, bin_)
+    for _ in range(COMB_FIT_STEPS):
+        if not np.any(comb.is_member):
+            break
+        error, order = _peak_error(lines, bin_)[comb.is_member], comb.order[comb.is_member]
+        off = float(np.sum(order * comb.offset[comb.is_member] / error**2) / np.sum((order / error) ** 2))
+        comb = _build_comb(comb.frequency + off, images, bin_)
+    return comb
+
+
+def _build_comb(frequency: float, images: Floats, bin_: float) -> Comb:
+    orders = np.round(images / frequency)
+    beyond = np.where(orders > 0, images - orders * frequency, np.inf)
+    nearest = np.argmin(np.abs(beyond), axis=0)[np.newaxis]
+    order, away = (np.take_along_axis(values, nearest, axis=0)[0] for values in (orders, beyond))
+    return Comb(frequency, np.abs(away) < COMB_TOLERANCE * bin_, order, away)
+
+
+def _peak_error(lines: SpectralPeaks, bin_: float) -> Floats:
+    """Standard error of each line (Hz), with what the speed wavers by."""
+    return np.hypot(lines.frequency_error(bin_), COMB_SPEED_WAVER * lines.frequency)
+
+
+def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, teeth: int, around: float) -> float:
+    """How many of all combs that are tried would have as many multiples among lines that lie anywhere.
+
+    Multiples of tooth passing alone are so much rarer.
+    """
+    orders = np.unique(comb.order[comb.is_member])
+    if orders.size < MIN_COMB_HARMONICS:
+        return np.inf
+    spacing = comb.frequency * (1 if np.any(orders % teeth) else teeth)
+    near = min(2 * COMB_TOLERANCE * bin_ / spacing * len(images), 1.0)
+    tried = max(around * float(np.max(images)) / (COMB_TOLERANCE * bin_), 1.0)
+    apart = np.unique(np.round(lines.frequency / (2 * COMB_TOLERANCE * bin_))).size
+    return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
+
+
+def _comb_speed(comb: Comb, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
+    off = comb.offset / _peak_error(lines, bin_)
+    exact = 1 / np.sqrt(np.sum((comb.order / _peak_error(lines, bin_))[comb.is_member] ** 2))
+    error = float(exact * max(1.0, float(np.sqrt(np.mean(off[comb.is_member] ** 2)))))
+    misfit = float(np.mean(np.minimum(np.abs(off), MAX_GRID_ERRORS) ** 2))
+    count = int(np.count_nonzero(comb.is_member))
+    return SpindleSpeed(comb.frequency, error, count / len(lines), count - 1, misfit)
+
+
+MIN_HARMONIC_LEVEL = 0.6
+"""log10 of its power over that of the noise from which on a multiple counts: noise is seldom so loud; chosen ..."""
+MAX_HARMONIC_LEVEL = 2.4
+"""... and the most that it counts beyond that; chosen."""
+SUM_FREQUENCY_STEP = 0.25
+"""Step of the frequencies that are tried, over what moves the highest multiple by a bin; chosen."""
+N_SUM_LEVELS = 100
+"""Levels into which a multiple's part of the sum is divided."""
+CLEAR_SUM_MEAN = 1 / 3
+"""Mean over the multiples below which a comb must be far rarer by chance, which takes each for itself: side bands of a
+line that is no multiple come together; chosen ..."""
+FAINT_SUM_CHANCE = 1e-8
+"""... as this; chosen."""
+MAX_REMAINING_CHANCE = 0.05
+"""How often chance may make the multiples that are left without those of one order; chosen."""
+HARMONIC_BINS = 4.0
+"""Distance from a multiple up to which the spectrum is its own (bins): half the width of the window's main lobe."""
+WEAK_PEAK_POWER = 4.0
+"""Power over that of the noise of the lines from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
+
+
+def find_comb_by_sum(
+    spectra: Sequence[Spectrum],
+    air: Sequence[Spectrum],
+    lines: SpectralPeaks,
+    teeth: int,
+    frequency: float,
+    around: float,
+    usual: float = 1.0,
+) -> SpindleSpeed | None:
+    """The comb near a frequency (Hz), up to `around` from it, relative, that is loudest over noise; None without one.
+
+    spectra and air: of each axis; what is no louder than in air does not count. lines: those that stand clear, of all
+    axes; where they are many, they settle it, and there is one on a multiple of anything. The mean over all axes of
+    log10 of power over noise is summed over the multiples (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It is a
+    comb where as many frequencies that are no multiples would have that sum less often than once in ten thousand, over
+    all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
+    """
+    if len(lines) >= MAX_COMB_PEAKS * len(spectra):
+        return None
+    first, above = spectra[0], _mean_level(spectra, air)
+    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (frequency * (1 + around))))
+    lowest, most = (1 - around) * frequency, (1 + around) * frequency
+    tried = np.arange(lowest, most, SUM_FREQUENCY_STEP * first.bin_width / max(highest, 1))
+    parts = np.array([np.interp(k * tried, first.frequency, above) for k in range(1, highest + 1)])
+    best = int(np.argmax(np.sum(parts, axis=0)))
+    heard = parts[:, best]
+    if not 0 < best < tried.size - 1 or np.count_nonzero(heard) < MIN_COMB_HARMONICS:
+        return None
+    inside = (first.frequency > lowest) & (first.frequency < highest * most)
+    beside = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
+    rarest = MAX_COMB_CHANCE if np.mean(heard) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
+    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / around, 1.0)
+    if SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(heard, above[beside]) > rarest or _is_partial_comb(
+        heard, above[beside], teeth
+    ):
+        return None
+    weak = join_peaks([find_peaks(spectrum, WEAK_PEAK_POWER) for spectrum in spectra])
+    return refine_comb(float(tried[best]), weak[weak.frequency < (highest + 0.5) * tried[best]], first.bin_width)
+
+
+def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
+    """log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, in the mean of all axes, 0 to `MOST`; 0 where it is of air."""
+    total = np.zeros(spectra[0].power.size)
+    for spectrum, quiet in zip(spectra, air, strict=True):
+        above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
+        above[spectrum.power <= MAX_AIR_POWER_RATIO * quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)] = (
+            0.0
+        )
+        total += np.clip(above, 0.0, MAX_HARMONIC_LEVEL)
+    return total / len(spectra)
+
+
+def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
+    """Whether the multiples that are heard have an order in common that the teeth have not: it is another's comb."""
+    orders = np.arange(1, heard.size + 1)
+    return any(
+        _sum_chance(heard[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
+    )
+
+
+def _sum_chance(heard: Floats, values: Floats) -> float:
+    """How often as many of the values, drawn anywhere, have a sum as large; noise is among them, if they are few."""
+    count, level = heard.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
+    share = (
+        np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)
+        / values.size
+    )
+    louder = np.maximum(np.cumsum(share[::-1])[::-1], np.exp(-(10 ** (MIN_HARMONIC_LEVEL + level))))
+    share = np.append(1.0, louder[1:]) - np.append(louder[1:], 0.0)
+    size = N_SUM_LEVELS * count + 1
+    sums = np.fft.irfft(np.fft.rfft(share, 2 * size) ** count, 2 * size)[:size]
+    return float(np.sum(sums[int(np.sum(heard) * N_SUM_LEVELS / MAX_HARMONIC_LEVEL) :]))

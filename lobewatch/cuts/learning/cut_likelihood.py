@@ -1,0 +1,241 @@
+"""Predict what a cut does on each sample, and the likelihood of its label."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobes import MillingRows, build_milling_system, count_pieces, rows_at_speeds
+from lobes.floquet import largest_multipliers
+from lobes.floquet.stability_boundary import loudest_chatter_frequency
+from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.prior_samples import SpindleSamples
+from lobewatch.machine.settings.cut_tables import FEED_ANGLES
+from lobewatch.machine.settings.requested_cut import CutSetting
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
+
+LIMIT_SPREAD = 0.05
+"""Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
+MISLABELED_SHARE = 0.03
+"""Share of cuts that are written down as what they are not; chosen: 2.7 % are heard wrong, some are typed wrong."""
+UNPITCHED_MISLABELED_SHARE = 0.06
+"""The same of chatter of which no frequency was told, so that nothing speaks for it but the word; chosen."""
+CHATTER_FREQUENCY_SPREAD = 0.01
+"""Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
+FOREIGN_FREQUENCY_SHARE = 0.05
+"""Share of chatter frequencies that say nothing; chosen, see docs/cuts.md, How good it is."""
+WRONG_KIND_SHARE = 0.1
+"""Share of chatter that is heard as that of the other kind; chosen."""
+MULTIPLIER_ACCURACY = 1e-3
+"""Accuracy of a multiplier, relative."""
+FLIP_ANGLE_TOLERANCE = 1e-3
+"""Distance of the angle of a multiplier from pi (rad) up to which it is that of period two."""
+MAX_LOG_EXCESS = 5.0
+"""Largest logarithm of depth over limit that counts, either way: a hundred times `EDGE`."""
+
+Floats = NDArray[np.float64]
+
+
+class CutPrediction(NamedTuple):
+    """What each spindle would do in a cut, shape (r,) each."""
+
+    excess: Floats
+    """Logarithm of depth over limit; positive where it chatters."""
+    frequency: Floats
+    """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
+    limit_frequency: Floats
+    """Folded frequency at the limit of its speed, by zero order (Hz); may be NaN where the cut says nothing of any."""
+    is_flip: NDArray[np.bool_]
+    """Whether that is of period two."""
+
+    @property
+    def chatter_probability(self) -> Floats:
+        """Chance that it chatters."""
+        return np.asarray(scipy.special.ndtr(self.excess / LIMIT_SPREAD))
+
+    @property
+    def label_probability(self) -> Floats:
+        """Chance that it is written down as chatter."""
+        return MISLABELED_SHARE + (1 - 2 * MISLABELED_SHARE) * self.chatter_probability
+
+    def frequency_distances(self, cut: CutEvidence) -> Floats:
+        """Distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
+
+        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
+        limit of a pocket these are two modes or lobes.
+        """
+        return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
+
+
+def predict_cut(cut: CutEvidence, draws: SpindleSamples) -> CutPrediction:
+    """What draws would do in the worst of the directions of feed of a cut, at its own depth."""
+    rows = draws.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
+    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
+    rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
+    predict = _predict_by_zero_order if is_force_constant(cut.cut) else _predict_by_multipliers
+    fed = [predict(rows.with_feed_angle(angle), cut) for angle in cut.feed_angles]
+    worst = np.argmax([prediction.excess for prediction in fed], axis=0)[np.newaxis]
+    return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True)))
+
+
+def log_likelihood(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
+    """Logarithm of the likelihood of what was written down, shape (r,).
+
+    again: the same cut as it was made at other times, whose words are known: all have one truth, so that of two words
+    that differ one is wrong, however near its limit the cut is.
+    """
+    return np.asarray(np.log(sum(_likelihoods(cut, prediction, again))))
+
+
+def mislabel_probability(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
+    """Chance that the word of a cut is wrong, of spindles that are the truth, shape (r,); again: as above."""
+    right, wrong = _likelihoods(cut, prediction, again)
+    return np.asarray(wrong / (right + wrong))
+
+
+def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> tuple[Floats, float]:
+    """Logarithm of Kt by power over that of each spindle, less what readings before it say of the error that all share,
+    shape (r,), and its variance.
+
+    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e standard
+    normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance. ValueError for a
+    cut without power.
+    """
+    if cut.power is None:
+        raise ValueError(f"cut {cut.id} has no power; ask for one that has")
+    shared, precision = np.zeros(force.shape), 1.0
+    for other in before:
+        if other.power is not None and other.material == cut.material:
+            shared += np.log(other.power.force / force) * other.power.common_error / other.power.own_error**2
+            precision += (other.power.common_error / other.power.own_error) ** 2
+    distance = np.log(cut.power.force / force) - cut.power.common_error * shared / precision
+    return distance, cut.power.own_error**2 + cut.power.common_error**2 / precision
+
+
+def power_log_likelihood(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> Floats:
+    """Logarithm of the likelihood of its power over the largest that it can be, shape (r,); 0 where nobody has read it.
+
+    Arguments as of `power_distance`. A natural frequency that has moved since says nothing of Kt: an old one counts
+    whole.
+    """
+    if cut.power is None:
+        return np.zeros(force.shape)
+    distance, variance = power_distance(cut, force, before)
+    return np.asarray(-(distance**2) / (2 * variance))
+
+
+def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence]) -> tuple[Floats, Floats]:
+    """Likelihood of what was written down with its word right, and with it wrong."""
+    truths: tuple[Floats, Floats] = prediction.chatter_probability, 1 - prediction.chatter_probability
+    for other in again:
+        told = [share * word for share, word in zip(truths, _label_likelihoods(other, prediction), strict=True)]
+        truths = told[0] / (told[0] + told[1]), told[1] / (told[0] + told[1])
+    chatters, stable = (share * word for share, word in zip(truths, _label_likelihoods(cut, prediction), strict=True))
+    return (chatters, stable) if cut.has_chatter else (stable, chatters)
+
+
+def _label_likelihoods(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]:
+    """Likelihood of what was written down where it chatters, and where it is stable; a wrong word sounds anyhow."""
+    ones = np.ones(prediction.excess.shape)
+    if not cut.has_chatter:
+        return MISLABELED_SHARE * ones, (1 - MISLABELED_SHARE) * ones
+    if not cut.has_frequency:
+        return (1 - UNPITCHED_MISLABELED_SHARE) * ones, UNPITCHED_MISLABELED_SHARE * ones
+    return (1 - MISLABELED_SHARE) * _frequency_likelihood(cut, prediction), MISLABELED_SHARE / 2 * ones
+
+
+def max_log_likelihood(cut: CutEvidence) -> float:
+    """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
+    if not cut.has_frequency:
+        return 0.0
+    base = np.atleast_1d(_folded_chatter(cut))
+    same = CutPrediction(np.array([np.inf]), base, base, np.array([cut.verdict == "flip"]))
+    return float(log_likelihood(cut, same)[0])
+
+
+def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
+    """Likelihood of kind and frequency that were told, where it chatters."""
+    alike = prediction.is_flip == (cut.verdict == "flip")
+    kind = np.where(alike, 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
+    wide = CHATTER_FREQUENCY_SPREAD * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
+    distances = prediction.frequency_distances(cut)
+    near = np.exp(-((distances / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
+    anywhere = 2 / cut.tooth_frequency
+    near = np.mean(np.where(np.isfinite(distances), near, anywhere), axis=0)
+    return np.asarray(kind * ((1 - FOREIGN_FREQUENCY_SHARE) * near + FOREIGN_FREQUENCY_SHARE * anywhere) / anywhere)
+
+
+def _folded_chatter(cut: CutEvidence) -> Floats:
+    """Chatter frequency that was heard, or that of period two where none was told, folded by the teeth (Hz)."""
+    chatter = cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2
+    return fold_frequency(chatter, cut.tooth_frequency)
+
+
+def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+    """Prediction where the mean force is all of it."""
+    mean = ZeroOrderBatch.of(rows)
+    limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
+    excess = np.clip(np.log(cut.depth / limit), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    frequency = at_limit.copy()
+    beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
+    if beyond.size:
+        _, loudest = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond]).fastest_growth(
+            rows.speed_rpm[beyond], cut.depth
+        )
+        frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
+    teeth = 1 / rows.tooth_period
+    base, at_limit = (fold_frequency(part, teeth) for part in (frequency, at_limit))
+    return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
+
+
+def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+    """Prediction by semi-discretisation at the depth of the cut; its distance from the limit is that of its growth.
+
+    Growth of the logarithm of the motion over the decay that the spindle has without a cut.
+    """
+    depth = np.full((len(rows), 1), cut.depth)
+    multiplier = largest_multipliers(rows, depth, count_pieces(rows, cut.depth), MULTIPLIER_ACCURACY)[:, 0]
+    quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
+    excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    angle = np.abs(np.angle(multiplier))
+    teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
+    if cut.has_frequency:
+        at_limit = ZeroOrderBatch.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
+    return CutPrediction(
+        excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), np.pi - angle < FLIP_ANGLE_TOLERANCE
+    )
+
+
+class ExpectedChatter(NamedTuple):
+    """What a cut sounds like in the direction of feed that is worst."""
+
+    stable: bool
+    """Whether no multiplier reaches 1."""
+    frequency: float
+    """Frequency of the largest multiplier (Hz): what chatter would sound with at this depth."""
+
+
+def predict_chatter(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> ExpectedChatter:
+    """What to expect at a speed (rpm): the sound at the limit is more than 1 % off in many cuts far beyond it.
+
+    The multiplier is that of the cut's own depth. ValueError for an assembly without modes.
+    """
+    system = build_milling_system(assembly.x, assembly.y, assembly.principal_directions.sign_patterns[0])
+    axes = FEED_ANGLES.values() if setting.feed == "both" else (FEED_ANGLES[setting.feed],)
+    cuts = [replace(setting.cut, feed_angle=angle) for angle in axes]
+    depth, speed = np.array([[setting.depth]]), np.array([speed_rpm])
+    multipliers = []
+    for cut in cuts:
+        rows = rows_at_speeds(system, cut, speed)
+        multipliers.append(largest_multipliers(rows, depth, count_pieces(rows, setting.depth))[0])
+    worst = int(np.argmax([abs(multiplier[0]) for multiplier in multipliers]))
+    repeats = np.array([setting.cut.repeats_per_turn * speed_rpm / 60])
+    frequency = loudest_chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], repeats)
+    return ExpectedChatter(bool(abs(multipliers[worst][0]) < 1), float(frequency[0]))

@@ -1,0 +1,141 @@
+"""Find test cuts whose label, frequency or power contradicts the other cuts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.cut_likelihood import (
+    CHATTER_FREQUENCY_SPREAD,
+    log_likelihood,
+    mislabel_probability,
+    power_distance,
+)
+from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
+
+MAX_WRONG_PROBABILITY = 0.5
+"""Chance that the word of a cut is wrong, given all cuts, from which it is not believed."""
+N_CHECK_SAMPLES = 300
+"""Number of draws that are asked what they say of a cut."""
+MAX_FREQUENCY_DEVIATION = 4.0
+"""Distance (standard deviations) from all frequencies predicted at which chatter is that of something else, and from
+the Kt that was known at which a power is not believed; chosen."""
+MIN_EXPLAINED_WEIGHT = 0.005
+"""Share of the weight by the other cuts that counts as nothing; chosen."""
+
+
+class Contradiction(StrEnum):
+    """In what a cut contradicts the model."""
+
+    FREQUENCY = "frequency"
+    """It chatters where no mode is."""
+    CHATTERS = "chatters"
+    """It chatters where most spindles that explain the other cuts are stable."""
+    STABLE = "stable"
+    """It is stable where most of them chatter."""
+    POWER = "power"
+    """Its power says another Kt than the cuts before it."""
+
+
+@dataclass(frozen=True)
+class InconsistentCut:
+    """A cut whose word or power is not believed, or whose frequency is of no mode."""
+
+    cut: CutEvidence
+    """The cut."""
+    contradiction: Contradiction
+    """Contradiction for which it is not believed."""
+    wrong_probability: float = 0.0
+    """Chance that its word is wrong."""
+
+
+def wrong_label_probability(evidence: NewEvidence) -> float:
+    """Chance that the word of a cut is wrong under spindles that explain all."""
+    cut, before = evidence.cut, evidence.prior
+    return float(np.sum(before.weights * mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))))
+
+
+def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
+    """What is wrong with a cut under spindles that explain all; None where nothing is."""
+    cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
+    wrong = wrong_label_probability(evidence)
+    if np.isfinite(cut.frequency) and cut.has_chatter:
+        near = np.any(
+            prediction.frequency_distances(cut) < MAX_FREQUENCY_DEVIATION * CHATTER_FREQUENCY_SPREAD * cut.frequency,
+            axis=0,
+        )
+        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction, _repeats_of(cut, evidence.prior)))
+        if np.sum(others * near) < MIN_EXPLAINED_WEIGHT * np.sum(others):
+            return InconsistentCut(cut, Contradiction.FREQUENCY, wrong)
+    if wrong <= MAX_WRONG_PROBABILITY:
+        return None
+    return InconsistentCut(cut, Contradiction.CHATTERS if cut.has_chatter else Contradiction.STABLE, wrong)
+
+
+def is_power_inconsistent(evidence: NewEvidence) -> bool:
+    """Whether the power of a cut says another Kt than all that was known before."""
+    cut, before = evidence.cut, evidence.prior
+    if cut.power is None:
+        return False
+    distance, variance = power_distance(cut, before.samples.force_factors(cut.material), before.cuts)
+    mean = np.sum(before.weights * distance)
+    return bool(
+        abs(mean) > MAX_FREQUENCY_DEVIATION * np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance)
+    )
+
+
+def find_inconsistent_cuts(learnt: Posterior) -> tuple[InconsistentCut, ...]:
+    """Cuts that are not believed, of those that were learnt from: each counts as its chance to be right says."""
+    few = learnt.resample(N_CHECK_SAMPLES)
+    doubted = (find_contradiction(few.predict(cut)) for cut in learnt.cuts)
+    return tuple(doubt for doubt in doubted if doubt is not None)
+
+
+def inconsistent_cut_remarks(
+    learnt: Posterior, contradicting: Sequence[InconsistentCut], about: str
+) -> Iterator[Remark]:
+    """What was left out, and where the spindle is not what it was tapped as; about: the program."""
+    yield from map(_inconsistent_cut_remark, contradicting)
+    if learnt.is_frequency_unusual:
+        between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
+        text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
+        yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
+
+
+def _repeats_of(cut: CutEvidence, learnt: Posterior) -> list[CutEvidence]:
+    """The same cut as it was made at other times."""
+    return [other for other in learnt.cuts if other is not cut and cut.is_repeat_of(other)]
+
+
+def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
+    """Remark on a cut that is not believed."""
+    cut = contradicting.cut
+    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
+    wrong = f"by the other cuts wrong with {100 * contradicting.wrong_probability:.0f} %"
+    text, cure = {
+        Contradiction.FREQUENCY: (
+            f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
+            "tap the workpiece where it is cut",
+        ),
+        Contradiction.CHATTERS: (
+            f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
+            "cut it again, or take it out with lobewatch exclude; tap again if it stays",
+        ),
+        Contradiction.STABLE: (
+            f"stable {at}, {wrong}: a slip, another depth or speed than told?",
+            "cut it again, or take it out with lobewatch exclude",
+        ),
+        Contradiction.POWER: (
+            f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
+            "another depth, worn edges?",
+            "read it again, or take the cut whose power was misread out with lobewatch exclude; its word counts",
+        ),
+    }[contradicting.contradiction]
+    return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

@@ -1,0 +1,123 @@
+"""Depths of stable pockets by test cuts only, for tap tests without a force sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.program_learning import collect_tool_evidence
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
+from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
+from lobewatch.verdicts.verdict import NOT_CHECKED_CODE, Stability, Verdict
+
+MAX_POCKET_CUTS = 5
+"""Number of test cuts in a pocket after which its depth stands."""
+FIRST_DEPTH_SHARE = 0.25
+"""First depth over that of the program."""
+MIN_DEPTH_RATIO = 1.2
+"""Shallowest depth with chatter over the deepest without, below which no cut between them is worth making."""
+PROGRAM_SPEED_TOLERANCE = 0.01
+"""Relative distance of two speeds that are one."""
+
+
+@dataclass(frozen=True)
+class PocketDepth:
+    """A pocket with what was heard in it."""
+
+    pocket: SpeedPocket
+    """Pocket by f_n and damping."""
+    speed_rpm: float
+    """Speed to cut at (rpm), the middle of its window."""
+    cuts: tuple[CutEvidence, ...]
+    """Cuts of the same cutter, material and immersion in its window."""
+    max_depth: float
+    """Deepest cut that machine and tool bear there (m)."""
+
+    @property
+    def chatter_depth(self) -> float:
+        """Shallowest depth that chattered (m); inf where none did."""
+        return min((cut.depth for cut in self.cuts if cut.has_chatter), default=math.inf)
+
+    @property
+    def stable_depth(self) -> float:
+        """Deepest depth that was heard stable, shallower than all chatter (m); 0 where none was."""
+        stable = (cut.depth for cut in self.cuts if not cut.has_chatter)
+        return max((depth for depth in stable if depth < self.chatter_depth), default=0.0)
+
+    def next_depth(self, first: float) -> float | None:
+        """Depth of the next cut (m), twice as deep or between what was heard; None where none is worth making.
+
+        first: depth to begin with (m).
+        """
+        if len(self.cuts) >= MAX_POCKET_CUTS:
+            return None
+        if not self.stable_depth:
+            wanted = first if math.isinf(self.chatter_depth) else self.chatter_depth / 2
+        elif math.isinf(self.chatter_depth):
+            wanted = 2 * self.stable_depth
+        else:
+            wanted = (
+                math.sqrt(self.stable_depth * self.chatter_depth)
+                if self.chatter_depth > MIN_DEPTH_RATIO * self.stable_depth
+                else self.stable_depth
+            )
+        wanted = round_down_depth_mm(1e3 * min(wanted, self.max_depth)) / 1e3
+        return wanted if wanted > self.stable_depth else None
+
+
+def find_pocket_depths(
+    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
+) -> list[PocketDepth]:
+    """The best pockets of a program with what was heard in each, that nearest to its own speed first."""
+    own, reach = _find_own_cuts(table, assembly, machine, cuts), CutRange.of(machine, table)
+    told = []
+    for pocket in find_speed_pockets(table, assembly, machine):
+        speed = round(sum(pocket.window_rpm) / 2 / SPEED_STEP_RPM) * SPEED_STEP_RPM
+        inside = tuple(cut for cut in own if pocket.contains(cut.speed_rpm))
+        told.append(PocketDepth(pocket, speed, inside, float(reach.depth_limits(np.array([speed]))[0]) / 1e3))
+    return sorted(told, key=lambda heard: abs(math.log(heard.speed_rpm / table.speed_rpm)))
+
+
+def choose_first_depth(table: ProgramTable) -> float:
+    """Depth of the first cut (m): a part of that of the program."""
+    return max(round_down_depth_mm(FIRST_DEPTH_SHARE * table.depth_mm), DEPTH_STEP_MM) / 1e3
+
+
+def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> Verdict:
+    """A verdict on a program whose limit is not known, with the word of the cuts that were heard at its very speed:
+    doubtful at best, for they tell nothing of what is not known."""
+    program = verdict.program
+    at_speed = [
+        cut
+        for cut in _find_own_cuts(program, assembly, machine, cuts)
+        if abs(cut.speed_rpm / program.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE
+    ]
+    depth = program.depth_mm / 1e3
+    chattering = [cut for cut in at_speed if cut.has_chatter and cut.depth <= depth]
+    stable = [cut for cut in at_speed if not cut.has_chatter and cut.depth >= depth]
+    if not chattering and not stable:
+        return verdict
+    heard = (chattering or stable)[-1]
+    word, what = (Stability.NOT_STABLE, "chatter") if chattering else (Stability.DOUBTFUL, "stable")
+    text = f"cut {heard.id} was heard {what} at {1e3 * heard.depth:.4g} mm; without K no limit is known beside it"
+    remark = Remark("heard-alone", program.name, text, "tap with a hammer that measures its force")
+    others = [other for other in verdict.remarks if other.code != NOT_CHECKED_CODE]
+    return replace(verdict, stability=word, remarks=(remark, *others))
+
+
+def _find_own_cuts(
+    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
+) -> list[CutEvidence]:
+    """Cuts of this very program, at the speeds that are now what theirs were then: f_n may have moved since."""
+    shape = geometry_key(machine.build_cut(table))
+    evidence = collect_tool_evidence(cuts, table, assembly, machine)
+    own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]
+    return [replace(cut, speed_rpm=cut.speed_rpm / cut.frequency_ratio) for cut in own]

@@ -1,0 +1,159 @@
+"""Learn from the test cuts of a program, and find its next test cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lobewatch.cuts.learning.cut_evidence import CutEvidence, estimate_force_by_power
+from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
+from lobewatch.cuts.learning.label_check import (
+    Contradiction,
+    InconsistentCut,
+    find_inconsistent_cuts,
+    is_power_inconsistent,
+)
+from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
+from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.cut_tables import FEED_ANGLES
+from lobewatch.machine.settings.requested_cut import find_by_name
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.tap_series import interpolate_frequency
+from lobewatch.verdicts.program_samples import build_median_row, build_program
+from lobewatch.verdicts.uncertainty import uncertainty_of
+
+
+@dataclass(frozen=True, eq=False)
+class LearningResult:
+    """What was learnt for one program."""
+
+    program: ProgramTable
+    """Program as it stands in machine.toml."""
+    prior: Posterior
+    """Spindle and coefficients as known without any cut."""
+    posterior: Posterior
+    """Spindle and coefficients as known with the cuts."""
+    inconsistent_cuts: tuple[InconsistentCut, ...]
+    """Cuts that are not believed; of some it is their power alone, without which they were learnt from."""
+    own_cuts: tuple[CutEvidence, ...]
+    """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
+
+    @property
+    def rejected_cuts(self) -> tuple[CutEvidence, ...]:
+        """Cuts whose word is not believed."""
+        return tuple(odd.cut for odd in self.inconsistent_cuts if odd.contradiction is not Contradiction.POWER)
+
+    @property
+    def accepted_cuts(self) -> tuple[CutEvidence, ...]:
+        """Cuts that are."""
+        return tuple(cut for cut in self.posterior.cuts if cut not in self.rejected_cuts)
+
+
+@dataclass(frozen=True, eq=False)
+class NextCut:
+    """What to cut next, and what it rests on."""
+
+    learning: LearningResult
+    """Lesson of the cuts that were made."""
+    suggestion: Suggestion | None
+    """Cut to make; None where nothing more is to be gained, or all cuts are made."""
+    cuts_left: int
+    """Number of test cuts that are still to be made."""
+    cut_range: CutRange
+    """Speeds and depths that machine and tool bear."""
+
+
+def find_program(machine: Machine, name: str) -> ProgramTable:
+    """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
+    return find_by_name({table.name: table for table in machine.program}, name)
+
+
+def learn_program(
+    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
+) -> LearningResult:
+    """Learn from the cuts of a machine; those of other tools say nothing of this one."""
+    start = build_prior(
+        build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
+    )
+    learnt, odd_powers = start, []
+    for cut in collect_tool_evidence(cuts, table, assembly, machine):
+        evidence = learnt.predict(cut)
+        if is_power_inconsistent(evidence):
+            odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
+            evidence = replace(evidence, cut=replace(cut, power=None))
+        learnt = evidence.update()
+    shape = geometry_key(machine.build_cut(table))
+    own_cuts = tuple(cut for cut in learnt.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
+    return LearningResult(table, start, learnt, (*find_inconsistent_cuts(learnt), *odd_powers), own_cuts)
+
+
+def find_next_cut(
+    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
+) -> NextCut:
+    """The next test cut of a program of which so many shall be made at most."""
+    lesson = learn_program(table, assembly, machine, cuts)
+    left = max(most - len(lesson.own_cuts), 0)
+    reach = CutRange.of(machine, table)
+    if not left or reach.is_empty:
+        return NextCut(lesson, None, left, reach)
+    grid = build_cut_grid(table, assembly, machine)
+    cut = suggest_cut(lesson.posterior, grid, lesson.own_cuts, left, lesson.rejected_cuts, table.depth_mm / 1e3)
+    return NextCut(lesson, cut, left, reach)
+
+
+def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:
+    """Speeds of the machine, and depths that tool and drive allow."""
+    reach = CutRange.of(machine, table)
+    speeds = reach.speeds(SPEED_GRID_STEP)
+    deepest = reach.depth_limits(speeds) / 1e3
+    cut, angles = machine.build_cut(table), tuple(FEED_ANGLES[feed] for feed in table.feed_axes)
+    trust = compare_zero_order(assembly.x, assembly.y, cut, angles, speeds, reach.deepest_mm / 1e3)
+    return CutGrid(cut, angles, speeds, deepest, trust)
+
+
+def collect_tool_evidence(
+    cuts: Sequence[CutEntry], table: ProgramTable, assembly: Assembly, machine: Machine
+) -> tuple[CutEvidence, ...]:
+    """The cuts of the same tool that count, oldest first."""
+    known = machine.coefficients(table)
+    materials = [(known.material, known.tangential, known.radial)]
+    evidence = []
+    for heard in cuts:
+        if heard.tool != table.tool or not heard.is_usable:
+            continue
+        material = heard.coefficients, heard.cut.tangential, heard.cut.radial
+        if material not in materials:
+            materials.append(material)
+        evidence.append(_build_evidence(heard, materials.index(material), assembly))
+    return tuple(evidence)
+
+
+def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvidence:
+    feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
+    return CutEvidence(
+        cut=cut.cut,
+        speed_rpm=cut.speed_rpm,
+        depth=cut.depth,
+        verdict=cut.word,
+        frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
+        feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
+        material=material,
+        speed_found=cut.by != "ear",
+        frequency_ratio=_frequency_ratio(cut, assembly),
+        id=cut.id,
+        power=None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter),
+    )
+
+
+def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
+    """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where not known."""
+    pairs = [
+        (interpolate_frequency(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series
+    ]
+    ratios = [before / now for before, now in pairs if before is not None]
+    return float(np.mean(ratios)) if ratios else 1.0

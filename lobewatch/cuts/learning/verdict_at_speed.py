@@ -1,0 +1,135 @@
+"""Verdicts and lobes of a program with the spindle at speed, as learned from test cuts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import DataError, Remark
+from lobes import StabilityLobes
+from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
+from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
+from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.learning.program_learning import LearningResult, learn_program
+from lobewatch.machine import CutTable, Machine, ProgramTable
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.tool.assembly import Assembly, compute_tip_lobes
+from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row, build_program
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.uncertainty import TEST_CUT_CAUSE, FactorRange, LearnedSamples, Uncertainty
+from lobewatch.verdicts.verdict import Verdict, evaluate_program
+
+INTERVAL_QUANTILES = (0.025, 0.975)
+"""Quantiles that 95 % of draws lie between."""
+
+Floats = NDArray[np.float64]
+
+
+def evaluate_at_speed(
+    table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
+) -> Verdict:
+    """The verdict on a program, or why its tool is not known; at speed as far as cuts have taught, else at rest."""
+    learnt = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
+    verdict = evaluate_program(table, tool, machine, learnt)
+    if isinstance(tool, DataError) or tool.directions or not tool.without_stiffness:
+        return verdict
+    return apply_test_cuts(verdict, tool, machine, cuts)
+
+
+def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> SpindleAtSpeed:
+    """What cuts have taught of a program and its spindle; nothing of the reference cut."""
+    if not isinstance(table, ProgramTable) or not tool.directions:
+        return NO_TEST_CUTS
+    if not any(cut.tool == table.tool and cut.is_usable for cut in cuts):
+        return NO_TEST_CUTS
+    lesson = learn_program(table, tool, machine, cuts)
+    remarks = tuple(inconsistent_cut_remarks(lesson.posterior, lesson.inconsistent_cuts, table.name))
+    return _build_spindle(lesson, tool, machine, remarks) if lesson.accepted_cuts else SpindleAtSpeed(remarks=remarks)
+
+
+def _build_spindle(
+    lesson: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
+) -> SpindleAtSpeed:
+    """The middle of what a lesson has left, and the draws around it."""
+    at_rest, draws = (
+        build_median_row(build_program(lesson.program, machine), tool),
+        lesson.posterior.draw(N_PROGRAM_SAMPLES),
+    )
+    rows = draws.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
+    parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
+    middle, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
+    force, direction = (draws.ratios()[name] for name in ("tangential", "ratio"))
+    push, ratio = float(np.mean(force)), float(np.mean(direction))
+    left = LearnedSamples(
+        frequency=parts[0] / middle[0],
+        damping_ratio=parts[1] / middle[1],
+        stiffness=parts[2] / middle[2],
+        phase_change=phases,
+        tangential=force / np.mean(force),
+        ratio=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
+    )
+    return SpindleAtSpeed(
+        n_cuts=len(lesson.accepted_cuts),
+        remarks=remarks,
+        uncertainty=Uncertainty(
+            modes={TEST_CUT_CAUSE: _half_widths(parts, phases)},
+            tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
+            speed=machine.doubt.speed_percent / 100,
+            tangential=_factor_range(force),
+            ratio=_factor_range(direction),
+            axes=tool.principal_directions,
+            learned=left,
+        ),
+        factors=np.stack(middle, axis=1),
+        tangential=float(at_rest.tangential[0]) * push / 1e6,
+        radial=float(at_rest.radial[0]) * push * ratio / 1e6,
+        prior_ranges=_factor_ranges(lesson.prior),
+        posterior_ranges=_factor_ranges(lesson.posterior),
+    )
+
+
+def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
+    """Half-widths of 95 % of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
+    relative = [
+        np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
+    ]
+    return np.stack([*relative, np.std(turned, axis=0) * 2], axis=1)
+
+
+def _factor_ranges(posterior: Posterior) -> dict[str, FactorRange]:
+    """Intervals of all that is learnt, over the values at rest."""
+    return {name: FactorRange(interval.low, interval.high) for name, interval in posterior.intervals.items()}
+
+
+def _factor_range(values: Floats) -> FactorRange:
+    """95 % of some draws over their mean."""
+    low, high = np.quantile(values, INTERVAL_QUANTILES) / np.mean(values) if np.mean(values) > 0 else (1.0, 1.0)
+    return FactorRange(min(float(low), 1.0), max(float(high), 1.0))
+
+
+class LobesAtSpeed(NamedTuple):
+    """Lobes of a cut by zero order with the spindle at speed."""
+
+    n_cuts: int
+    """Number of test cuts that they were learnt from."""
+    lobes: StabilityLobes
+    """Lobes in the middle of what was learnt."""
+    band: LimitBand
+    """Band of the limits that the cuts have left open."""
+
+
+def compute_lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:
+    """The lobes of programs with the same cut, from their verdicts; None where no test cut has taught anything."""
+    for verdict in verdicts:
+        tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
+        if tool is None or not at_speed.n_cuts:
+            continue
+        taught, spindle = msgspec.structs.replace(machine, all_programs=(verdict.program,)), at_speed.scale_modes(tool)
+        lobes = compute_tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name], spindle.cross)[name]
+        return LobesAtSpeed(at_speed.n_cuts, lobes, compute_limit_band(lobes, name, tool, taught, at_speed))
+    return None

@@ -1,0 +1,10 @@
+"""Many machines at once: how each stands, small and quick to read, and the tap tests of all as one table."""
+
+from .fleet import Fleet
+from .summarize import summarize_folder, summarize_with_rows
+
+__all__ = [
+    "Fleet",
+    "summarize_folder",
+    "summarize_with_rows",
+]

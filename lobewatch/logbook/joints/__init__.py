@@ -1,1 +1,0 @@
-"""Joints and bearings together, from the newest tap tests of several tools."""

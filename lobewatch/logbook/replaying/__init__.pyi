@@ -1,5 +1,0 @@
-"""Recorded files as tap tests of a machine: found in folders, dated, understood, shown or stored."""
-
-from .store import ReplayOutcome, store_recordings
-
-__all__ = ["ReplayOutcome", "store_recordings"]

@@ -1,1 +1,0 @@
-"""Whether the files of a machine are those that were committed; damage by name, and its mending."""

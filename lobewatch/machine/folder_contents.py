@@ -1,0 +1,213 @@
+"""Compare the journal with taps/: usable, damaged and unlisted tap tests."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import Remark
+from acquisition.file_io import open_regular_file, read_regular_file
+from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
+from lobewatch.machine.journal.entries import (
+    Acknowledgement,
+    FleetScatter,
+    MaintenanceEvent,
+    read_acknowledgements,
+    read_events,
+    read_exclusion_reasons,
+    read_fleet_scatters,
+    read_mode_edits,
+)
+from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
+from lobewatch.machine.journal.tap_entry import NO_MODE_EDITS, TapEntry, decode_tap_entries
+from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+
+MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
+"""Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first, as long as they are neither
+more bytes nor more files; lobewatch verify takes all."""
+MAX_LISTED_FILES = 20
+"""Files without a line that are named one by one; chosen."""
+
+
+@dataclass(frozen=True)
+class FolderContents:
+    """Tap tests, test cuts and events of a machine folder."""
+
+    taps: tuple[TapEntry, ...]
+    """Tap tests whose files are as they were committed, oldest first by their time."""
+    lost: tuple[TapEntry, ...]
+    """Committed tap tests that cannot be used, likewise."""
+    remarks: tuple[Remark, ...]
+    """Remarks on what is wrong."""
+    events: tuple[MaintenanceEvent, ...] = ()
+    """Maintenance of the machine, oldest first."""
+    line_count: int = 0
+    """Number of lines of the journal."""
+    cuts: tuple[CutEntry, ...] = ()
+    """Test cuts, oldest first, those that a person has taken out too."""
+    acknowledgements: tuple[Acknowledgement, ...] = ()
+    """What a person has acknowledged, oldest first."""
+    fleet_scatters: tuple[FleetScatter, ...] = ()
+    """What the other machines told of its scatter, oldest first."""
+
+    def with_tap(self, entry: TapEntry) -> FolderContents:
+        """Contents with a tap test that was just committed, and nothing else since."""
+        is_newest = not self.taps or _tap_time(self.taps[-1]) <= _tap_time(entry)
+        taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
+        return replace(self, taps=taps, line_count=self.line_count + 1)
+
+    @property
+    def baselines(self) -> list[datetime]:
+        """Times at which all comparing began anew, oldest first."""
+        return [event.time for event in self.events if event.new_baseline]
+
+
+def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContents:
+    """Contents that the journal and taps/ prove together; reading: of the journal."""
+    committed = read_committed_taps(reading)
+    remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
+    events = read_events(reading.other_entries)
+    sizes, given_up, proved = _list_tap_sizes(folder), read_given_up_ids(reading), 0
+    for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
+        proved += entry.size
+        is_old = proved > MAX_HASHED_BYTES or count >= MAX_HASHED_FILES
+        fault = "" if is_old and sizes.get(entry.id) == entry.size else find_file_fault(folder, entry)
+        (lost if fault else taps).append(entry)
+        if fault:
+            remarks.append(tap_damage_remark(folder, entry, fault, entry.id in given_up))
+    taps.reverse()
+    extra = [folder / "taps" / f"{name}.h5" for name in sorted(sizes.keys() - committed.keys())]
+    missing = not reading.lines and not reading.damage and any(_lacks_known_origin(folder, path) for path in extra)
+    if missing:
+        remarks.append(missing_journal_remark(folder, len(extra)))
+    if reading.damage or missing:
+        doubtful = [(path, read_unverified_tap(path)) for path in extra]
+        whole = [entry for path, entry in doubtful if entry is not None and entry.id == path.stem]
+        taps = [*_sort_by_time([*taps, *whole])]
+    else:
+        cure = f"{format_command('verify', folder)} says what it is and what to do"
+        remarks += [
+            unlisted_file_remark(path, "not in the journal, does not count", cure) for path in extra[:MAX_LISTED_FILES]
+        ]
+        if extra[MAX_LISTED_FILES:]:
+            text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
+            remarks.append(Remark("tap-unlisted", "taps", text, cure))
+    cuts = read_committed_cuts(reading)
+    words = read_acknowledgements(reading.other_entries), read_fleet_scatters(reading.other_entries)
+    return FolderContents(tuple(taps), _sort_by_time(lost), tuple(remarks), events, len(reading.lines), cuts, *words)
+
+
+def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
+    """Test cuts of the journal, oldest first."""
+    return read_cuts(reading.other_entries, read_exclusion_reasons(reading.other_entries))
+
+
+def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
+    """Tap tests of the journal by identity."""
+    accepted: dict[str, tuple[str, ...]] = {}
+    for line in reading.other_entries:
+        if line["kind"] == "accept":
+            accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
+    excluded, by_hand = read_exclusion_reasons(reading.other_entries), read_mode_edits(reading.other_entries)
+    entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
+    for line in reading.other_entries:
+        if line["kind"] == "tap":
+            name = line["id"]
+            later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+            entries[name] = TapEntry.from_line(line, *later)
+    return entries
+
+
+def _list_tap_sizes(folder: Path) -> dict[str, int]:
+    """Sizes (bytes) of the files in taps/ that could be tap tests, by identity."""
+    if not (folder / "taps").is_dir():
+        return {}
+    with os.scandir(folder / "taps") as listing:
+        files = [file for file in listing if file.name.endswith(".h5") and not file.name.startswith(".")]
+        return {file.name[:-3]: file.stat().st_size for file in files}
+
+
+def list_tap_files(folder: Path) -> Mapping[str, Path]:
+    """Files in taps/ that could be tap tests, by identity."""
+    taps = folder / "taps"
+    files = sorted(taps.glob("*.h5")) if taps.is_dir() else []
+    return {path.stem: path for path in files if not path.name.startswith(".")}
+
+
+def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
+    """Fault of the file of a tap test or of a cut; empty where it is as it was written.
+
+    OSError where this program can open no more files.
+    """
+    try:
+        with open_regular_file(f"{folder}/{entry.file}") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size != entry.size:
+                return f"{size} bytes, not {entry.size} as when it was written"
+            digest = hashlib.sha256(file.read()).hexdigest()
+        if digest != entry.sha256:
+            return "altered since it was written (SHA-256 differs)"
+    except FileNotFoundError:
+        return "named in the journal but missing"
+    except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE):  # nothing is said of this file
+            raise
+        return f"cannot be read ({error.strerror})"
+    return ""
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
+    try:
+        return hashlib.sha256(read_regular_file(path)).hexdigest()
+    except OSError:
+        return ""
+
+
+def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
+    """Remark on a tap test that cannot be used."""
+    text = f"{fault}; results are those of the other tap tests"
+    if is_given_up:
+        return Remark("tap-lost", entry.file, text)
+    cure = f"put it back from a backup; without one, {format_command('rebuild', folder)} goes on without it"
+    return Remark("tap-damaged", entry.file, text, cure)
+
+
+def missing_journal_remark(folder: Path, count: int) -> Remark:
+    """Remark on tap files that lie there alone."""
+    return journal_damage_remark(folder / JOURNAL_NAME, f"is missing beside {count} tap file{'s' if count > 1 else ''}")
+
+
+def has_known_origin(folder: Path, entry: TapEntry) -> bool:
+    """Whether a tap file without a line is what an ended program leaves: its hits or its recording are still there."""
+    return bool(entry.source_sha256) or (folder / "spool" / entry.id).is_dir()
+
+
+def _lacks_known_origin(folder: Path, path: Path) -> bool:
+    if (folder / "spool" / path.stem).is_dir():
+        return False
+    entry = read_unverified_tap(path)
+    return entry is None or not has_known_origin(folder, entry)
+
+
+def unlisted_file_remark(path: Path, text: str, cure: str) -> Remark:
+    """Remark on a file in taps/ that is in no journal."""
+    return Remark("tap-unlisted", f"taps/{path.name}", text, cure)
+
+
+def read_given_up_ids(reading: JournalReading) -> set[str]:
+    """Identities of the tap tests and recordings that `lobewatch rebuild` went on without."""
+    return {line["tap"] for line in reading.other_entries if line["kind"] == "lost"}
+
+
+def _sort_by_time(entries: Iterable[TapEntry]) -> tuple[TapEntry, ...]:
+    return tuple(sorted(entries, key=_tap_time))
+
+
+def _tap_time(entry: TapEntry) -> datetime:
+    return datetime.fromisoformat(entry.time)

@@ -1,0 +1,239 @@
+"""Rebuild a damaged machine folder from its sound files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from acquisition import DataError, Remark, read_tap
+from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
+from acquisition.files.cut_file import read_cut_signal
+from lobewatch.machine.daq_rates import read_stored_devices
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_contents import (
+    find_file_fault,
+    hash_file,
+    list_tap_files,
+    read_committed_cuts,
+    read_committed_taps,
+    read_given_up_ids,
+)
+from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
+from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, parse_cut_line
+from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal
+from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+
+
+def verify_cut_recordings(
+    folder: Path, cuts: Sequence[CutEntry], given_up: Collection[str], mend: str
+) -> Iterator[Remark]:
+    """Remarks on recordings that are altered, missing or unlisted; mend: the command that puts them right."""
+    for cut in cuts:
+        fault = _find_recording_fault(folder, cut.recording)
+        if not fault or cut.recording is None:
+            continue
+        text = f"{fault}; what was heard in it counts"
+        if cut.id in given_up:
+            yield Remark("cut-lost", cut.recording.file, text)
+        else:
+            cure = f"put it back from a backup; without one, {mend} goes on without it"
+            yield Remark("cut-damaged", cut.recording.file, text, cure)
+    for path in _list_unlisted_cuts(folder, cuts):
+        yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal, does not count", f"{mend} looks into it")
+
+
+def repair_cut_recordings(folder: Path, journal: Journal, put_aside: Callable[[Path], Path]) -> Iterator[str]:
+    """Enter whole recordings without a line, put others aside, delete none; what was done, a sentence each.
+
+    What was heard in a recording that is lost stands in its line and goes on to count.
+    """
+    for path in _list_unlisted_cuts(folder, read_committed_cuts(journal.read())):
+        cut = _read_unlisted_cut(path)
+        if cut is None or cut.id in {entered.id for entered in read_committed_cuts(journal.read())}:
+            yield f"cuts/{path.name}: put into {put_aside(path).relative_to(folder).as_posix()}"
+            continue
+        content = read_regular_file(path)
+        recording = RecordingFile(cut.id, hashlib.sha256(content).hexdigest(), len(content))
+        journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
+        yield f"cuts/{path.name}: entered in the journal"
+    reading = journal.read()
+    for lost in _find_damaged_recordings(folder, read_committed_cuts(reading)):
+        if (folder / lost.file).exists():
+            put_aside(folder / lost.file)
+        if lost.id not in read_given_up_ids(reading):
+            journal.append({"kind": "lost", "tap": lost.id, "time": datetime.now(UTC).isoformat()})
+            yield f"{lost.file}: lost; what was heard in it goes on to count"
+
+
+def _list_unlisted_cuts(folder: Path, cuts: Sequence[CutEntry]) -> list[Path]:
+    """Files in cuts/ without a line, none that is being written."""
+    listed = {f"{cut.id}.h5" for cut in cuts if cut.recording is not None}
+    files = sorted((folder / "cuts").glob("*")) if (folder / "cuts").is_dir() else []
+    return [path for path in files if path.name not in listed and not path.name.startswith(".")]
+
+
+def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[RecordingFile]:
+    return [cut.recording for cut in cuts if cut.recording is not None and _find_recording_fault(folder, cut.recording)]
+
+
+def _read_unlisted_cut(path: Path) -> CutEntry | None:
+    """The test cut that a recording without a line is of; None where it is no whole one, or has another name."""
+    try:
+        _, about = read_cut_signal(path)
+        cut = parse_cut_line(about)
+    except (DataError, OSError, LookupError, TypeError, ValueError):
+        return None
+    return cut if f"{cut.id}.h5" == path.name else None
+
+
+def _find_recording_fault(folder: Path, recording: RecordingFile | None) -> str:
+    return "" if recording is None else find_file_fault(folder, recording)
+
+
+DAMAGED_FOLDER_NAME = "damaged"
+"""Name of the folder of what was put out of the way."""
+LOST_ENTRIES_HINT = (
+    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
+    "(lobewatch event, exclude, replay --accept, observe)"
+)
+"""Advice on corrections that no copy of the journal has."""
+
+
+def rebuild_files(path: Path) -> list[str]:
+    """Mend machine.toml where it is missing, taps/, the journal and daq.json; what was done, a sentence each.
+
+    DataError where this is no machine folder, BusyError where another program writes.
+    """
+    if not (path / "machine.toml").is_file() and not list_tap_files(path):
+        MachineFolder(path)
+    with FolderLock(path).hold(LOCK_TIMEOUT):
+        journal = Journal(path)
+        reading = journal.read()
+        committed = read_committed_taps(reading)
+        report = [*_restore_misplaced(path, committed)]
+        fresh = _enter_unlisted_taps(path, committed, report)
+        if reading.damage or (fresh and not reading.lines):
+            journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
+            report.append(f"{JOURNAL_NAME}: written anew with {len(reading.entries) + len(fresh)} lines")
+            report += _report_missing_lines(reading.entries, len(fresh))
+        else:
+            for entry in fresh:
+                journal.append(entry.line)
+        report += [f"{entry.file}: entered in the journal" for entry in fresh]
+        report += _record_lost_taps(path, journal)
+        report += repair_cut_recordings(path, journal, lambda file: _move_to_damaged(path, file))
+        report += [*_restore_machine_file(path), *_repair_devices_file(path)]
+    return report
+
+
+def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
+    """Lines that no copy of the journal has; n_fresh: tap tests that were entered anew in place of theirs."""
+    if not entries:
+        yield f"{JOURNAL_NAME}: nothing of it or of its copy could be read; {LOST_ENTRIES_HINT}"
+        return
+    numbers = {entry["number"] for entry in entries if "number" in entry}
+    first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
+    missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
+    if len(missing) > n_fresh:
+        yield f"{JOURNAL_NAME}: of lines {', '.join(map(str, missing))} neither copy is sound; {LOST_ENTRIES_HINT}"
+
+
+def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
+    """Give files with the content of another tap test back to that where its own is wrong, else put them aside."""
+    by_content = {entry.sha256: entry for entry in committed.values()}
+    misplaced: dict[Path, TapEntry] = {}
+    for path in list_tap_files(folder).values():
+        entry = by_content.get(hash_file(path))
+        if entry is not None and path != folder / entry.file:
+            misplaced[path] = entry
+    asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced.items()}
+    for aside, entry in asides.items():
+        if find_file_fault(folder, entry):
+            if (folder / entry.file).exists():
+                _move_to_damaged(folder, folder / entry.file)
+            atomic_write(folder / entry.file, aside.read_bytes())
+            aside.unlink()
+            yield f"{entry.file}: given its name back"
+        else:
+            yield f"{aside.relative_to(folder).as_posix()}: put there, a copy of {entry.file}"
+
+
+def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
+    """Give whole tap files without a line their own names and return them; put all others without one aside."""
+    entries = []
+    for name, path in list_tap_files(folder).items():
+        if name in committed:
+            continue
+        entry = read_unverified_tap(path)
+        taken = entry is not None and entry.id != name and (folder / entry.file).exists()
+        if entry is None or taken or entry.id in committed:
+            report.append(f"taps/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}")
+            continue
+        if entry.id != name:
+            path.rename(folder / entry.file)
+        entries.append(entry)
+    return entries
+
+
+def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
+    """Write down that all goes on without the tap tests that cannot be had back."""
+    reading = journal.read()
+    for name, entry in read_committed_taps(reading).items():
+        if not find_file_fault(folder, entry):
+            continue
+        if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
+            _move_to_damaged(folder, folder / entry.file)
+        if name not in read_given_up_ids(reading):
+            journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
+            yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
+
+
+def _is_temporarily_unreadable(path: Path) -> bool:
+    """Whether a file cannot be read just now; it stays where it is."""
+    try:
+        read_regular_file(path)
+    except IrregularFileError:
+        return False
+    except OSError:
+        return True
+    return False
+
+
+def _restore_machine_file(folder: Path) -> Iterator[str]:
+    """Take a missing machine.toml from the newest tap test that has a copy."""
+    toml = folder / "machine.toml"
+    if toml.exists():
+        return
+    entries = [
+        entry for entry in read_committed_taps(Journal(folder).read()).values() if not find_file_fault(folder, entry)
+    ]
+    for entry in sorted(entries, key=lambda entry: entry.time, reverse=True):
+        text = read_tap(folder / entry.file).circumstances.machine_toml
+        if text:
+            atomic_write(toml, text.encode())
+            yield f"machine.toml: the copy in {entry.file}"
+            return
+    raise DataError(f"{toml}: is missing, and no tap test has a copy; put it back from a backup")
+
+
+def _repair_devices_file(folder: Path) -> Iterator[str]:
+    machine = MachineFolder(folder)
+    try:
+        read_stored_devices(machine)
+    except DataError:
+        aside = _move_to_damaged(folder, folder / "daq.json")
+        yield f"daq.json: put into {aside.relative_to(folder).as_posix()}; the rates of DAQs are measured anew"
+
+
+def _move_to_damaged(folder: Path, path: Path) -> Path:
+    """Move a file into the folder of what is damaged, under a name that nothing has there."""
+    make_folder(folder / DAMAGED_FOLDER_NAME)
+    aside, number = folder / DAMAGED_FOLDER_NAME / path.name, 1
+    while aside.exists():
+        aside, number = folder / DAMAGED_FOLDER_NAME / f"{path.name}.{number}", number + 1
+    return path.replace(aside)

@@ -1,0 +1,197 @@
+"""Draft of machine.toml during setup: detected DAQs, questions and parsed answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+from acquisition import STANDARD_GRAVITY, Channel, DataError, DeviceError, find_driver
+from acquisition.devices import DeviceSettings, PortScan, convert_driver_errors, scan_ports
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml, parse_toml_tables
+
+
+@dataclass(frozen=True)
+class DetectedDaq:
+    """A port, and who answers there."""
+
+    port: str
+    """Port; empty where none is known."""
+    driver: str = "taps"
+    """Name of the driver."""
+    text: str = ""
+    """Words for the device; empty where none has answered."""
+    channels: tuple[Channel, ...] = ()
+    """Channels that the device describes itself."""
+    problem: str = ""
+    """Reason why nobody answers, a sentence."""
+
+    def sensor_text(self, quantity: str) -> str:
+        """Sensitivity of a sensor that the device describes; empty where it does not."""
+        for channel in self.channels:
+            if channel.quantity == quantity:
+                unit, factor = ("mV/N", 1e3) if quantity == "force" else ("mV/g", 1e3 * STANDARD_GRAVITY)
+                serial = f", serial number {channel.serial_number}" if channel.serial_number else ""
+                return f"{channel.sensitivity * factor:.4g} {unit}{serial}"
+        return ""
+
+
+def find_daqs() -> tuple[DetectedDaq, ...]:
+    """DAQs that answer on the USB ports of this computer."""
+    return _list_answering(scan_ports())
+
+
+def inspect_port(port: str) -> DetectedDaq:
+    """Who answers on a port, with a problem in place of the device where nobody does."""
+    survey = scan_ports(port)
+    answering = _list_answering(survey)
+    if answering:
+        return answering[0]
+    return DetectedDaq(port, problem=survey.ports[0].problem or f"no DAQ that lobewatch knows answers on {port}")
+
+
+def _list_answering(survey: PortScan) -> tuple[DetectedDaq, ...]:
+    looks = []
+    for seen in survey.ports:
+        if seen.answer is not None:
+            identity, driver = seen.answer.identity, seen.answer.driver
+            text = f"{identity.model}, serial number {identity.serial}"
+            looks.append(DetectedDaq(seen.port.device, driver, text, _read_channels(seen.port.device, driver)))
+    return tuple(looks)
+
+
+def _read_channels(port: str, name: str) -> tuple[Channel, ...]:
+    """Channels of a device that describes its sensors."""
+    driver = find_driver(name)
+    if driver.sensor_data is None:
+        return ()
+    try:
+        with convert_driver_errors(name, f"opening {port}"), driver.open(port, DeviceSettings()) as device:
+            return device.channels
+    except (DataError, DeviceError):
+        return ()
+
+
+@dataclass(frozen=True)
+class MachineDraft:
+    """Text of a machine.toml that is being asked for."""
+
+    text: str
+    """Text as it stands."""
+    detected_daqs: Mapping[str, DetectedDaq]
+    """DAQs that were looked at, by port."""
+
+    def table(self, name: str, number: int | None = None) -> dict[str, Any]:
+        """Values of a table; none where it is not there."""
+        table: Any = parse_toml_tables(self.text)
+        for part in name.split("."):
+            table = table.get(part, {})
+        if number is None:
+            return dict(table)
+        return dict(table[number]) if number < len(table) else {}
+
+    def set(self, name: str, number: int | None = None, /, **values: TomlValue) -> Self:
+        """With these values in a table; DataError where the text cannot be edited."""
+        return replace(self, text=edit_toml(self.text, TablePath(name, number), values))
+
+    @property
+    def daq(self) -> DetectedDaq:
+        """DAQ that it names, as far as it was looked at."""
+        table = self.table("daq")
+        port = table.get("port", "")
+        return self.detected_daqs.get(port) or DetectedDaq(port, table.get("driver", "taps"))
+
+    @property
+    def needs_sensors(self) -> bool:
+        """Whether the DAQ does not know its sensors."""
+        return find_driver(self.table("daq").get("driver", "taps")).sensor_data is None
+
+    @property
+    def missing_sensors(self) -> list[str]:
+        """Sensors that are needed and were not told of yet, by the names of their questions."""
+        wanted = {} if self.has_no_force_sensor else {"hammer": "force"}
+        wanted["accelerometer"] = "acceleration"
+        known = [channel.get("quantity") for channel in self.table("daq").get("channel", ())]
+        return [name for name, quantity in wanted.items() if self.needs_sensors and quantity not in known]
+
+    @property
+    def has_no_force_sensor(self) -> bool:
+        """Whether no hammer measures its force."""
+        return self.table("tap").get("hammer") == "none"
+
+    def checked(self) -> Self:
+        """The same; DataError where it is no machine file."""
+        if not self.missing_sensors:
+            parse_machine_file(self.text)
+        return self
+
+
+def _always_ask(_: MachineDraft) -> str:
+    return ""
+
+
+@dataclass(frozen=True)
+class SetupQuestion:
+    """Something that machine.toml needs and only a person knows."""
+
+    name: str
+    """Name, as in --edit NAME, and of the option that answers it."""
+    text: str
+    """Words of the question."""
+    example: str
+    """Answer that somebody else might give."""
+    read_current: Callable[[MachineDraft], str]
+    """Function that gives the answer that stands there already, "-" where it was left open, "" where there is none."""
+    apply_answer: Callable[[MachineDraft, str], MachineDraft]
+    """Function that takes an answer; ValueError for one that is none."""
+    skip_reason: Callable[[MachineDraft], str] = _always_ask
+    """Function that gives the reason why nothing is asked; empty where it is."""
+
+
+OPEN_ANSWER = "-"
+"""Answer that leaves something open."""
+ANSWER_UNITS = (
+    "rpm",
+    "1/min",
+    "mm",
+    "mm/tooth",
+    "deg",
+    "°",
+    "kw",
+    "nm",
+    "n·m",
+    "mv/n",
+    "mv/g",
+    "g",
+    "v",
+    "teeth",
+    "flutes",
+    "x",
+)
+"""Words that may stand between numbers."""
+ANSWER_NUMBER_PATTERN = re.compile(r"\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
+
+
+def is_open_answer(answer: str) -> bool:
+    """Whether an answer leaves it open."""
+    return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
+
+
+def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -> list[float]:
+    """Numbers of an answer, as many as there are names, or at least so many; ValueError that names them."""
+    words = ANSWER_NUMBER_PATTERN.sub(" ", answer)
+    strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
+    if strange:
+        raise ValueError(f"{answer!r}: what is {strange[0]!r}? Wanted are numbers alone: {', '.join(names)}")
+    numbers = [float(number.replace(",", ".")) for number in ANSWER_NUMBER_PATTERN.findall(answer)]
+    if not (len(names) if least is None else least) <= len(numbers) <= len(names):
+        count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
+        raise ValueError(f"{answer!r}: {count}; wanted are, with blanks between them: {', '.join(names)}")
+    return numbers
+
+
+def format_answer_number(value: float) -> str:
+    """A number as it is typed."""
+    return f"{value:.10g}"

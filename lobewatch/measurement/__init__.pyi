@@ -1,0 +1,38 @@
+"""One tap test or one recorded file to what it measures: modes, followed mode, calibrated model; questions; workers."""
+
+from .estimate import Estimate
+from .exponential_window import Window
+from .file_modes import FileModes, check_modes_together, fit_file_modes, list_comparison_files, match_modes_across_files
+from .spindle_model import (
+    ModelCalibration,
+    ModelMode,
+    ModelState,
+    ModelSummary,
+    build_model_state,
+    calibrate_model,
+    compute_model_frf,
+    first_critical_speed,
+    summarize_model,
+)
+from .tap_measurement import Measurement, measure
+
+__all__ = [
+    "Estimate",
+    "FileModes",
+    "Measurement",
+    "ModelCalibration",
+    "ModelMode",
+    "ModelState",
+    "ModelSummary",
+    "Window",
+    "build_model_state",
+    "calibrate_model",
+    "check_modes_together",
+    "compute_model_frf",
+    "first_critical_speed",
+    "fit_file_modes",
+    "list_comparison_files",
+    "match_modes_across_files",
+    "measure",
+    "summarize_model",
+]

@@ -1,0 +1,36 @@
+"""A value with its standard error, and by how much it has changed."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Estimate(NamedTuple):
+    """A value and its standard error, in any unit.
+
+    >>> first, now = Estimate(700.0, 0.5), Estimate(665.0, 0.5)  # Hz
+    >>> change = now.change_since(first)
+    >>> f"{change.value:.2f} +- {change.std:.2f} %"
+    '-5.00 +- 0.10 %'
+    """
+
+    value: float
+    """Value; NaN where it is not known."""
+    std: float = math.nan
+    """Standard error, same unit; NaN where it is not known."""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a value."""
+        return math.isfinite(self.value)
+
+    def change_since(self, then: Estimate) -> Estimate:
+        """Relative change (%), positive for a rise, with the standard error that both errors give it."""
+        ratio = self.value / then.value
+        error = math.hypot(then.std / then.value, self.std / self.value)
+        return Estimate(100 * (ratio - 1), 100 * abs(ratio) * error)
+
+
+UNKNOWN_ESTIMATE = Estimate(math.nan)
+"""No value."""

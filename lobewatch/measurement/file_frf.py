@@ -1,0 +1,139 @@
+"""Read the FRF of a recorded file with its hits."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from acquisition import (
+    DataError,
+    Description,
+    Fact,
+    Frf,
+    Hit,
+    HitFlags,
+    Remark,
+    check_hit,
+    estimate_frf,
+    infer_averages,
+    inspect_file,
+    read_frf,
+)
+from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
+from modal import ConjugateError, pick_peaks
+
+ACCEPTABLE_FLAGS = (
+    HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+)
+"""Verdicts that can be accepted: a hit with others has no single pulse, or not all of its scans."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileFrf:
+    """An FRF with the hits behind it."""
+
+    frf: Frf | None
+    """FRF as it was read, or the average of the hits; None where no force was measured."""
+    hits: tuple[Hit, ...] = ()
+    """Hits that it was averaged from; none where the file holds only an FRF."""
+    time_constant: float | None = None
+    """Time constant of the window that was laid over all hits here (s); None where none was."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what was done to the hits."""
+    facts: tuple[Fact, ...] = ()
+    """Facts known of the file, and where each is from."""
+    recorded_window: float | None = None
+    """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
+
+
+def read_file_frf(
+    path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
+) -> FileFrf:
+    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `fit_file_modes`.
+
+    window, conjugate: as they are said, so that what is missing of them is asked for with all else.
+    """
+    accepted, averages, description = (
+        _parse_accepted_flags(accept),
+        description.averages,
+        replace(description, averages=None),
+    )
+    recording = inspect_file(path, description)
+    if recording.problems:
+        phase = "" if conjugate else _check_phase(path, description)
+        raise DataError(f"{path}: {recording.problems}{missing_window_text(recording.window, window)}{phase}")
+    if recording.frf is not None:
+        facts = tuple(fact for fact in recording.facts if fact.name != "averages")
+        return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
+    if averages is not None:
+        raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+    frf = _average_hits(path, recording.hits, accepted, description)
+    return replace(frf, facts=recording.facts, recorded_window=recording.window)
+
+
+def _check_phase(path: Path, description: Description) -> str:
+    """What is wrong with the phase of an FRF that only its unit or its number is missing of; empty where nothing is."""
+    unit, response = description.unit or "m/N", description.response or 1
+    frf = inspect_file(path, replace(description, unit=unit, response=response)).frf
+    try:
+        if frf is not None:
+            pick_peaks(frf)
+    except ConjugateError as error:
+        return f"; {error}"
+    except ValueError:
+        return ""
+    return ""
+
+
+def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
+    verdicts = [check_hit(hit) for hit in hits]
+    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
+    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
+    if refused:
+        text = f"{refused} of {len(hits)} hits are averaged though they were refused"
+        frf = estimate_frf(good) if good[0].has_force else None
+        return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
+    if good and not good[0].has_force:
+        return FileFrf(None, tuple(good))
+    try:
+        return FileFrf(read_frf(path, description), tuple(good))
+    except DataError:
+        ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
+        if not ringing or not hits[0].has_force:
+            raise
+        return _average_ringing_hits(ringing)
+
+
+def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
+    flags = {flag.words.replace(" ", "-"): flag for flag in ACCEPTABLE_FLAGS}
+    accepted = HitFlags.OK
+    for code in codes:
+        if code not in flags:
+            raise ValueError(f"--accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}")
+        accepted |= flags[code]
+    return accepted
+
+
+def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
+    frf, windowed, tau = window_ringing_hits(hits)
+    remark = own_window_remark("", tau, "a longer record needs none; --accept not-decayed takes the hits as they are")
+    return FileFrf(frf, windowed, tau, (remark,))
+
+
+def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
+    """An FRF of a file with the number of hits behind its coherence: as asked, else as the file says, else inferred."""
+    if averages is not None:
+        if averages < 1:
+            raise ValueError(f"--averages {averages}: give the number of hits averaged, 1 or more")
+        if frf.coherence is None:
+            raise ValueError(f"--averages {averages}: {path.name} has no coherence to use it with; leave it out")
+        return FileFrf(replace(frf, n_averages=averages))
+    if frf.coherence is None or frf.n_averages > 1:
+        return FileFrf(frf)
+    inferred, cure = infer_averages(frf), "give it with --averages"
+    if inferred is None:
+        text = "the coherence is not used: the number of averages is not known and cannot be inferred"
+        return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))
+    text = f"about {inferred} averages, inferred from the coherence and the scatter from line to line"
+    return FileFrf(replace(frf, n_averages=inferred), remarks=(Remark("averages-inferred", "", text, cure),))

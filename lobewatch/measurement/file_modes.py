@@ -1,0 +1,234 @@
+"""Fit the modes of a recorded file and match them with other files."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import DataError, Description, Fact, Frf, Remark, correct_windowed_receptance, remove_sensor_mass
+from dsm import format_with_error
+from lobewatch.machine import NO_MODE_EDITS
+from lobewatch.machine.settings.setup_tables import SensorLoading
+from lobewatch.measurement.exponential_window import (
+    Window,
+    hidden_window_remarks,
+    refit_ringing_modes,
+    remove_own_window,
+    remove_recorded_window,
+    resolve_window,
+)
+from lobewatch.measurement.file_frf import FileFrf, read_file_frf
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.tap_measurement import mode_edits_remark
+from modal import (
+    Extraction,
+    Mode,
+    ModeEdits,
+    common_delay,
+    edit_modes,
+    extract_modes,
+    find_peaks_above_band,
+    find_truncated_peaks,
+    match_modes,
+    modes_from_decays,
+    modes_from_extraction,
+    pick_peaks,
+)
+
+UNKNOWN_SENSOR = SensorLoading()
+"""An accelerometer that nobody says anything of."""
+MAX_LISTED_PEAKS = 6
+"""Peaks beyond the usable band that are named one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileModes:
+    """The modes of one recorded file."""
+
+    path: Path
+    """Path that it was read from."""
+    frf: Frf | None
+    """Average of its hits, or the FRF that it holds; None where no force was measured."""
+    extraction: Extraction
+    """Bands and models that the modes were extracted with."""
+    as_recorded: tuple[Mode, ...]
+    """Modes by least squares, the damping of an exponential window still in them."""
+    fitted: tuple[Mode, ...]
+    """Modes by least squares, without the damping of the window."""
+    picked: tuple[Mode, ...]
+    """Modes by the peak picking of the paper, for comparison."""
+    remarks: tuple[Remark, ...]
+    """Remarks on all modes together, and on those that are missing."""
+    facts: tuple[Fact, ...] = ()
+    """Facts known of the file, and where each is from."""
+    by_hand: ModeEdits = NO_MODE_EDITS
+    """What a person said of its modes."""
+
+
+def fit_file_modes(
+    path: Path,
+    band: tuple[float, float] | None = None,
+    *,
+    window: Window | None = None,
+    conjugate: bool = False,
+    accept: Collection[str] = (),
+    description: Description | None = None,
+    by_hand: ModeEdits = NO_MODE_EDITS,
+    sensor: SensorLoading = UNKNOWN_SENSOR,
+) -> FileModes:
+    """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
+
+    window: exponential window on the response, to be corrected; else that which the file names. conjugate: the file
+    holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
+    description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
+    still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
+    otherwise, else the modes that do. by_hand: modes that a person adds, leaves out, or holds at what they are without
+    any window. sensor: accelerometer whose mass is taken off. Hits without force tell no stiffness, and are taken as
+    they are: no window, no mass taken off.
+
+    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
+    verdicts that cannot be accepted, and what `edit_modes` refuses.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> modes = synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(100.0, 1000.0))
+    >>> with TemporaryDirectory() as folder:
+    ...     new_table = np.column_stack([modes.frequency, modes.receptance.real, modes.receptance.imag])
+    ...     names = "frequency [Hz],real [m/N],imag [m/N]"
+    ...     np.savetxt(f"{folder}/frf.csv", new_table, delimiter=",", header=names, comments="")
+    ...     read = fit_file_modes(Path(folder) / "frf.csv")
+    >>> [f"{mode.frequency:.1f} Hz, K = {mode.stiffness / 1e6:.1f} N/um" for mode in read.fitted]
+    ['500.0 Hz, K = 20.0 N/um']
+    """
+    file_frf = read_file_frf(path, accept, description or Description(), window, conjugate=conjugate)
+    if file_frf.frf is None:
+        if window is not None or conjugate:
+            raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")
+        return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
+    frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
+    hits = () if conjugate else file_frf.hits
+    window = resolve_window(file_frf.recorded_window, window)
+    delay = None if window is None else window.delay(file_frf.hits)
+    frf = frf if window is None else correct_windowed_receptance(frf, window.time_constant)
+    tau = file_frf.time_constant if window is None else window.time_constant
+    edits = by_hand if tau is None else by_hand.with_window(tau)
+
+    def fit(bare: Frf) -> FrfFit:
+        state = edit_modes(extract_modes([bare], band), edits)
+        return FrfFit(
+            state, tuple(modes_from_extraction(state, [hits])), (mode_edits_remark(by_hand),) if by_hand else ()
+        )
+
+    extraction, modes, said = fit_without_sensor_mass(frf, sensor, fit)
+    mass, fitted = extraction.frf.mass_removed, modes
+    frf = remove_sensor_mass(frf, mass)
+    if window is not None and delay is not None:
+        fitted, windowed = remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
+    elif file_frf.time_constant is not None:
+        fitted, windowed = tuple(remove_own_window(modes, file_frf.time_constant)), ()
+    else:
+        windowed = tuple(hidden_window_remarks(hits, modes))
+        if not accept:
+            fitted, ringing = refit_ringing_modes(modes, hits, band, mass)
+            windowed += ringing
+    return FileModes(
+        path=path,
+        frf=frf,
+        extraction=extraction,
+        as_recorded=modes,
+        fitted=fitted,
+        picked=tuple(pick_peaks(frf, band)),
+        remarks=(*file_frf.remarks, *said, *windowed, *_fit_remarks(modes, frf, band)),
+        facts=file_frf.facts,
+        by_hand=by_hand,
+    )
+
+
+def _fit_decay_modes(
+    path: Path, decays: FileFrf, band: tuple[float, float] | None, by_hand: ModeEdits, sensor: SensorLoading
+) -> FileModes:
+    """Modes of hits whose force nobody measured; DataError where a window that the file names adds damping to them."""
+    if decays.recorded_window is not None:
+        raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
+    state = edit_modes(extract_decay_modes(decays.hits, band), by_hand)
+    modes = tuple(modes_from_decays(state))
+    said = (*([mode_edits_remark(by_hand)] if by_hand else []), *decay_remarks(sensor))
+    remarks = (*decays.remarks, *said, *_fit_remarks(modes, state.frf, band))
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
+
+
+def _frequency_step(frf: Frf) -> float:
+    return float(np.mean(np.diff(frf.frequency)))
+
+
+def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
+    yield from check_modes_together(modes)
+    for edge in find_truncated_peaks(frf, modes, band):
+        text = "a peak may be cut by the edge of the lines, its mode missing"
+        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
+    if band is None:
+        yield from _peaks_beyond_remarks(frf)
+    if not modes:
+        yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
+
+
+def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
+    """Peaks that are not fitted because the force hardly reached them."""
+    peaks = find_peaks_above_band(frf)
+    if frf.usable_band is None or not peaks:
+        return
+    where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
+    if len(peaks) > MAX_LISTED_PEAKS:
+        where = f"{len(peaks)} places from {peaks[0]:.0f} to {peaks[-1]:.0f}"
+    text = f"peaks at {where} Hz lie beyond the usable band, which ends at {frf.usable_band[1]:.0f} Hz: not fitted"
+    yield Remark("peaks-beyond", "", text, "a harder tip reaches higher")
+
+
+def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
+    """Remarks on all modes of an FRF together."""
+    return [*_check_signs(modes), *_check_delay(modes)]
+
+
+def _check_signs(modes: Sequence[Mode]) -> Iterator[Remark]:
+    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
+        text = "every K is negative: hammer or sensor is mounted or wired the other way round"
+        yield Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")
+
+
+def _check_delay(modes: Sequence[Mode]) -> Iterator[Remark]:
+    delay = common_delay(modes)
+    if delay is not None:
+        late = format_with_error(delay.skew, delay.skew_std, 1e-6)
+        text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
+        cure = "measure it with lobewatch sensors --skew, or add that to skew_us of the accelerometer in machine.toml"
+        yield Remark("channel-delay", "", text, cure)
+
+
+def list_comparison_files(
+    beside: Sequence[str], file: Path, description: Description
+) -> list[tuple[Path, Description]]:
+    """Files, and what they do not say: each of beside is a file, or the number of another response of this one."""
+    return [
+        (file, replace(description, response=int(text))) if text.isdecimal() else (Path(text), description)
+        for text in beside
+    ]
+
+
+def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], others: Sequence[FileModes]) -> FileModes:
+    """The modes of a file, each with how many of the others have it too; beside: what each of these was named by.
+
+    ValueError where two are the same measurement.
+    """
+    for place, (text, other) in enumerate(zip(beside, others, strict=True)):
+        if any(_is_same_measurement(other, one) for one in (file_modes, *others[:place])):
+            raise ValueError(f"--beside {text}: the same numbers are looked at already; name another measurement")
+    found = [other.fitted for other in others]
+    as_recorded, fitted = (tuple(match_modes(modes, found)) for modes in (file_modes.as_recorded, file_modes.fitted))
+    return replace(file_modes, as_recorded=as_recorded, fitted=fitted)
+
+
+def _is_same_measurement(one: FileModes, other: FileModes) -> bool:
+    return np.array_equal(one.extraction.frf.receptance, other.extraction.frf.receptance)

@@ -1,0 +1,314 @@
+"""Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip.
+
+recorded with its reason, and the next one goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cache
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from acquisition import CROSS_TAP, Frf, Remark, TapTest
+from dsm import Calibration, calibrate, format_rounded, modal_stiffness
+from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
+from lobewatch.measurement.exponential_window import hidden_window_remarks
+from lobewatch.measurement.recording_questions import (
+    check_band_coverage,
+    check_frequency_jump,
+    check_model_stiffness,
+    check_stiffness_jump,
+    no_mode_remark,
+)
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from modal import (
+    CredibleModes,
+    Extraction,
+    Mode,
+    ModeEdits,
+    edit_modes,
+    extract_modes,
+    follow_mode,
+    modes_from_decays,
+    modes_from_extraction,
+    predominant_mode,
+    select_credible_modes,
+)
+
+EDITS_NOT_APPLIED_CODE = "hand-not-applied"
+MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
+"""Codes of the remarks on what a person said of the modes of a tap test, which they are about."""
+BEARING_STIFFNESS_RANGE = (1e5, 1e11)
+"""Range that is believed of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
+MAX_STIFFNESS_CHANGE_RATIO = 2.0
+"""K of one test over that of the one before of the series, or the inverse, above which nothing is calibrated.
+
+Wear of 10 % in frequency takes a third off K, tests scatter by a tenth, the smallest mistake of a unit is 4.4."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One tap test as it is understood: modes, the mode followed, the model recalibrated to it."""
+
+    tap_id: str
+    """Identity of the tap test."""
+    time: datetime
+    """Time of the tap test."""
+    tool: str
+    """Tool in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    modes: Sequence[Mode] = ()
+    """All modes found, as measured."""
+    followed: Mode | None = None
+    """Mode that calibration and trend follow; None where there is none."""
+    calibration: Calibration | None = None
+    """Model recalibrated to the mode followed; None where that was not possible or is not believed."""
+    at_tip: Sequence[Mode] = ()
+    """Modes that lobes are computed from, at the tool tip; empty where there are none."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what could not be done, and on what is in doubt."""
+    cross: Sequence[Mode] | None = None
+    """Modes of a cross tap at the tool tip, signed; None of another tap, and where it was not at the tip."""
+
+
+@dataclass(frozen=True, eq=False)
+class TapFit:
+    """The modes of one tap test, fitted by itself, whatever other tests say."""
+
+    tap_id: str
+    """Identity of the tap test."""
+    time: datetime
+    """Time of the tap test."""
+    tool: str
+    """Tool in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    modes: Sequence[Mode] = ()
+    """All modes found, as measured."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what is in doubt, and why there are no modes."""
+    failed: bool = False
+    """Whether the fit was not possible at all."""
+
+
+@cache
+def _thread_controller() -> ThreadpoolController:
+    """The numerical libraries of this process, looked for once: that takes longer than many a fit."""
+    return ThreadpoolController()
+
+
+def measure(
+    tap: TapTest, machine: Machine, last: Mode | None = None, by_hand: ModeEdits = NO_MODE_EDITS
+) -> Measurement:
+    """Measurement of one tap test; last: the mode that was followed in the test before; by_hand: as `fit_tap`."""
+    return interpret_fit(fit_tap(tap, machine, by_hand), machine, last)
+
+
+def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) -> TapFit:
+    """The modes of one tap test: most of the work, and the part that needs no other tap test.
+
+    by_hand: what a person said of its modes; where that cannot be done the modes are those of the fit, and a remark
+    says so.
+    """
+    about, band = tap.circumstances, None if tap.frf is None else check_band_coverage(tap.frf, machine)
+    remarks = () if band is None else (band,)
+    named = (tap.id, about.created, about.tool, about.direction)
+    with _thread_controller().limit(limits=1):
+        try:
+            if tap.frf is None:
+                fitted = _fit_decays(tap, machine, by_hand)
+                return TapFit(*named, fitted.modes, fitted.remarks)
+            fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
+            windows = hidden_window_remarks(tap.accepted, fitted.modes)
+            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
+        except ValueError as error:
+            failure = Remark("no-modes", "", f"no modes: {error}")
+            return TapFit(*named, (), (*remarks, failure, no_mode_remark((), machine)), failed=True)
+
+
+def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
+    state, remarks = _apply_edits(extract_modes([frf]), by_hand)
+    return FrfFit(state, tuple(modes_from_extraction(state, [tap.accepted])), remarks)
+
+
+def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
+    """Modes of a tap test without force."""
+    state, remarks = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
+    return FrfFit(state, tuple(modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
+
+
+def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
+    """An extraction as a person says, or as it is where that cannot be done, with a remark."""
+    if not by_hand:
+        return state, ()
+    try:
+        return edit_modes(state, by_hand), (mode_edits_remark(by_hand),)
+    except ValueError as error:
+        cure = "say it anew with lobewatch modes MACHINE TAP, or --by-fit to take it back"
+        return state, (Remark("hand-not-applied", str(by_hand), str(error), cure),)
+
+
+def mode_edits_remark(by_hand: ModeEdits) -> Remark:
+    """Remark on modes that a person chose."""
+    return Remark("modes-by-hand", str(by_hand), "modes chosen by hand")
+
+
+def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
+    """Measurement that follows from the modes of a tap test; last: the mode that was followed in the test before."""
+    if fit.direction == CROSS_TAP:
+        return _interpret_cross_tap(fit, machine, last)
+    remarks, modes = [*fit.remarks], fit.modes
+    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
+    if fit.failed:
+        return Measurement(*named, remarks=fit.remarks)
+    with _thread_controller().limit(limits=1):
+        trusted = select_credible_modes(_select_in_band(modes, machine))
+        remarks += trusted.remarks
+        followed = _follow_mode(trusted, modes, machine, remarks, last)
+        calibration = _calibrate(followed, machine, fit.tool, remarks, last)
+        at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
+    return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
+
+
+def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
+    """What a cross tap says: modes of either sign, none where x and y do not move each other. It calibrates nothing."""
+    signed = _select_in_band(fit.modes, machine)
+    plain = [replace(mode, stiffness=abs(mode.stiffness)) for mode in signed]
+    trusted = select_credible_modes(plain)
+    cross = [mode for mode, size in zip(signed, plain, strict=True) if size in trusted.modes]
+    followed = predominant_mode(trusted.modes) if last is None else follow_mode(last, trusted.modes).mode
+    remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
+    if machine.tap.position_mm:
+        text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
+        remarks.append(Remark("cross-beside-tip", "", text, "tap across at the tip"))
+    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
+    knows_size = all(mode.has_stiffness for mode in cross)
+    at_tip = cross if knows_size and not machine.tap.position_mm else None
+    said = (*remarks, *trusted.remarks)
+    return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=said)
+
+
+def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    return [mode for mode in modes if low <= mode.frequency <= high]
+
+
+def _follow_mode(
+    trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
+) -> Mode | None:
+    """The believed mode that continues the last one, the predominant one where there is none yet."""
+    mode = predominant_mode(trusted.modes)
+    if mode is None:
+        remarks.append(no_mode_remark(modes, machine))
+    elif last is not None:
+        mode = _continue_mode(last, mode, trusted.modes, remarks)
+    return mode
+
+
+def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
+    """The candidate that is like the last mode; now: the predominant one, which is taken, and asked about, where none
+    is and it is far off."""
+    next_mode = follow_mode(last, candidates)
+    jump = check_frequency_jump(last, now) if next_mode.mode is None else None
+    if jump is not None:
+        remarks.append(jump)
+        return now
+    remarks += [] if next_mode.mode is None else filter(None, [check_stiffness_jump(last, next_mode.mode)])
+    cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if next_mode.mode is None else ""
+    remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
+    return next_mode.mode
+
+
+def _calibrate(
+    followed: Mode | None, machine: Machine, tool: str, remarks: list[Remark], last: Mode | None
+) -> Calibration | None:
+    if followed is None:
+        return None
+    std = float(followed.standard_error[0])
+    try:
+        spindle = machine.model(tool)
+        calibration = calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
+    except (ValueError, ArithmeticError) as error:
+        remarks.append(Remark("no-bearing-stiffness", "", f"no bearing stiffness: {error}"))
+        return None
+    doubt = _check_calibration(calibration, followed, last)
+    remarks += [] if doubt is None else [doubt]
+    if doubt is None and last is None and followed.has_stiffness:
+        of_model = modal_stiffness(calibration.spindle, calibration.mode, machine.tap.position_mm / 1e3)
+        remarks += filter(None, [check_model_stiffness(followed, of_model)])
+    return calibration if doubt is None else None
+
+
+def _check_calibration(calibration: Calibration, followed: Mode, last: Mode | None) -> Remark | None:
+    """Why a calibration is not believed; None where it is."""
+    low, high = BEARING_STIFFNESS_RANGE
+    before = followed.stiffness if last is None else last.stiffness
+    ratio = followed.stiffness / before if followed.has_stiffness and not math.isnan(before) else 1.0
+    if not low <= calibration.bearing_stiffness <= high:
+        stiffness = format_rounded(calibration.bearing_stiffness, scale=1e6, digits=3)
+        text = f"bearing stiffness {stiffness} N/um is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
+        cure = "compare [spindle] with the drawing, and [mode] model_mode with the mode that is tapped"
+    elif not 1 / MAX_STIFFNESS_CHANGE_RATIO <= ratio <= MAX_STIFFNESS_CHANGE_RATIO:
+        then, now = (format_rounded(stiffness, scale=1e6, digits=3) for stiffness in (before, followed.stiffness))
+        text = f"stiffness was {then} N/um in the test before, is {now} now, {ratio:.2g} times as much"
+        cure = "tap again; compare the sensitivities of hammer and accelerometer, and where it was tapped"
+    else:
+        return None
+    return Remark("calibration-not-believed", "", f"bearing stiffness unknown: {text}", cure)
+
+
+def _transfer_to_tip(
+    trusted: CredibleModes,
+    followed: Mode | None,
+    calibration: Calibration | None,
+    machine: Machine,
+    remarks: list[Remark],
+) -> list[Mode]:
+    """Believed modes, carried to the tip by the model where the tap was elsewhere; none where one has K < 0."""
+    if not trusted.modes or not all(mode.has_stiffness for mode in trusted.modes):
+        return []
+    if trusted.opposed:
+        where = ", ".join(f"{mode.frequency:.0f}" for mode in trusted.opposed)
+        text = f"no stability lobes: not a driving point, the stiffness of the modes at {where} Hz is negative"
+        cure = "hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
+        remarks.append(Remark("no-lobes-driving-point", "", text, cure))
+        return []
+    if machine.tap.position_mm == 0:
+        return list(trusted.modes)
+    if calibration is None or followed is None:
+        text = "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and no model is calibrated"
+        remarks.append(Remark("no-lobes-beside-tip", "", text, "tap at the tip, or add a [spindle]"))
+        return []
+    return [_scale_to_tip(followed, calibration, machine.tap.position_mm / 1e3)]
+
+
+def _scale_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
+    number = calibration.mode
+    ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
+    return mode.scaled(1.0, ratio, "model to tip")
+
+
+def is_fit_of(answer: object, entry: TapEntry) -> bool:
+    """Whether it is one of this tap test with modes that may be. A wrong value that could be right is not seen."""
+    return (
+        isinstance(answer, TapFit)
+        and (answer.tap_id, answer.time.isoformat()) == (entry.id, entry.time)
+        and (answer.tool, answer.direction) == (entry.tool, entry.direction)
+        and isinstance(answer.failed, bool)
+        and all(isinstance(remark, Remark) for remark in answer.remarks)
+        and all(isinstance(mode, Mode) and _is_valid_mode(mode) for mode in answer.modes)
+    )
+
+
+def _is_valid_mode(mode: Mode) -> bool:
+    try:
+        replace(mode)  # what has come from elsewhere was never checked
+    except (TypeError, ValueError):
+        return False
+    return True

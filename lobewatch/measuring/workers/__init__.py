@@ -1,1 +1,0 @@
-"""Work shared among processes: this one, several of this computer, or the workers of a Dask cluster."""

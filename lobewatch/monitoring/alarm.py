@@ -1,0 +1,109 @@
+"""Alarms: raised and closed by what was measured, acknowledged by a person.
+
+Imported with every look at a plant, so without numpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Any, NamedTuple
+
+import msgspec
+
+from acquisition import Remark
+from lobewatch.machine.journal.entries import Acknowledgement, format_alarm_id
+
+
+class Alarm(msgspec.Struct, frozen=True):
+    """A reason that rings. Its identity is what rings, of what, and the tap test that first raised it."""
+
+    code: str
+    """Code of the reason."""
+    about: str
+    """Series or program."""
+    triggered_by: str
+    """Identity of the tap test that raised it."""
+    triggered_at: datetime
+    """Time of that tap test."""
+    acknowledgement: Acknowledgement | None = None
+    """Newest word of a person on it; None where there is none."""
+
+    @property
+    def id(self) -> str:
+        """Name of the alarm for people and other programs, without blanks."""
+        return format_alarm_id(self.code, self.about, self.triggered_by)
+
+    def is_about(self, remark: Remark) -> bool:
+        """Whether it rings for a reason."""
+        return (self.code, self.about) == (remark.code, remark.about)
+
+    def is_acknowledged(self, now: datetime) -> bool:
+        """Whether it is acknowledged at a time."""
+        return self.acknowledgement is not None and self.acknowledgement.is_active_at(now)
+
+    def to_row(self, now: datetime) -> dict[str, Any]:
+        """Fields for other programs; times are ISO 8601, `acknowledged` is null where it is not quiet."""
+        word = self.acknowledgement if self.is_acknowledged(now) else None
+        return {
+            "id": self.id,
+            "code": self.code,
+            "about": self.about,
+            "raised_by": self.triggered_by,
+            "raised": self.triggered_at.isoformat(),
+            "acknowledged": word
+            and {
+                "time": word.time.isoformat(),
+                "operator": word.operator,
+                "until": word.until and word.until.isoformat(),
+                "note": word.note,
+            },
+        }
+
+
+class TriggeredAlarm(NamedTuple):
+    """A reason that rings, and the tap test that first raised it."""
+
+    remark: Remark
+    """Reason."""
+    tap_id: str
+    """Identity of the tap test."""
+    time: datetime
+    """Time of the tap test."""
+
+    def build_alarm(self, acknowledgements: Iterable[Acknowledgement], baseline: datetime | None) -> Alarm:
+        """The alarm, with the newest acknowledgement of the same one: it was open when that was given, and has not been
+        closed since, whatever was excluded or included meanwhile."""
+        code, about = self.remark.code, self.remark.about
+        given = [
+            word
+            for word in acknowledgements
+            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest
+        ]
+        return Alarm(code, about, self.tap_id, self.time, given[-1] if given else None)
+
+
+def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:
+    """The reasons, those that are acknowledged at a time with that in their text."""
+    return tuple(_add_acknowledgement(remark, alarms, now) for remark in remarks)
+
+
+def _add_acknowledgement(remark: Remark, alarms: Sequence[Alarm], now: datetime) -> Remark:
+    words = [alarm.acknowledgement for alarm in alarms if alarm.is_about(remark) and alarm.is_acknowledged(now)]
+    return replace(remark, text=f"{remark.text} ({words[0]})") if words else remark
+
+
+def select_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:
+    """All that ring, or the open one with this identity, or this part of one; ValueError where none or several fit."""
+    if not alarms:
+        raise ValueError("nothing rings on this machine: there is nothing to acknowledge")
+    exact = [alarm for alarm in alarms if alarm.id == name]
+    fitting = exact or [alarm for alarm in alarms if (name in alarm.id if name else not alarm.is_acknowledged(now))]
+    names = ", ".join(alarm.id for alarm in alarms)
+    if not fitting and not name:
+        raise ValueError(f"all is acknowledged already; name the alarm to say something else of it: {names}")
+    if not fitting or (name and len(fitting) > 1):
+        what = f"part of {len(fitting)} alarms" if fitting else "no such alarm"
+        raise ValueError(f"{name!r}: {what}; open are {names}")
+    return fitting

@@ -1,0 +1,299 @@
+"""Detect drops and rises in a series with a change-point model.
+
+Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality
+Technology 35(4), with hinges beside the steps, one-sided.
+
+anew.
+
+Two points running that are sure of a fall raise an alarm; four running that are not close it. Nothing else does: no
+rise, and nothing that was done to the machine. A sure rise begins the watch anew at the point that was sure of it, for
+among the lower points before no fall would be seen any more. (From where it seems to have risen, chance rises would
+begin it at their highest points, and a third of them would end as a fall.) An alarm that is open goes on to be judged
+by its own watch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobewatch.monitoring.level_model import LevelModel, build_level_model
+from lobewatch.monitoring.series_points import Readings
+
+MIN_MONITORED_POINTS = 9
+"""Number of points before which nothing is judged; chosen."""
+MIN_POINTS_WITH_PRIOR = 5
+"""The same where something is known of the scatter beforehand; chosen."""
+SURE_CHANGE_SCORE = 3.3
+"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is looked at."""
+MIN_SHARED_CHANGE = 0.5
+"""Least share of what two series did on the mean that one of them did, where that counts for it; chosen."""
+SCORE_BLOCK_ROWS = 64
+"""Number of points that are judged at once, to bound the memory."""
+
+Floats = NDArray[np.float64]
+ChangeKind = Literal["step", "slope"]
+CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
+MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
+"""Least number of points before a change of each kind, and from it on."""
+
+
+class SeriesChange(NamedTuple):
+    """A change of a series, as it is fitted to a number of its points."""
+
+    kind: ChangeKind
+    """Kind: fallen at once, or falling since."""
+    point: int
+    """Index of the first point after the step, or of the last one before the slope."""
+    size: float
+    """Fall from there to the last point fitted, in the unit of the series."""
+    half_width: float
+    """Half the width of the 95 % interval of the size."""
+
+
+class LikeliestChange(NamedTuple):
+    """The likeliest change in the points up to each of some of them."""
+
+    score: Floats
+    """Score: how ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
+    is_step: NDArray[np.bool_]
+    """Whether the change is a step, shape (r,)."""
+    point: NDArray[np.intp]
+    """Index of its point as in Fall, shape (r,)."""
+
+    @classmethod
+    def of_none(cls, n: int) -> Self:
+        """Where no point is judged."""
+        return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeMonitor:
+    """Judgement on the points of a series, one after the other."""
+
+    level_model: LevelModel
+    """Base of the fits."""
+    change: LikeliestChange
+    """Likeliest change up to each point; the score of the first ones, which are not judged, is NaN."""
+    sign: int
+    """1 where it looks for falls, -1 where for rises."""
+
+    @property
+    def scores(self) -> Floats:
+        """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape
+        (n,); NaN before the 9th, before the 5th where something is known of the scatter beforehand."""
+        return self.change.score
+
+    @cached_property
+    def is_sure(self) -> NDArray[np.bool_]:
+        """Whether each point is sure of a change, shape (n,)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.scores >= SURE_CHANGE_SCORE)
+
+    @property
+    def first_alarm(self) -> int | None:
+        """Index of the first point that is sure of a change as the one before it was; None where there is none."""
+        return next(self.alarms_from(0), None)
+
+    def alarms_from(self, first: int) -> Iterator[int]:
+        """Points from one on that are sure of a change as the ones before them were."""
+        begin = max(first, 1)
+        return (begin + int(i) for i in np.flatnonzero(self.is_sure[begin:] & self.is_sure[begin - 1 : -1]))
+
+    def change_at(self, alarm: int) -> SeriesChange:
+        """The change that a point is sure of: kind and beginning as it sees them, size by all points."""
+        return _fit_change(self.level_model, self.change, alarm, self.sign)
+
+
+def find_newest_change(y: Floats) -> SeriesChange | None:
+    """The fall, or with a negative size the rise, that the last two points (n,) are both sure of; None without one."""
+    if y.size <= MIN_MONITORED_POINTS:
+        return None
+    base = build_level_model(Readings(y))
+    for sign, change in zip((1, -1), _find_likeliest_changes(base, np.arange(y.size - 2, y.size)), strict=True):
+        if (change.score >= SURE_CHANGE_SCORE).all():
+            fall = _fit_change(base, change, -1, sign)
+            return fall._replace(size=sign * fall.size)
+    return None
+
+
+def monitor_drops(readings: Readings) -> ChangeMonitor:
+    """Judge a series point after point: whether it falls."""
+    return monitor_drops_and_rises(readings)[0]
+
+
+def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMonitor]:
+    """Judge a series likewise, and its mirror image: whether it rises.
+
+    What the mean of both directions did is looked at beside what the one did alone.
+    """
+    base, common, shared = (
+        build_level_model(readings),
+        build_level_model(readings.mean_of_directions),
+        readings.shared_points,
+    )
+    pairs = zip(_score_points(base), _score_points(common), strict=True)
+    falls, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
+    return ChangeMonitor(base, falls, 1), ChangeMonitor(base, rises, -1)
+
+
+def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
+    """The likeliest fall, and the likeliest rise, up to each point."""
+    first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
+    last = np.arange(first - 1, base.y.size)
+    falls, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
+    if last.size:
+        for every, judged in zip((falls, rises), _find_likeliest_changes(base, last), strict=True):
+            for values, part in zip(every, judged, strict=True):
+                values[last] = part
+    return falls, rises
+
+
+def _merge_directions(
+    base: LevelModel,
+    alone: LikeliestChange,
+    common: LevelModel,
+    together: LikeliestChange,
+    shared: NDArray[np.intp],
+) -> LikeliestChange:
+    """The surer of what a series did alone and what the mean of both directions did, where the series did that too.
+
+    shared: points of the series that the mean has. Who looks twice is told of chance twice as often.
+    """
+    n = np.flatnonzero(np.isfinite(together.score)) + 1
+    last, fell, middle = shared[n - 1], together.is_step[n - 1], together.point[n - 1]
+    own, mean = base.change_sizes(fell, last + 1, shared[middle]), common.change_sizes(fell, n, middle)
+    shares = own * mean >= MIN_SHARED_CHANGE * mean**2
+    counts = shares & ~(together.score[n - 1] <= alone.score[last])
+    merged = LikeliestChange(alone.score.copy(), alone.is_step.copy(), alone.point.copy())
+    for values, part in zip(merged, (together.score[n - 1], fell, shared[middle]), strict=True):
+        values[last[counts]] = part[counts]
+    merged.score[last] = -scipy.special.ndtri(np.minimum(2 * scipy.special.ndtr(-merged.score[last]), 1.0))
+    return merged
+
+
+def _find_likeliest_changes(base: LevelModel, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
+    """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
+    blocks = [
+        _find_largest_changes(base, last[begin : begin + SCORE_BLOCK_ROWS] + 1)
+        for begin in range(0, last.size, SCORE_BLOCK_ROWS)
+    ]
+    points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
+    fall, rise = (_choose_likeliest(base, last + 1, points[i], sign * leans[i]) for i, sign in enumerate((-1, 1)))
+    return fall, rise
+
+
+def _find_largest_changes(base: LevelModel, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+    """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
+    k, rows = np.arange(n[-1]), np.arange(n.size)
+    points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
+    for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
+        lean = base.explained_root(CHANGE_KINDS[kind], n[:, np.newaxis], k)
+        outside = k[n[0] - behind :] > n[:, np.newaxis] - behind
+        for side, (worst, farthest) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
+            np.copyto(lean[:, n[0] - behind :], worst, where=outside)
+            lean[:, :before] = worst
+            points[side, kind] = farthest(lean, axis=1)
+            leans[side, kind] = lean[rows, points[side, kind]]
+    return points, leans
+
+
+def _choose_likeliest(
+    base: LevelModel, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats
+) -> LikeliestChange:
+    """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
+    t = [base.t_statistic(lean, n) for lean in leans]
+    scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
+    fell = t[0] >= t[1]
+    return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
+
+
+def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:
+    """The change up to one of the points, fitted to the whole series; at: index of that point."""
+    kind: ChangeKind = "step" if change.is_step[at] else "slope"
+    n, point = base.y.size, int(change.point[at])
+    beta, error = base.fit_change(kind, n, point)
+    length = n - 1 - point if kind == "slope" else 1
+    student = float(scipy.special.stdtrit(base.freedom(np.array([n]))[0], 0.975))
+    return SeriesChange(kind, point, -sign * beta * length, error * length * student)
+
+
+N_CLOSING_POINTS = 4
+"""Points running, none of them sure of the fall, that close an alarm; chosen."""
+
+
+class DetectedDrop(NamedTuple):
+    """A fall that has raised an alarm; points by their index in the series."""
+
+    triggered_at: int
+    """Point that raised it, the second one running that was sure."""
+    closed_at: int | None
+    """Point that closed it; None while it is open."""
+    change: SeriesChange
+    """Kind and beginning as they were when it was raised, size as it is now."""
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """What has been seen of a series."""
+
+    scores: Floats
+    """Score of each point in the watch of its time, shape (n,); NaN for the first 8 points of a watch."""
+    drops: tuple[DetectedDrop, ...]
+    """Falls that have raised an alarm, oldest first."""
+    rise: SeriesChange | None
+    """Newest sure rise, which the watch began anew with, its size positive; None where there is none."""
+
+    @property
+    def open_drops(self) -> tuple[DetectedDrop, ...]:
+        """Falls whose alarm is open."""
+        return tuple(fall for fall in self.drops if fall.closed_at is None)
+
+    @property
+    def needs_repeat(self) -> bool:
+        """Whether the newest point alone is sure of a fall."""
+        return not self.open_drops and self.scores.size > 0 and bool(self.scores[-1] >= SURE_CHANGE_SCORE)
+
+
+def detect_changes(readings: Readings) -> Detection:
+    """What is to be seen of a series."""
+    count = readings.y.size
+    scores, falls, rise = np.full(count, np.nan), list[DetectedDrop](), None
+    begin = judged = 0
+    while judged < count:
+        down, up = monitor_drops_and_rises(readings.since(begin))
+        end = count if up.first_alarm is None else begin + up.first_alarm + 1
+        scores[judged:end] = down.scores[judged - begin : end - begin]
+        falls += _find_drops(down, begin, judged, end)
+        judged = end
+        if up.first_alarm is not None:
+            seen = up.change_at(up.first_alarm)
+            rise, begin = seen._replace(point=begin + seen.point), begin + up.first_alarm
+    return Detection(scores, tuple(falls), rise)
+
+
+def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
+    """Falls that a watch from one point on raises an alarm for between two others."""
+    raised = next(watch.alarms_from(first - begin), None)
+    while raised is not None and begin + raised < end:
+        closed = _find_closing_point(watch, raised)
+        fall = watch.change_at(raised)
+        shifted = fall._replace(point=begin + fall.point)
+        yield DetectedDrop(begin + raised, None if closed is None else begin + closed, shifted)
+        raised = None if closed is None else next(watch.alarms_from(closed + 1), None)
+
+
+def _find_closing_point(watch: ChangeMonitor, raised: int) -> int | None:
+    """Point that closes an alarm."""
+    calm = 0
+    for point in range(raised + 1, watch.scores.size):
+        calm = 0 if watch.is_sure[point] else calm + 1
+        if calm == N_CLOSING_POINTS:
+            return point
+    return None

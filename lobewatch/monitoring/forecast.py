@@ -1,0 +1,256 @@
+"""When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
+
+Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
+averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No random
+numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobewatch.monitoring.level_model import build_level_model
+from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
+from lobewatch.monitoring.series_points import Readings
+from lobewatch.monitoring.trend_shapes import (
+    SHAPE_KINDS,
+    ShapeFits,
+    TrendShape,
+    fit_pair_shapes,
+    fit_single_shapes,
+    fit_triple_shapes,
+)
+
+MIN_FORECAST_POINTS = 8
+"""Number of points from which on anything is foretold; chosen."""
+CROSSING_QUANTILES = (0.1, 0.5, 0.9)
+"""Probabilities at which a level counts as reached: earliest, probable and latest date; chosen."""
+N_FORECAST_DATES = 241
+"""Number of dates looked at up to the horizon; between them the probability is interpolated."""
+
+DROPPED_SHAPE_WEIGHT = 1e-3
+"""Weight that all shapes that are left out have together."""
+MAX_FITTED_POINTS = 120
+"""Points that are fitted at most; of more the means of neighbours; chosen."""
+NEGLIGIBLE_PROBABILITY = 1e-12
+"""Probability that is as good as none."""
+RATE_QUANTILES = (0.025, 0.975)
+"""Probabilities of the interval of a rate."""
+QUANTILE_HALVINGS = 40
+"""Halvings of the range in which a quantile is looked for."""
+FAN_STANDARD_ERRORS = 50
+"""Standard errors around the means within which any level of a fan lies."""
+
+Floats = NDArray[np.float64]
+FitFamily = ShapeFits | RandomWalkFits
+"""Shapes of one sort, fitted to a series."""
+
+
+class DateRange(NamedTuple):
+    """Dates of the series between which a level is reached."""
+
+    earliest: float
+    """Date at a probability of 10 %; -inf where it is reached at the last point, inf where not before the horizon."""
+    probable: float
+    """Date at a probability of 50 %."""
+    latest: float
+    """Date at a probability of 90 %."""
+
+
+class Rate(NamedTuple):
+    """Rate of change of a series at its last point, in its unit for one of its dates."""
+
+    value: float
+    """Mean of the mixture; negative where it falls."""
+    low: float
+    """2.5 % quantile."""
+    high: float
+    """97.5 % quantile."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """The mixture of all courses that a series may take."""
+
+    shapes: tuple[TrendShape, ...]
+    """Shapes that were fitted, j of them."""
+    weight: Floats
+    """Weight of each shape, shape (j,), their sum 1."""
+    spread: float
+    """Standard deviation of the points around the shapes, in the unit of the series."""
+    fitted: Floats
+    """Mean of the mixture at the points themselves, shape (n,)."""
+    dates: Floats
+    """Dates from the last point to the horizon, shape (d,)."""
+    mean: Floats
+    """Mean of each shape at these dates, shape (j, d)."""
+    error: Floats
+    """Standard error of these means, shape (j, d)."""
+    freedom: Floats
+    """Degrees of freedom of the errors of each shape, shape (j,)."""
+
+    @property
+    def mean_line(self) -> Floats:
+        """Mean of the mixture at the dates, shape (d,)."""
+        return np.asarray(self.weight @ self.mean)
+
+    @property
+    def likeliest(self) -> TrendShape:
+        """The heaviest shape of the heaviest kind."""
+        kinds = np.array([shape.kind for shape in self.shapes])
+        heaviest = max(SHAPE_KINDS, key=lambda kind: self.weight[kinds == kind].sum())
+        return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
+
+    def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
+        """Probability that the series is below a level (one, or one a date; with its standard error) at the dates,
+        shape (d,)."""
+        away = level - self.mean
+        away /= np.hypot(self.error, error) if error else self.error
+        return np.asarray(self.weight @ _student_cdf(self.freedom, away))
+
+    def crossing_dates(self, level: float, error: float = 0.0) -> DateRange:
+        """Dates at which a level (with its standard error) is reached."""
+        chance = np.maximum.accumulate(self.probability(level, error))
+        return DateRange(*(self._first(chance, quantile) for quantile in CROSSING_QUANTILES))
+
+    def _first(self, chance: Floats, quantile: float) -> float:
+        above = int(np.searchsorted(chance, quantile))
+        if above in (0, chance.size):
+            return -np.inf if above == 0 else np.inf
+        return float(np.interp(quantile, chance[above - 1 : above + 1], self.dates[above - 1 : above + 1]))
+
+    def quantile_line(self, quantile: float) -> Floats:
+        """Level below which the series is with a probability at the dates, shape (d,)."""
+        low, high = (
+            (self.mean - FAN_STANDARD_ERRORS * self.error).min(axis=0),
+            (self.mean + FAN_STANDARD_ERRORS * self.error).max(axis=0),
+        )
+        for _ in range(QUANTILE_HALVINGS):
+            middle = (low + high) / 2
+            below = self.probability(middle) < quantile
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.asarray((low + high) / 2)
+
+
+def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
+    """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
+
+    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
+    """
+    return fit_past(dates, Readings(y, temperature)).forecast(horizon)
+
+
+@dataclass(frozen=True, eq=False)
+class PastFit:
+    """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
+
+    families: tuple[FitFamily, ...]
+    """Shapes that were fitted, their dates counted from the first point on."""
+    weight: Floats
+    """Weight of each shape, shape (j,), their sum 1."""
+    fitted: Floats
+    """Mean of the mixture at the points, shape (n,)."""
+    dates: Floats
+    """Dates of the points, shape (n,)."""
+    first_value: float
+    """Value of the first point."""
+    spread: float
+    """Standard deviation of the points around the shapes that do not wander, in the unit of the series."""
+
+    def forecast(self, horizon: float) -> Forecast:
+        """Forecast until a date."""
+        begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
+        at = np.linspace(span, min(max(horizon - begin, span), 3 * span), N_FORECAST_DATES)
+        mean, error = (np.concatenate(blocks) for blocks in zip(*(f.predict(at) for f in self.families), strict=True))
+        shapes = [shape for family in self.families for shape in family.shapes]
+        moved = tuple(shape._replace(start=shape.start + begin) for shape in shapes)
+        freedom = np.concatenate([family.freedom for family in self.families])
+        return Forecast(
+            moved, self.weight, self.spread, self.fitted, begin + at, mean + self.first_value, error, freedom
+        )
+
+    @property
+    def rate(self) -> Rate:
+        """Rate of change at its last point."""
+        rate, error = (np.concatenate(rates) for rates in zip(*(f.rate() for f in self.families), strict=True))
+        freedom = np.concatenate([family.freedom for family in self.families])
+        low, high = (_mixture_quantile(self.weight, rate, error, freedom, p) for p in RATE_QUANTILES)
+        return Rate(float(self.weight @ rate), low, high)
+
+
+def fit_past(dates: Floats, readings: Readings) -> PastFit:
+    """Fit all shapes to a series over its dates (n,), increasing; ValueError as that of `forecast_series`."""
+    at, y = dates - dates[:1].sum(), readings.y
+    if y.size < MIN_FORECAST_POINTS or at[-1] <= 0:
+        raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {MIN_FORECAST_POINTS}")
+    places = _average_neighbors(at)
+    base = build_level_model(_average_readings(readings))
+    families = [fit(base, places) for fit in (fit_single_shapes, fit_pair_shapes, fit_triple_shapes)]
+    kept, weight = _select_heaviest(
+        [*families, fit_random_walks(base, places, "wander"), fit_random_walks(base, places, "bend")]
+    )
+    first = _average_neighbors(y)[0]
+    fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
+    return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))
+
+
+def _point_spread(families: Sequence[ShapeFits]) -> float:
+    evidence, variance = (
+        np.concatenate([getattr(family, name) for family in families]) for name in ("evidence", "variance")
+    )
+    weight = np.exp(evidence - evidence.max())
+    return float(np.sqrt(weight @ variance / weight.sum()))
+
+
+def _average_neighbors(values: Floats) -> Floats:
+    """Means of neighbours where there are many."""
+    return np.array([part.mean() for part in np.array_split(values, min(values.size, MAX_FITTED_POINTS))])
+
+
+def _average_readings(readings: Readings) -> Readings:
+    """The same of the means; who held the hammer counts where each is one point."""
+    if readings.y.size <= MAX_FITTED_POINTS:
+        return readings
+    temperature = None if readings.temperature is None else _average_neighbors(readings.temperature)
+    return Readings(_average_neighbors(readings.y), temperature)
+
+
+def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ...], Floats]:
+    """The families without those of their shapes that together weigh next to nothing, and the weights of the others."""
+    log = np.concatenate([family.evidence for family in families])
+    weight = np.exp(log - log.max())
+    order = np.argsort(weight)
+    light = np.zeros(weight.size, dtype=bool)
+    light[order] = np.cumsum(weight[order]) < DROPPED_SHAPE_WEIGHT * weight.sum()
+    parts = np.split(~light, np.cumsum([len(family.shapes) for family in families])[:-1])
+    kept = [family.select(np.flatnonzero(part)) for family, part in zip(families, parts, strict=True) if part.any()]
+    return tuple(kept), weight[~light] / weight[~light].sum()
+
+
+def _student_cdf(freedom: Floats, t: Floats) -> Floats:
+    """Distribution of Student's t (j, d) of degrees of freedom (j,): 0 and 1 where nobody asks for more."""
+    freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
+    share, near = (
+        (t > 0).astype(np.float64),
+        ~(np.abs(t) > scipy.special.stdtrit(freedom[:, :1], 1 - NEGLIGIBLE_PROBABILITY)),
+    )
+    share[near] = scipy.special.stdtr(freedom[near], t[near])
+    return np.asarray(share)
+
+
+def _mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
+    """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    reach = scipy.special.stdtrit(freedom, 1 - NEGLIGIBLE_PROBABILITY) * error
+    low, high = float((middle - reach).min()), float((middle + reach).max())
+    for _ in range(QUANTILE_HALVINGS):
+        value = (low + high) / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            below = np.where(error > 0, scipy.special.stdtr(freedom, (value - middle) / error), middle <= value)
+        low, high = (value, high) if weight @ below < p else (low, value)
+    return high

@@ -1,0 +1,280 @@
+"""Regression model of the level of a series, with temperature and operators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, winsorize
+
+MIN_TEMPERATURE_POINTS = 12
+"""Number of points with a temperature from which on its influence is fitted; chosen."""
+MIN_TEMPERATURE_SPAN = 5.0
+"""Least span of these temperatures (K); chosen."""
+STEEL_FREQUENCY_PER_KELVIN = -0.015
+"""Change of the natural frequency that Young's modulus of steel leads to (%/K), and how far it may be from that."""
+
+MIN_POINT_VARIANCE = 1e-12
+"""Least variance of a point (%^2): below it is rounding."""
+OPERATOR_SPREAD = 1.0
+"""How far apart the clampings of operators may lie, in scatters from one point to the next; chosen."""
+MIN_SINGULAR_SHARE = 1e-12
+"""Share of the largest below which a direction of some columns is none: they are alike."""
+MIN_RESIDUAL_SHARE = 1e-20
+"""Least share of the sum of squares that is taken as left: less is rounding."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LevelModel:
+    """A series and the columns that are in every fit of it."""
+
+    y: Floats
+    """Values without the expected influence of the temperature, from the first point on, shape (n,)."""
+    newest: Floats
+    """What each of them is while it is the last, shape (n,)."""
+    columns: Floats
+    """Columns: 1, the temperature where it counts, and one for each operator, shape (n, p)."""
+    n_temperature_columns: int = 0
+    """Number of columns of the temperature."""
+    scatter_prior: ScatterPrior = NO_SCATTER_PRIOR
+    """What is known of the scatter from point to point beforehand."""
+
+    def precision(self, n: NDArray[np.intp]) -> Floats:
+        """Precision of the coefficients as known beforehand, times the variance of n (r,) points, shape (r, p, p)."""
+        p = self.columns.shape[1]
+        precision = np.zeros((n.size, p, p))
+        for i in range(1 + self.n_temperature_columns, p):
+            precision[:, i, i] = OPERATOR_SPREAD**-2
+        if self.n_temperature_columns:
+            squares = np.concatenate([[0.0, 0.0], np.cumsum(np.diff(self.y) ** 2)])
+            precision[:, 1, 1] = (
+                np.maximum(squares[n] / (2 * (n - 1)), MIN_POINT_VARIANCE) / STEEL_FREQUENCY_PER_KELVIN**2
+            )
+        return precision
+
+    def explained_root(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
+
+        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
+        n runs from one number to another, k from 0.
+        """
+        if self.columns.shape[1] > 1:
+            product, square = self._change(kind, n, k)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                return np.asarray(product / np.sqrt(square))
+        sums, root = _change_without_level(kind, n, k)
+        product = self._tail(0, kind, n, k)
+        product -= sums * self._levels[1][n[:, 0]]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            product /= root
+        return product
+
+    def t_statistic(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
+        """Student's t of changes that explain so much in the first n, shape (r,) each."""
+        total = self._residual_squares_up_to[n]
+        left = np.maximum(total - lean**2, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        return np.asarray(lean / np.sqrt((left + self._prior_squares) / self.freedom(n)))
+
+    def freedom(self, n: NDArray[np.intp]) -> Floats:
+        """Degrees of freedom of a change in the first n, shape (r,) each."""
+        return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
+
+    @property
+    def _prior_squares(self) -> float:
+        """Sum of squares that is known beforehand."""
+        return self.scatter_prior.freedom * self.scatter_prior.percent**2
+
+    def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
+        """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
+        until = np.array([n])
+        product, square = (
+            float(products[0, 0]) for products in self._change(kind, until[:, np.newaxis], np.array([k]))
+        )
+        size, total = product / square, float(self._residual_squares_up_to[n])
+        left = max(total - size * product, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
+
+    def change_sizes(self, fell: NDArray[np.bool_], n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Sizes of changes from points k (r,) on in the first n (r,), shape (r,): steps, or slopes a point."""
+        sizes = np.empty(n.size)
+        for kind, rows in (("step", np.flatnonzero(fell)), ("slope", np.flatnonzero(~fell))):
+            if rows.size:
+                product, square = self._change(kind, n[rows, np.newaxis], k[rows, np.newaxis])
+                sizes[rows] = (product / square)[:, 0]
+        return sizes
+
+    def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Products of the column of a change with the series and with itself, what the base leaves of both."""
+        tail, square = (
+            [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])],
+            _change_square(kind, n - k),
+        )
+        inverse, level = (coefficients[n[:, 0]] for coefficients in self._levels)
+        p = self.columns.shape[1]
+        product = tail[0]
+        for i in range(p):
+            product -= tail[1 + i] * level[:, i, np.newaxis]
+            for j in range(p):
+                square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
+        return product, square
+
+    def _tail(self, i: int, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Product of the column of a change with the series (0) or one of the columns (from 1 on)."""
+        sums, moments = self._sums[i], self._moments[i]
+        tail: Floats = sums[n] - sums[k]
+        if i == 0:
+            tail += self._newest_excess[n]
+        if kind == "slope":
+            tail *= k
+            np.subtract(moments[n] - moments[k], tail, out=tail)
+            if i == 0:
+                tail += self._newest_excess[n] * (n - 1)
+        return tail
+
+    @cached_property
+    def _newest_excess(self) -> Floats:
+        """What the last point is above what it will be, by the number of the first points, shape (n + 1,)."""
+        return np.concatenate([[0.0], self.newest - self.y])
+
+    @cached_property
+    def _levels(self) -> tuple[Floats, Floats]:
+        """Inverse (n + 1, p, p) of the normal matrix of the base, and its coefficients (n + 1, p), by the number of the
+        first points; those of less than two are nothing."""
+        n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
+        inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
+        normal = self._outer[n, 1:, 1:] + self.precision(n)
+        inverse[2:] = 1 / normal if p == 1 else np.linalg.inv(normal)
+        level[2:] = (inverse[2:] @ self._outer[n, 1:, :1])[..., 0]
+        return inverse, level
+
+    @cached_property
+    def _residual_squares_up_to(self) -> Floats:
+        """Sum of squares that the base leaves, by the number of the first points, shape (n + 1,)."""
+        return np.asarray(self._outer[:, 0, 0] - (self._outer[:, 0, 1:] * self._levels[1]).sum(axis=1))
+
+    @cached_property
+    def _values(self) -> Floats:
+        return np.column_stack([self.y, self.columns])
+
+    @cached_property
+    def _sums(self) -> Floats:
+        return _cumulative_sums(self._values).T
+
+    @cached_property
+    def _moments(self) -> Floats:
+        return _cumulative_sums(np.arange(self.y.size)[:, np.newaxis] * self._values).T
+
+    @cached_property
+    def _outer(self) -> Floats:
+        newest = np.column_stack([self.newest, self.columns])
+        past, last = (np.einsum("ni,nj->nij", values, values) for values in (self._values, newest))
+        sums = _cumulative_sums(past)
+        sums[1:] += last - past
+        return sums
+
+    @cached_property
+    def inverse_normal_matrix(self) -> Floats:
+        """Inverse of the normal matrix of the base, shape (p, p), the variance of a point being 1."""
+        return np.asarray(np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0]))
+
+    @property
+    def residual_squares(self) -> float:
+        """Sum of squares that the base leaves of all points."""
+        return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
+
+    def fit_columns(self, columns: Floats) -> ColumnFits:
+        """Each of some sets of k columns (j, k, n) fitted beside the base, one set at a time."""
+        level = self.inverse_normal_matrix @ self.columns.T @ self.y
+        crossed = columns @ self.columns
+        leaning = crossed @ self.inverse_normal_matrix
+        product = columns @ (self.y - self.columns @ level)
+        square = columns @ columns.transpose(0, 2, 1) - leaning @ crossed.transpose(0, 2, 1)
+        inverse = np.asarray(np.linalg.pinv(square, rcond=MIN_SINGULAR_SHARE, hermitian=True), dtype=np.float64)
+        size = (inverse @ product[..., np.newaxis])[..., 0]
+        total = self.residual_squares
+        rss = np.maximum(total - (size * product).sum(axis=1), MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        freedom = self.y.size - 1 - columns.shape[1]
+        return ColumnFits(
+            rss, size, inverse, leaning[..., 0], float(level[0]), float(self.inverse_normal_matrix[0, 0]), freedom
+        )
+
+
+class ColumnFits(NamedTuple):
+    """Sets of k columns fitted, one set at a time."""
+
+    rss: Floats
+    """Sum of squares that each leaves, shape (j,)."""
+    size: Floats
+    """Sizes of the columns, shape (j, k)."""
+    inverse: Floats
+    """Inverse of the products of the columns, what the base leaves of them, shape (j, k, k)."""
+    level_leaning: Floats
+    """Leanings of the columns on the level of the base, shape (j, k)."""
+    level: float
+    """Level of the base, at the mean temperature."""
+    level_variance: float
+    """Variance of the level, that of a point being 1."""
+    freedom: int
+    """Degrees of freedom; the temperature costs none, its influence is known beforehand."""
+
+    def select(self, numbers: NDArray[np.intp]) -> ColumnFits:
+        """The fits of some of the sets."""
+        rss, size, inverse, leaning = (values[numbers] for values in self[:4])
+        return ColumnFits(rss, size, inverse, leaning, self.level, self.level_variance, self.freedom)
+
+    def predict(self, columns: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard error of the series where the columns have other values (j, k, d), shape (j, d) each."""
+        away = columns - self.level_leaning[..., np.newaxis]
+        mean = self.level + (self.size[:, np.newaxis] @ away)[:, 0]
+        variance = self.level_variance + np.einsum("jkd,jkd->jd", self.inverse @ away, away)
+        return mean, np.sqrt(variance * (self.rss / self.freedom)[:, np.newaxis])
+
+    def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
+        """Rate of change of the series, and its standard error, where the columns change so (j, k)."""
+        variance = np.einsum("jk,jkl,jl->j", slopes, self.inverse, slopes)
+        return (self.size * slopes).sum(axis=1), np.sqrt(variance * self.rss / self.freedom)
+
+
+def _change_square(kind: str, length: NDArray[np.intp]) -> Floats:
+    """Product of the column of a change over so many points with itself."""
+    points = length.astype(np.float64)
+    return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
+
+
+def _change_without_level(kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Sums of the columns of changes from each point k (m,) on in the first n (r, 1), and the root of the square of
+    what a column of ones leaves of them, shape (r, m) each."""
+    length = (n - k).astype(np.float64)
+    sums = length if kind == "step" else length * (length - 1) / 2
+    with np.errstate(invalid="ignore"):
+        return sums, np.asarray(np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums))
+
+
+def _cumulative_sums(values: Floats) -> Floats:
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+
+
+def is_temperature_usable(temperature: Floats) -> bool:
+    """Whether the temperature counts in any part of a series."""
+    recorded = temperature[np.isfinite(temperature)]
+    return recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
+
+
+def build_level_model(readings: Readings) -> LevelModel:
+    """The base of a series, the temperature in it only where enough of it is known over a wide enough span."""
+    rest, columns = readings.y - readings.y[:1].sum(), [np.ones(readings.y.size)]
+    temperature = np.full(rest.size, np.nan) if readings.temperature is None else readings.temperature
+    is_warm = is_temperature_usable(temperature)
+    if is_warm:
+        warmer = temperature - temperature[np.isfinite(temperature)].mean()
+        columns.append(np.where(np.isfinite(warmer), warmer, 0.0))
+        rest -= STEEL_FREQUENCY_PER_KELVIN * columns[-1]
+    names = dict.fromkeys(filter(None, readings.operators))
+    columns += [np.array([held == name for held in readings.operators], dtype=np.float64) for name in names]
+    return LevelModel(winsorize(rest), rest, np.column_stack(columns), int(is_warm), readings.scatter_prior.single)

@@ -1,0 +1,312 @@
+"""Assess the status of a machine from its series and programs.
+
+Pure: rows in, records out.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import CROSS_TAP, Remark
+from lobewatch.history.history import History, HistoryRow
+from lobewatch.machine import LimitsTable, Machine
+from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter
+from lobewatch.measurement.estimate import Estimate
+from lobewatch.measurement.recording_questions import question_remarks
+from lobewatch.monitoring.alarm import Alarm, TriggeredAlarm, add_acknowledgements
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
+from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
+from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
+from lobewatch.monitoring.status_rules import (
+    STATUS_BY_CODE,
+    UNREADABLE_NEXT_STEP,
+    StatusLevel,
+    add_file_remedy,
+    count_days_left,
+    date_remarks,
+    find_next_step,
+    is_early_alarm,
+    next_tap_step,
+    sort_by_severity,
+    unreadable_remark,
+    worst_status,
+)
+from lobewatch.monitoring.trend import Trend
+from lobewatch.verdicts.verdict import Stability
+
+OTHER_VALUES = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
+"""Values that are watched beside the frequency, and what they are called; that of the bearings follows from it."""
+MIN_REPORTED_CHANGE = 0.1
+"""Change of these (%) that is told; no verdict feels a smaller one, and computed data have such."""
+RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (run-in)?"
+"""What is said of a fall as that of bearings that run in; it rings like any other."""
+
+
+def lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
+    """Remark on a newest test that does not show the mode followed."""
+    if not newest.frequency.is_known and newest.direction != CROSS_TAP:
+        cure = "Tap again: the mode that is followed was not found in the newest test."
+        yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+
+
+def drop_limit_remarks(name: str, fall: Estimate, limits: LimitsTable) -> Iterator[Remark]:
+    """Remark on a fall that has reached a limit of machine.toml."""
+    text = f"frequency fallen by {fall.value:.1f} % since the first tests"
+    if fall.value >= limits.frequency_alarm_percent:
+        cure = "Before the next part have the bearings, the tool and its clamping looked at, then tap again."
+        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
+    elif fall.value >= limits.frequency_warn_percent:
+        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
+        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
+
+
+def trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
+    """Remarks on what the watch over the frequency sees: a fall, a doubt, a rise. path: of the folder, for commands."""
+    folder = shlex.quote(str(path))
+    event = f'lobewatch event {folder} "what was done" --new-baseline'
+    if trend.open_drop is not None:
+        fall = trend.open_drop.change
+        course = "fell at once before" if fall.kind == "step" else "has been falling since"
+        text = f"frequency {course} {trend.drop_since:%Y-%m-%d}, by {_change_text(fall.size, fall.half_width)}"
+        text += RUN_IN_TEXT if trend.is_run_in else ""
+        cure = f"Have the bearings, the tool and its clamping looked at; after a repair: {event}"
+        yield Remark("decay", name, text, f"{cure}. Known already: lobewatch ack {folder}")
+    elif trend.detection.needs_repeat:
+        text = "the newest test is lower than those before it"
+        cure = f"Clamp the tool anew and tap again: lobewatch tap {folder} --reclamped shows whether it fell."
+        yield Remark("decay-doubtful", name, text, cure)
+    if trend.detection.rise is not None:
+        rise = trend.detection.rise
+        text = f"frequency rose by {_change_text(-rise.size, rise.half_width)}: assembly changed?"
+        yield Remark("frequency-rose", name, text, f"If so: {event}")
+
+
+def value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
+    """Remarks on changes of damping ratio and stiffness."""
+    for field, word in OTHER_VALUES.items():
+        newest = series.values[field].find_newest_change()
+        if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
+            time, change = newest
+            verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
+            course = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
+            by = _change_text(change.size, change.half_width)
+            text = f"{word} {course} {time:%Y-%m-%d}, by {by}; programs are judged with it, the light does not watch it"
+            yield Remark("value-changed", name, text)
+
+
+def _change_text(fall: float, half_width: float) -> str:
+    """Size of a change (%), from that of its logarithm (%) with the half-width of its 95 % interval."""
+    share = math.exp(-fall / 100)
+    return f"{100 * abs(1 - share):.2f} ±{half_width * share:.2f} %"
+
+
+@dataclass(frozen=True)
+class SeriesStatus:
+    """The standing of one tool in one direction."""
+
+    tool: str
+    """Tool in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    time: datetime
+    """Time of its newest test."""
+    first_time: datetime
+    """Time of the test that it is compared with."""
+    drop: Estimate
+    """Fall of the followed frequency from the start of the series to the last test that shows it (%)."""
+    trend: Trend | None = field(compare=False)
+    """Points, alarm and forecast; None where no test of it can be compared with."""
+    remarks: tuple[Remark, ...]
+    """Reasons that it gives."""
+    triggered: tuple[TriggeredAlarm, ...]
+    """Those that ring."""
+    history: SeriesHistory = field(compare=False, repr=False)
+    """Rows that all this follows from, and the history of their values."""
+
+    @property
+    def name(self) -> str:
+        """Tool and direction."""
+        return f"{self.tool}, {self.direction}"
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether there is nothing to compare with yet."""
+        return self.time == self.first_time
+
+
+@dataclass(frozen=True)
+class MachineStatus:
+    """The standing of one machine."""
+
+    time: datetime
+    """Time that it is the standing at."""
+    reasons: tuple[Remark, ...]
+    """Reasons in order of harm, without what a person has said to them."""
+    next_step: str
+    """Next step, one sentence."""
+    remarks: tuple[Remark, ...]
+    """Reasons, those that are acknowledged with that in their text."""
+    alarms: tuple[Alarm, ...] = ()
+    """Alarms that are open, in the order of their reasons."""
+    series: tuple[SeriesStatus, ...] = ()
+    """Series, the one that fell most first."""
+    last_tap: datetime | None = None
+    """Time of the newest tap test; None where there is none."""
+    days_left: float | None = None
+    """Days until the next test is due; negative where it is overdue; None before the first."""
+
+    @property
+    def status(self) -> StatusLevel:
+        """Light of the worst reason."""
+        return worst_status(self.remarks)
+
+    @property
+    def is_early(self) -> bool:
+        """Whether its alarm is that of a fall short of every limit."""
+        return is_early_alarm(self.remarks)
+
+    def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
+        """The standing of one series; None where there is none."""
+        fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
+        return next(fits, None)
+
+
+def assess_status(
+    machine: Machine,
+    history: History,
+    now: datetime,
+    path: Path | str = "MACHINE",
+    files: Sequence[Remark] = (),
+    acknowledgements: Sequence[Acknowledgement] = (),
+    scatter: FleetScatter | None = None,
+) -> MachineStatus:
+    """The standing at a time; the last row holds the word on every program.
+
+    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first; scatter:
+    what other machines told of it.
+    """
+    rows = history.current
+    if not rows and files:
+        return _build_status(now, [unreadable_remark("; ".join(map(str, files)))], UNREADABLE_NEXT_STEP)
+    if not rows:
+        cure = "Take the first tap test: all others are compared with it."
+        since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
+        return _build_status(now, [Remark("never-tapped", "", f"no tap test {since}", cure)])
+    pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
+    series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
+    newest, interval = rows[-1], machine.machine.tap_interval_days
+    remarks = [remark for standing in series for remark in standing.remarks]
+    raised = [alarm for standing in series for alarm in standing.triggered]
+    remarks += [add_file_remedy(remark) for remark in files if remark.code in STATUS_BY_CODE]
+    asked = {row.tap_id: row.questions for row in history.rows}
+    remarks += question_remarks(asked, path, [row.tap_id for row in rows])
+    programs = [*_program_remarks(rows, machine)]
+    raised += [
+        _trigger_program_alarm(remark, rows) for remark in programs if STATUS_BY_CODE[remark.code] is StatusLevel.ALARM
+    ]
+    remarks += [
+        *programs,
+        *date_remarks(newest.tap_id, newest.time, interval, now, path),
+        *_direction_remarks(rows),
+    ]
+    series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
+    left = count_days_left(newest.time, interval, now)
+    alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
+    return _build_status(now, remarks, next_tap_step(newest.time, interval), series, newest.time, left, alarms)
+
+
+def _build_status(
+    now: datetime,
+    remarks: Sequence[Remark],
+    well: str = "",
+    series: Sequence[SeriesStatus] = (),
+    last_tap: datetime | None = None,
+    left: float | None = None,
+    alarms: Sequence[Alarm] = (),
+) -> MachineStatus:
+    """The standing with these reasons; well: the next step where none says another."""
+    ordered = sort_by_severity(remarks)
+    said = add_acknowledgements(ordered, alarms, now)
+    return MachineStatus(
+        now, ordered, find_next_step(ordered, well), said, sort_by_severity(alarms), tuple(series), last_tap, left
+    )
+
+
+def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:
+    rows, beside = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
+    if scatter is None or sum(row.time <= scatter.time for row in rows) >= MIN_MONITORED_POINTS:
+        return build_series_history(rows, beside)
+    return build_series_history(
+        rows, beside, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
+    )
+
+
+def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStatus:
+    newest, frequency, fall = series.rows[-1], series.frequency, series.drop
+    first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
+    trend = None if frequency.trend is None else frequency.trend.at_day(now)
+    name = f"{newest.tool}, {newest.direction}"
+    of_limits, of_watch = (
+        [*drop_limit_remarks(name, fall, machine.limits)],
+        [*trend_remarks(name, trend, path)] if trend else [],
+    )
+    remarks = [*lost_mode_remarks(name, newest), *of_limits, *of_watch, *value_change_remarks(name, series)]
+    raised = [
+        TriggeredAlarm(remark, row.tap_id, row.time)
+        for remarks, row in (
+            (of_limits, series.first_below(machine.limits.frequency_alarm_percent)),
+            (of_watch, series.first_falling),
+        )
+        for remark in remarks
+        if STATUS_BY_CODE[remark.code] is StatusLevel.ALARM and row is not None
+    ]
+    return SeriesStatus(
+        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), tuple(raised), series
+    )
+
+
+def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[Remark]:
+    to_tap = {remark.about: remark.cure for remark in _direction_remarks(rows)}
+    tools = {program.name: program.tool for program in machine.program}
+    for name, ruling in (rows[-1].verdicts or {}).items():
+        tap = to_tap.get(tools[name])
+        if ruling.stability is Stability.NOT_STABLE:
+            cure = "Change these programs before the next part: lobewatch check names a safe speed and depth."
+            cure = f"Do not run these programs. {tap}" if tap else cure
+            yield Remark("program-not-stable", name, ruling.stability.value, cure)
+        elif ruling.stability is Stability.UNKNOWN:
+            yield Remark("program-unknown", name, ruling.stability.value, "See why with lobewatch check.")
+        elif ruling.stability is Stability.DOUBTFUL:
+            cure = tap or "See with lobewatch check what would settle it, and where to go until then."
+            yield Remark("program-doubtful", name, ruling.stability.value, cure)
+
+
+def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
+    """The alarm of a program that is not stable: raised by the first of the newest tap tests that all say so."""
+    first = rows[-1]
+    for row in reversed(rows):
+        ruling = (row.verdicts or {}).get(remark.about)
+        if ruling is None or ruling.stability is not Stability.NOT_STABLE:
+            break
+        first = row
+    return TriggeredAlarm(remark, first.tap_id, first.time)
+
+
+def _direction_remarks(rows: Sequence[HistoryRow]) -> Iterator[Remark]:
+    pairs = dict.fromkeys((row.tool, row.direction) for row in rows if row.direction != CROSS_TAP)
+    for tool in dict.fromkeys(tool for tool, _ in pairs):
+        tapped = {direction for name, direction in pairs if name == tool and _is_frequency_known(rows, name, direction)}
+        if len(tapped) == 1:
+            direction = tapped.pop()
+            missing = "y" if direction == "x" else "x"
+            cure = f"Tap direction {missing} of the same tool too: no program is sure with one direction alone."
+            yield Remark("one-direction", tool, f"tapped in direction {direction} alone", cure)
+
+
+def _is_frequency_known(rows: Sequence[HistoryRow], tool: str, direction: str) -> bool:
+    return any(row.frequency.is_known for row in rows if (row.tool, row.direction) == (tool, direction))

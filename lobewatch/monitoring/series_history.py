@@ -1,0 +1,214 @@
+"""One series of tap tests and what follows from its rows: where each value started, and how it has changed since.
+
+Made once for a standing and handed on with it. What is worked out of it lasts as long as it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cached_property
+from itertools import chain, compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm import RemainingPreload, calibrate, remaining_preload
+from lobewatch.history.history import WATCHED_VALUES, HistoryRow
+from lobewatch.machine import Machine
+from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
+from lobewatch.monitoring.change_detection import SeriesChange, find_newest_change
+from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, SeriesScatterPrior
+from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_percents
+
+
+@dataclass(frozen=True, eq=False)
+class ValueHistory:
+    """One value of a series: the tap tests that know it, its trend, its start and its change."""
+
+    name: str
+    """Field of a row, one of `WATCHED`."""
+    rows: tuple[HistoryRow, ...]
+    """Rows of the series, oldest first, n of them."""
+    values: NDArray[np.float64]
+    """Value of each row and its standard error, shape (n, 2)."""
+    has_questions: NDArray[np.bool_]
+    """Whether anything is asked about a row that nobody has answered, shape (n,)."""
+    other_direction: ValueHistory | None = None
+    """The same value in the other direction; None where nothing is known of it, or where it does not count."""
+    scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
+    """What is known of its scatter beforehand."""
+
+    @cached_property
+    def known_rows(self) -> tuple[HistoryRow, ...]:
+        """Rows that know the value."""
+        return self._select(np.isfinite(self.values[:, 0]))
+
+    @cached_property
+    def reference_rows(self) -> tuple[HistoryRow, ...]:
+        """Rows that know the value and that nothing is asked about: those that others are compared with."""
+        return self._select(np.isfinite(self.values[:, 0]) & ~self.has_questions)
+
+    @cached_property
+    def trend(self) -> Trend | None:
+        """Trend of the sure rows as on the day of the newest; None where none has a positive value."""
+        taps = self.tap_values
+        beside = [] if self.other_direction is None else self.other_direction.tap_values
+        return fit_trend(taps, taps[-1].time, beside, self.scatter_prior) if taps else None
+
+    @property
+    def tap_values(self) -> list[TapValue]:
+        """The sure rows as points of a trend.
+
+        Temperature and operator count for the frequency alone: of the others nothing is known beforehand.
+        """
+        rows, numbers = self._positive
+        errors = np.where(np.isfinite(numbers[:, 1]), 100 * numbers[:, 1] / numbers[:, 0], math.nan).tolist()
+        under, times = [row.conditions for row in rows], [row.time for row in rows]
+        hours = [_or_nan(conditions.hours) for conditions in under]
+        reclamped = [conditions.reclamped for conditions in under]
+        if self.name == "frequency":
+            temperatures, operators = [_or_nan(it.temperature_c) for it in under], [row.operator for row in rows]
+        else:
+            temperatures, operators = [math.nan] * len(rows), [""] * len(rows)
+        return [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures, hours, operators, reclamped)]
+
+    @cached_property
+    def start(self) -> Estimate:
+        """Value that the series is compared with, not one tap test but where its first ones lie; UNKNOWN without any.
+
+        From 8 points on its error is the scatter from tap test to tap test.
+        """
+        if not self.known_rows:
+            return UNKNOWN_ESTIMATE
+        first: Estimate = getattr((self.reference_rows or self.known_rows)[0], self.name)
+        trend = self.trend
+        if trend is None or (trend.past_fit is None and self.name != "frequency"):
+            return first
+        value = trend.first_value * math.exp(trend.start / 100)
+        return Estimate(value, first.std if trend.past_fit is None else value * trend.spread / 100)
+
+    @property
+    def change(self) -> Estimate:
+        """Change (%) from the start to the last row; unknown where that does not know the value."""
+        return self.change_at(self.rows[-1])
+
+    def change_at(self, row: HistoryRow) -> Estimate:
+        """Change (%) from the start to a row; unknown where that does not know the value."""
+        value: Estimate = getattr(row, self.name)
+        if not value.is_known:
+            return UNKNOWN_ESTIMATE
+        return Estimate(0.0, 0.0) if self.start == value else value.change_since(self.start)
+
+    def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
+        """The change that the newest points are sure of, whatever the temperature, and its time; None without one."""
+        rows, numbers = self._positive
+        reclamped = [row.conditions.reclamped for row in rows]
+        times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
+        change = find_newest_change(np.array(percents))
+        return None if change is None else (times[change.point], change)
+
+    @property
+    def _positive(self) -> tuple[tuple[HistoryRow, ...], NDArray[np.float64]]:
+        """The sure rows whose value is one to take a logarithm of, with their numbers, shape (n, 2)."""
+        counts = np.isfinite(self.values[:, 0]) & ~self.has_questions & (self.values[:, 0] > 0)
+        return self._select(counts), self.values[counts]
+
+    @property
+    def trend_rows(self) -> tuple[HistoryRow, ...]:
+        """The rows that the trend is of, oldest first."""
+        return self._positive[0]
+
+    def _select(self, counts: NDArray[np.bool_]) -> tuple[HistoryRow, ...]:
+        return self.rows if counts.all() else tuple(compress(self.rows, counts.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesHistory:
+    """The rows of one tool and direction, and the history of each value that is watched."""
+
+    rows: tuple[HistoryRow, ...]
+    """Rows of the series, oldest first; one at least."""
+    values: Mapping[str, ValueHistory]
+    """History of each value, by its name in `WATCHED`."""
+
+    @property
+    def frequency(self) -> ValueHistory:
+        """The natural frequency of the mode followed (Hz)."""
+        return self.values["frequency"]
+
+    @property
+    def drop(self) -> Estimate:
+        """Fall of the frequency (%) to the newest test, or where that is in question, to another that fell farther."""
+        newest = [rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows]
+        change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN_ESTIMATE)
+        return Estimate(-change.value + 0.0, change.std)
+
+    def first_below(self, percent: float) -> HistoryRow | None:
+        """The first of the newest tap tests that all show a fall of so much (%); None where the newest does not."""
+        first = None
+        for row in reversed(self.frequency.known_rows):
+            if -self.frequency.change_at(row).value < percent and (first is not None or not row.questions):
+                break
+            first = row if -self.frequency.change_at(row).value >= percent else first
+        return first
+
+    @property
+    def first_falling(self) -> HistoryRow | None:
+        """The tap test that raised the alarm of the watch over the frequency; None where none is open."""
+        trend = self.frequency.trend
+        if trend is None or trend.open_drop is None:
+            return None
+        return self.frequency.trend_rows[trend.points[trend.open_drop.triggered_at].taps[0]]
+
+
+def build_series_history(
+    rows: Iterable[HistoryRow], beside: Iterable[HistoryRow] = (), scatter: SeriesScatterPrior = NO_SERIES_PRIOR
+) -> SeriesHistory:
+    """The history of a series from its rows, oldest first, one at least.
+
+    beside: rows of the same tool in the other direction; scatter: what is known of that of the frequency beforehand.
+    """
+    values = _build_value_histories(tuple(rows))
+    others = _build_value_histories(tuple(beside))
+    values["frequency"] = replace(values["frequency"], other_direction=others["frequency"], scatter_prior=scatter)
+    return SeriesHistory(values["frequency"].rows, values)
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHistory]:
+    flat = chain.from_iterable(chain.from_iterable([row.watched for row in rows]))
+    numbers = np.fromiter(flat, np.float64, 2 * len(WATCHED_VALUES) * len(rows)).reshape(-1, len(WATCHED_VALUES), 2)
+    is_asked = np.array([bool(row.questions) for row in rows], dtype=np.bool_)
+    return {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED_VALUES)}
+
+
+def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
+    """The preload left in the bearings of a machine, from the change of their stiffness; see dsm.preload_left.
+
+    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it open,
+    or where one of the calibrated bearings has rollers.
+    """
+    stiffness = series.values["bearing_stiffness"]
+    change = stiffness.change
+    if machine.spindle is None or not change.is_known or len(stiffness.reference_rows) < 2:
+        return None
+    if any(_is_preload_open(row, machine) for row in (stiffness.reference_rows[0], series.rows[-1])):
+        return None
+    calibrated = [bearing for bearing in machine.spindle.build().bearings if bearing.group]
+    return remaining_preload(calibrated, 1 + change.value / 100)
+
+
+def _is_preload_open(row: HistoryRow, machine: Machine) -> bool:
+    """Whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
+    frequency, std = row.frequency
+    try:
+        model = machine.model(row.tool)
+        return calibrate(model, frequency, std if math.isfinite(std) else None, machine.mode.model_mode).is_open
+    except (ValueError, ArithmeticError):
+        return True

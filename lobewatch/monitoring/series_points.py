@@ -1,0 +1,213 @@
+"""Points of a series: readings, clampings, days of use, outliers and scatter."""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from math import copysign, sqrt
+from statistics import median
+from typing import NamedTuple, Self
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class ScatterPrior(NamedTuple):
+    """What is known of the scatter from point to point before any is measured."""
+
+    percent: float = 0.0
+    """Standard deviation (%)."""
+    freedom: float = 0.0
+    """Degrees of freedom that it is worth; 0: nothing is known."""
+
+
+NO_SCATTER_PRIOR = ScatterPrior()
+"""Nothing is known of it."""
+
+
+class SeriesScatterPrior(NamedTuple):
+    """What is known of the scatter of a series beforehand."""
+
+    single: ScatterPrior = NO_SCATTER_PRIOR
+    """That of one direction."""
+    common: ScatterPrior = NO_SCATTER_PRIOR
+    """That of the mean of both."""
+
+
+NO_SERIES_PRIOR = SeriesScatterPrior()
+"""Nothing is known of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """A series, point by point."""
+
+    y: Floats
+    """Values, shape (n,)."""
+    temperature: Floats | None = None
+    """Temperature of the spindle (K or degC), NaN where it was not recorded, shape (n,)."""
+    operators: tuple[str, ...] = ()
+    """Who held the hammer, empty where nobody said so, n of them; none where that does not count."""
+    other_direction: Floats | None = None
+    """Values of the other direction in the same clampings, NaN where there are none, shape (n,)."""
+    scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
+    """What is known of its scatter beforehand."""
+
+    def since(self, begin: int) -> Self:
+        """The points from one on."""
+        temperature, other = (
+            None if values is None else values[begin:] for values in (self.temperature, self.other_direction)
+        )
+        operators = self.operators[begin:]
+        return replace(self, y=self.y[begin:], temperature=temperature, operators=operators, other_direction=other)
+
+    @property
+    def shared_points(self) -> NDArray[np.intp]:
+        """Points that the other direction has too."""
+        return (
+            np.empty(0, np.intp) if self.other_direction is None else np.flatnonzero(np.isfinite(self.other_direction))
+        )
+
+    @property
+    def mean_of_directions(self) -> Readings:
+        """The means of both directions, at the points that both have."""
+        at, other = self.shared_points, self.y if self.other_direction is None else self.other_direction
+        temperature = None if self.temperature is None else self.temperature[at]
+        operators = tuple(self.operators[i] for i in at) if self.operators else ()
+        mean = (self.y[at] + other[at]) / 2
+        return Readings(mean, temperature, operators, scatter_prior=SeriesScatterPrior(self.scatter_prior.common))
+
+
+SAME_CLAMPING_TIME = timedelta(hours=24)
+"""Time within which tap tests are one clamping where nobody says otherwise; chosen."""
+TapRange = tuple[int, int]
+"""First tap test of a point, and the one behind its last."""
+
+
+class PercentSeries(NamedTuple):
+    """Tap tests with one of their values, oldest first."""
+
+    times: tuple[datetime, ...]
+    """Times of the tests."""
+    percents: tuple[float, ...]
+    """Changes of the value since the first test (%)."""
+    temperatures: tuple[float, ...]
+    """Temperatures of the spindle (degC); NaN where not recorded."""
+    reclamped: tuple[bool, ...]
+    """Whether the tool was clamped anew for each of them."""
+
+    def percent(self, span: TapRange) -> float:
+        """Change of a point (%): mean of two, median from three on."""
+        first, end = span
+        if end - first > 2:
+            return median(self.percents[first:end])
+        return (self.percents[first] + self.percents[end - 1]) / 2
+
+    def temperature(self, span: TapRange) -> float:
+        """Mean of the temperatures recorded for a point; NaN where none was."""
+        recorded = [temperature for temperature in self.temperatures[slice(*span)] if temperature == temperature]
+        return sum(recorded) / len(recorded) if recorded else np.nan
+
+
+def divide_into_points(series: PercentSeries) -> Iterator[TapRange]:
+    """The points of a series, one test at least."""
+    first = 0
+    for tap in range(1, len(series.times)):
+        if series.reclamped[tap] or series.times[tap] - series.times[first] >= SAME_CLAMPING_TIME:
+            yield first, tap
+            first = tap
+    yield first, len(series.times)
+
+
+RECENT_USE_DAYS = 180.0
+"""Days before the last point over which use goes on as it is now, two points at least; chosen."""
+
+STANDSTILL_DAYS = 1e-6
+"""Days between two points that the spindle stood still between."""
+
+
+def days_of_use(days: Floats, hours: Floats) -> Floats:
+    """Days (n,) at which the points would lie had the spindle always run as much a day as lately; the last one stays.
+
+    days: increasing; hours: that it had run (h). The days themselves where hours are missing or go back, or where it
+    has not run lately.
+    """
+    begin = max(min(int(np.searchsorted(days, days[-1] - RECENT_USE_DAYS)), days.size - 2), 0)
+    lately = hours[-1] - hours[begin]
+    if not np.isfinite(hours).all() or np.any(np.diff(hours) < 0) or lately <= 0:
+        return days
+    days_an_hour = (days[-1] - days[begin]) / lately
+    return np.asarray(days[-1] - (hours[-1] - hours) * days_an_hour - STANDSTILL_DAYS * np.arange(days.size)[::-1])
+
+
+N_REFERENCE_POINTS = 7
+"""Points before it that one is held against; chosen."""
+MIN_REFERENCE_POINTS = 3
+"""Points before it below which none is said to stand alone; chosen."""
+MAX_OUTLIER_DISTANCE = 3.0
+"""Scatters that a point may be away from those before it; one that stands alone is drawn in to there; chosen."""
+CONFIRMED_DISTANCE_SHARE = 0.7
+"""Share of its distance that the next point is away, too, where it does not stand alone; chosen."""
+MAD_TO_STD = 1.4826
+"""Standard deviation of normal scatter over its median absolute deviation."""
+
+
+def winsorize(y: Floats) -> Floats:
+    """A series (n,) with the points that stand alone drawn in to 3 scatters from those before them.
+
+    What a point becomes follows from those until the one after it, so that the last one is as it was measured.
+    """
+    values: list[float] = y.tolist()
+    steps: list[float] = []
+    for i in range(1, len(values) - 1):
+        if i >= MIN_REFERENCE_POINTS:
+            middle = median(values[max(i - N_REFERENCE_POINTS, 0) : i])
+            away, after = values[i] - middle, values[i + 1] - middle
+            limit = MAX_OUTLIER_DISTANCE * MAD_TO_STD / sqrt(2) * steps[len(steps) // 2]
+            if abs(away) > limit and after / away < CONFIRMED_DISTANCE_SHARE:
+                values[i] = middle + copysign(limit, away)
+        insort(steps, abs(y[i] - y[i - 1]))
+    return np.array(values)
+
+
+MIN_SCATTER_POINTS = 8
+"""Points of a series from which on its scatter tells anything; chosen."""
+DOF_PER_DIFFERENCE = 0.25
+"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares, differences
+of neighbours two thirds of that of residuals."""
+MIN_OTHER_SERIES = 4
+"""Series that anything is said of others from; chosen."""
+MAX_PRIOR_DOF = 30.0
+"""Degrees of freedom that others are worth at most; chosen."""
+
+
+def estimate_scatter(y: Floats) -> ScatterPrior:
+    """Scatter from point to point of a series (n,), by the median of its steps: what it fell counts little."""
+    if y.size < MIN_SCATTER_POINTS:
+        return NO_SCATTER_PRIOR
+    return ScatterPrior(MAD_TO_STD * float(np.median(np.abs(np.diff(y)))) / 2**0.5, DOF_PER_DIFFERENCE * (y.size - 1))
+
+
+def pool_scatter(series: Sequence[ScatterPrior]) -> ScatterPrior:
+    """What the scatters of some series, each known with its own degrees of freedom, say of another one.
+
+    Empirical Bayes: variances scattered as scaled inverse chi squares; its two parameters by the moments of their
+    logarithms (Smyth 2004, "Linear models and empirical Bayes methods", Stat. Appl. Genet. Mol. Biol. 3(1), section
+    6.2). Nothing below four series.
+    """
+    known = np.array([scatter for scatter in series if scatter.freedom and scatter.percent > 0])
+    if len(known) < MIN_OTHER_SERIES:
+        return NO_SCATTER_PRIOR
+    half = known[:, 1] / 2
+    logs = 2 * np.log(known[:, 0]) - scipy.special.digamma(half) + np.log(half)
+    spread = float(np.var(logs, ddof=1) - scipy.special.polygamma(1, half).mean())
+    freedom = MAX_PRIOR_DOF
+    if spread > scipy.special.polygamma(1, MAX_PRIOR_DOF / 2):
+        freedom = 2 * scipy.optimize.brentq(lambda x: scipy.special.polygamma(1, x) - spread, 1e-3, MAX_PRIOR_DOF / 2)
+    variance = np.exp(logs.mean() + scipy.special.digamma(freedom / 2) - np.log(freedom / 2))
+    return ScatterPrior(float(np.sqrt(variance)), float(freedom))

@@ -1,0 +1,101 @@
+"""Forecast dates at which a threshold is reached.
+
+The one form in which dates go to people, files and other programs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import date, timedelta
+
+import msgspec
+
+UNIX_EPOCH = date(1970, 1, 1)
+INF = math.inf
+
+
+class ThresholdDates(msgspec.Struct, frozen=True):
+    """When a level is reached, in days since 1970; it may be past where nobody has tapped since."""
+
+    is_measured: bool = False
+    """Whether tap tests show it: it is reached already."""
+    earliest: float | None = None
+    """At a probability of 10 %; None where not before `foretold_to`."""
+    probable: float | None = None
+    """At 50 %; None likewise."""
+    latest: float | None = None
+    """At 90 %; None likewise."""
+    forecast_end: float | None = None
+    """Last day that was looked at; None where nothing can be foretold."""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether anything can be said of it."""
+        return self.is_measured or self.forecast_end is not None
+
+    def to_row(self) -> dict[str, str | None]:
+        """As other programs take it: p10, p50, p90, each a date, null where none is in sight, "already"."""
+        dates = zip(("p10", "p50", "p90"), (self.earliest, self.probable, self.latest), strict=True)
+        return {name: "already" if self.is_measured else _iso_date(days) for name, days in dates}
+
+
+class ProgramForecast(msgspec.Struct, frozen=True):
+    """What becomes of one program."""
+
+    doubtful: ThresholdDates
+    """When it becomes doubtful."""
+    not_stable: ThresholdDates
+    """When it becomes not stable."""
+
+
+NO_FORECAST = ThresholdDates()
+ALREADY_REACHED = ThresholdDates(is_measured=True)
+LimitForecasts = tuple[tuple[float, ThresholdDates], ...]
+"""Fixed limits (%) of machine.toml, each with when the worst series has fallen by it."""
+
+
+def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:
+    """The earliest of several; where nobody can tell of one of them, that none is in sight is not known."""
+    if ALREADY_REACHED in reaches:
+        return ALREADY_REACHED
+    known = [reach for reach in reaches if reach.is_known]
+    if not known:
+        return NO_FORECAST
+    rows = ((reach.earliest, reach.probable, reach.latest, reach.forecast_end) for reach in known)
+    first = ThresholdDates(
+        False, *(min((day for day in days if day is not None), default=None) for days in zip(*rows, strict=True))
+    )
+    return first if len(known) == len(reaches) or first.earliest is not None else NO_FORECAST
+
+
+def build_forecast_rows(
+    fates: Mapping[str, ProgramForecast], limits: LimitForecasts
+) -> dict[str, dict[str, dict[str, str | None]]]:
+    """All dates of a machine as other programs take them: by program and by limit ("10 %")."""
+    programs = {
+        name: {"doubtful": fate.doubtful.to_row(), "not stable": fate.not_stable.to_row()}
+        for name, fate in fates.items()
+    }
+    return programs | {f"{percent:g} %": {"reached": reach.to_row()} for percent, reach in limits}
+
+
+def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | None:
+    """The fixed limit that is reached next; None where none is ahead, or nobody can tell.
+
+    Where none is in sight: the lowest of them.
+    """
+    ahead = ((percent, reach) for percent, reach in limits if reach.forecast_end is not None)
+    return min(ahead, key=lambda limit: (limit[1].probable or INF, limit[1].earliest or INF, limit[0]), default=None)
+
+
+def build_limit_row(limit: tuple[float, ThresholdDates] | None) -> dict[str, float | str | None] | None:
+    """A limit as other programs take it."""
+    if limit is None:
+        return None
+    percent, reach = limit
+    return {"percent": percent, **reach.to_row(), "foretold_to": _iso_date(reach.forecast_end)}
+
+
+def _iso_date(days: float | None) -> str | None:
+    return None if days is None else (UNIX_EPOCH + timedelta(days=days)).isoformat()

@@ -1,0 +1,264 @@
+"""The trend of one value of a series: its points, alarm, where they started and where they go."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
+from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
+from lobewatch.monitoring.series_points import (
+    NO_SERIES_PRIOR,
+    SAME_CLAMPING_TIME,
+    PercentSeries,
+    Readings,
+    SeriesScatterPrior,
+    TapRange,
+    days_of_use,
+    divide_into_points,
+)
+from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
+from lobewatch.monitoring.trend_shapes import TrendShape
+
+MAX_TREND_POINTS = 1000
+"""Number of newest points that alone are judged; chosen, as the work grows with its square."""
+DAYS_PER_MONTH = 30.44
+"""Mean length of a month (days)."""
+FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
+"""Time after the last point (days) beyond which nothing is foretold; chosen."""
+MAX_RUN_IN_RATE = 0.4
+"""Rate of a fall over its mean rate so far below which it has slowed down; chosen."""
+N_START_POINTS = 3
+"""Points that the start of a series is looked for in while it has no fitted line; chosen."""
+
+Floats = NDArray[np.float64]
+
+
+class TapValue(NamedTuple):
+    """One value of a series, from one tap test."""
+
+    time: datetime
+    """Time of the tap test."""
+    value: float
+    """Value, positive."""
+    error: float = math.nan
+    """Standard error of the value (%)."""
+    temperature: float = math.nan
+    """Temperature of the spindle (degC)."""
+    hours: float = math.nan
+    """Running hours of the spindle (h)."""
+    operator: str = ""
+    """Who held the hammer."""
+    reclamped: bool = False
+    """Whether the tool was clamped anew for it."""
+
+
+class TrendPoint(NamedTuple):
+    """The tap tests of one clamping together."""
+
+    time: datetime
+    """Time of the first of them."""
+    percent: float
+    """Change, 100 ln of the value over that of the first tap test of the series: mean, median from three on."""
+    error: float
+    """Standard error by the tap tests alone (%)."""
+    temperature: float
+    """Mean of the temperatures recorded (degC)."""
+    hours: float
+    """Running hours of the spindle at the first of them (h)."""
+    operator: str
+    """Who held the hammer for the first of them."""
+    taps: tuple[int, ...]
+    """Numbers of the tap tests in the series."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """One series, judged."""
+
+    points: tuple[TrendPoint, ...]
+    """Points, oldest first; one at least."""
+    first_value: float
+    """Value that the percents are of: that of the first tap test."""
+    readings: Readings
+    """Percents of the points, and what is known of them."""
+    past_fit: PastFit | None
+    """Shapes that it allows, over days of use, those behind the last point being days since 1970; None below 8
+    points."""
+    today: int
+    """Day since 1970 that it is judged on."""
+
+    def at_day(self, now: datetime) -> Trend:
+        """This trend as judged on another day."""
+        return replace(self, today=int(days_since_epoch(now)))
+
+    @cached_property
+    def detection(self) -> Detection:
+        """What the watch over its points has seen."""
+        return detect_changes(self.readings)
+
+    @cached_property
+    def forecast(self) -> Forecast | None:
+        """Forecast over days since 1970; None below 8 points."""
+        return (
+            None
+            if self.past_fit is None
+            else self.past_fit.forecast(float(self.past_fit.dates[-1]) + FORECAST_HORIZON_DAYS)
+        )
+
+    @cached_property
+    def likeliest_shape(self) -> TrendShape | None:
+        """The shape that fits it best, its start in days since 1970; None below 8 points."""
+        if self.past_fit is None or self.forecast is None:
+            return None
+        shape = self.forecast.likeliest
+        return shape._replace(start=float(np.interp(shape.start, self.past_fit.dates, point_days(self.points))))
+
+    @property
+    def start(self) -> float:
+        """Its start (%): the highest of the fitted line at the first 8 points, else of the first three points.
+
+        A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
+        spindle that falls from the beginning.
+        """
+        if self.past_fit is not None:
+            return float(self.past_fit.fitted[:MIN_FORECAST_POINTS].max())
+        return max(point.percent for point in self.points[:N_START_POINTS])
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether today is farther from its last point than anything is foretold."""
+        return self.forecast is not None and self.today > self.forecast.dates[-1]
+
+    @property
+    def has_forecast(self) -> bool:
+        """Whether it is long enough, and young enough."""
+        return self.past_fit is not None and not self.is_stale
+
+    def forecast_level(self, percent: float, error: float = 0.0) -> ThresholdDates:
+        """When it falls to a level: 100 ln of the frequency there over that of its first test; error: of that."""
+        if self.forecast is None or self.is_stale:
+            return NO_FORECAST
+        dates = self.forecast.crossing_dates(percent, error)
+        first, last = (float(day) for day in self.forecast.dates[[0, -1]])
+        earliest, probable, latest = (None if day == math.inf else max(day, first) for day in dates)
+        return ThresholdDates(False, earliest, probable, latest, last)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation from point to point around the fitted line (%); 0 while it is not known."""
+        return 0.0 if self.past_fit is None else self.past_fit.spread
+
+    @property
+    def rate(self) -> Rate | None:
+        """Change in % a month now, with its 95 % interval; None below 8 points."""
+        return None if self.past_fit is None else Rate(*(DAYS_PER_MONTH * rate for rate in self.past_fit.rate))
+
+    @property
+    def open_drop(self) -> DetectedDrop | None:
+        """The newest fall whose alarm is open; None without alarm."""
+        return next(reversed(self.detection.open_drops), None)
+
+    @property
+    def is_run_in(self) -> bool:
+        """Whether the open fall began among the first points and has slowed down since, as new bearings run in."""
+        if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
+            return False
+        fallen = self.start - float(self.past_fit.fitted[-1])
+        mean = fallen / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
+        return -self.past_fit.rate.value < MAX_RUN_IN_RATE * mean
+
+    @property
+    def drop_since(self) -> datetime | None:
+        """Time at which the fall began or happened that the alarm is about; None without alarm."""
+        return None if self.open_drop is None else self.points[self.open_drop.change.point].time
+
+
+def fit_trend(
+    series: Sequence[TapValue],
+    now: datetime,
+    other: Sequence[TapValue] = (),
+    known: SeriesScatterPrior = NO_SERIES_PRIOR,
+) -> Trend:
+    """Judge a series, oldest first, one value at least.
+
+    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, likewise;
+    known: what is known of its scatter beforehand.
+    """
+    points = _newest_points(series)
+    readings = _build_readings(points, _newest_points(other) if other else (), known)
+    return Trend(points, series[0].value, readings, _fit_points(points, readings), int(days_since_epoch(now)))
+
+
+def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
+    """The newest points of a series, oldest first."""
+    times, values, _, temperatures, _, _, reclamped = zip(*series, strict=True)
+    percents = PercentSeries(times, _log_percents(values), temperatures, reclamped)
+    return tuple(_build_point(percents, series, span) for span in [*divide_into_points(percents)][-MAX_TREND_POINTS:])
+
+
+def _build_point(percents: PercentSeries, series: Sequence[TapValue], span: TapRange) -> TrendPoint:
+    first, end = span
+    error = math.sqrt(sum(tap.error**2 for tap in series[first:end])) / (end - first)
+    changed, warm = percents.percent(span), percents.temperature(span)
+    begun = series[first]
+    return TrendPoint(begun.time, changed, error, warm, begun.hours, begun.operator, tuple(range(first, end)))
+
+
+def list_newest_percents(
+    times: Sequence[datetime], values: Sequence[float], reclamped: Sequence[bool]
+) -> tuple[list[datetime], list[float]]:
+    """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
+    series = PercentSeries(tuple(times), _log_percents(values), (math.nan,) * len(times), tuple(reclamped))
+    spans = [*divide_into_points(series)][-MAX_TREND_POINTS:] if times else []
+    return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
+
+
+def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
+    """Changes of values, 100 ln of each over the first."""
+    log, first = math.log, values[0] if values else 1.0
+    return tuple([100 * log(value / first) for value in values])
+
+
+def _fit_points(points: Sequence[TrendPoint], readings: Readings) -> PastFit | None:
+    if len(points) < MIN_FORECAST_POINTS:
+        return None
+    return fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
+
+
+def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], known: SeriesScatterPrior) -> Readings:
+    percents, temperatures = ([getattr(point, name) for point in points] for name in ("percent", "temperature"))
+    operators, other = tuple(point.operator for point in points), np.array([*_other_percents(points, others)])
+    return Readings(np.array(percents), np.array(temperatures), operators, other, known)
+
+
+def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) -> Iterator[float]:
+    """Percent of the other direction nearest in time to each point, NaN where there is none within a day."""
+    times = [other.time for other in others]
+    for point in points:
+        at = bisect(times, point.time)
+        near = min(others[max(at - 1, 0) : at + 1], key=lambda other: abs(other.time - point.time), default=None)
+        yield near.percent if near is not None and abs(near.time - point.time) < SAME_CLAMPING_TIME else math.nan
+
+
+def point_days(points: Sequence[TrendPoint]) -> Floats:
+    """Days since 1970, shape (n,)."""
+    return np.array([point.time.timestamp() for point in points]) / 86400
+
+
+def days_since_epoch(time: datetime) -> float:
+    """Days since 1970."""
+    return time.timestamp() / 86400
+
+
+def date_of_days(days: float) -> datetime:
+    """Date of so many days since 1970."""
+    return datetime.fromtimestamp(86400 * days, UTC)

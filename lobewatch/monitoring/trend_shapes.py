@@ -1,0 +1,210 @@
+"""Shapes that a trend may have, and their fits by least squares."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.monitoring.level_model import ColumnFits, LevelModel
+
+EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
+"""Rates of the exponential curves, over the span of the series; chosen."""
+POWER_EXPONENTS = (1.5, 2.0, 3.0)
+"""Exponents of the power curves; chosen."""
+RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.1, 1.2, 1.35, 1.6, 2.0, 2.7))
+"""Exponents of the curves that run away, and where they end, in spans of the series from its first point; chosen."""
+MIN_RUNAWAY_DISTANCE = 1e-6
+"""Least share of the way to that end at which such a curve is drawn."""
+
+Floats = NDArray[np.float64]
+ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
+SHAPE_KINDS: tuple[ShapeKind, ...] = (
+    "none",
+    "line",
+    "slope",
+    "step",
+    "curve",
+    "runaway",
+    "slopes",
+    "breaks",
+    "crash",
+    "wander",
+    "bend",
+)
+
+
+PRIOR_ODDS: dict[ShapeKind, float] = {
+    "none": 0.3,
+    "step": 0.3,
+    "slopes": 5.0,
+    "breaks": 5.0,
+    "crash": 4.0,
+    "wander": 0.5,
+    "bend": 0.5,
+}
+"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many courses hold their dates."""
+
+
+class TrendShape(NamedTuple):
+    """One shape that the course of a series may have."""
+
+    kind: ShapeKind
+    """Kind: "none", steady; "slope", a line from a point on; "step", fallen once; "curve", accelerating or slowing;
+    "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
+    "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
+    start: float
+    """Date from which on it falls, or on which it fell; the later one of two slopes; the step of a crash."""
+    accelerates: bool = False
+    """Whether a curve accelerates; else it slows down."""
+    rate: float = 0.0
+    """Rate of an exponential curve, over the span of the series; how much wanders; 0 of others."""
+    power: float = 0.0
+    """Exponent of a power curve, or one that runs away; 0 of others."""
+    end: float = 0.0
+    """Where a curve that runs away ends, in spans; the earlier date of two slopes, that of the line of a crash."""
+
+
+def list_single_shapes(at: Floats) -> list[TrendShape]:
+    """All shapes of one column that are tried; dates count from the first point on."""
+    return [
+        TrendShape("none", 0.0),
+        TrendShape("line", 0.0),
+        *(TrendShape("slope", start) for start in at[1:-3].tolist()),
+        *(TrendShape("step", start) for start in at[2:-1].tolist()),
+        *(TrendShape("curve", 0.0, rate > 0, rate=rate) for rate in EXPONENTIAL_RATES),
+        *(TrendShape("curve", 0.0, True, power=power) for power in POWER_EXPONENTS),
+        *(TrendShape("runaway", 0.0, True, power=power, end=end) for power, end in RUNAWAY_SHAPES),
+    ]
+
+
+def list_pair_shapes(at: Floats) -> list[TrendShape]:
+    """All shapes of two columns that are tried."""
+    ramps, steps = [0.0, *at[1:-3].tolist()], at[2:-1].tolist()
+    slopes = [TrendShape("slopes", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
+    crashes = [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
+    return slopes + crashes
+
+
+def list_triple_shapes(at: Floats) -> list[TrendShape]:
+    """All shapes of three columns that are tried."""
+    ramps = at[1:-3].tolist()
+    return [TrendShape("breaks", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
+
+
+def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floats:
+    """Courses of shapes of one column over dates that count from the first point on, shape (j, 1, d); span: of the
+    series."""
+    starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
+    columns, end = np.empty((len(shapes), at.size)), 0
+    for kind, alike in groupby(shape.kind for shape in shapes):
+        begin, end = end, end + len([*alike])
+        block, block_starts = columns[begin:end], starts[begin:end]
+        if kind == "step":
+            block[:] = at >= block_starts
+        elif kind == "curve":
+            curves = [(shape.rate, shape.power) for shape in shapes[begin:end]]
+            block[:] = [np.expm1(rate * at / span) if rate else (at / span) ** power for rate, power in curves]
+        elif kind == "runaway":
+            ways = [
+                (shape.power, np.maximum(1 - at / (shape.end * span), MIN_RUNAWAY_DISTANCE))
+                for shape in shapes[begin:end]
+            ]
+            block[:] = [way**-power - 1 for power, way in ways]
+        else:
+            np.maximum(np.subtract(at, block_starts, out=block), 0.0, out=block)
+    return np.asarray(columns[:, np.newaxis])
+
+
+def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
+    """Courses of shapes of two columns, shape (j, 2, d): that of the earlier date, that of the later one."""
+    places = np.array([(shape.end, shape.start) for shape in shapes]).reshape(-1, 2, 1)
+    columns = np.maximum(at - places, 0.0)
+    is_crash = np.array([shape.kind == "crash" for shape in shapes], dtype=bool)
+    columns[is_crash, 1] = at >= places[is_crash, 1]
+    return np.asarray(columns)
+
+
+def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
+    """Courses of shapes of three columns, shape (j, 3, d): the line, and both dates."""
+    line = np.broadcast_to(at, (len(shapes), 1, at.size))
+    return np.concatenate([line, build_pair_columns(shapes, at)], axis=1)
+
+
+RATE_STEP = 1e-6
+"""Part of the span over which a rate is taken."""
+
+ColumnBuilder = Callable[[Sequence[TrendShape], Floats], Floats]
+"""Columns (j, k, d) of shapes at dates that count from the first point on."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFits:
+    """Shapes of the same number of columns, fitted to one series whose dates count from its first point on."""
+
+    shapes: tuple[TrendShape, ...]
+    """The shapes, j of them."""
+    evidence: Floats
+    """Logarithm of the evidence for each, a steady series having 0, by Schwarz's approximation, shape (j,)."""
+    fits: ColumnFits
+    """Their fits."""
+    build_columns: ColumnBuilder
+    """Their columns."""
+    span: float
+    """Length of the series."""
+
+    @property
+    def freedom(self) -> Floats:
+        """Degrees of freedom, shape (j,)."""
+        return np.full(len(self.shapes), float(self.fits.freedom))
+
+    @property
+    def variance(self) -> Floats:
+        """Variance of a point around each shape, shape (j,)."""
+        return self.fits.rss / self.fits.freedom
+
+    def select(self, numbers: NDArray[np.intp]) -> Self:
+        """Some of the shapes alone."""
+        shapes = tuple(self.shapes[j] for j in numbers)
+        return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
+
+    def predict(self, at: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard error of each at dates, shape (j, d) each."""
+        return self.fits.predict(self.build_columns(self.shapes, at))
+
+    def rate(self) -> tuple[Floats, Floats]:
+        """Rate of change of each at the last point, and its standard error, shape (j,) each."""
+        near = self.build_columns(self.shapes, np.array([self.span - RATE_STEP * self.span, self.span]))
+        return self.fits.rate(np.diff(near)[..., 0] / (RATE_STEP * self.span))
+
+
+def fit_single_shapes(base: LevelModel, at: Floats) -> ShapeFits:
+    """Shapes of one column."""
+    span = float(at[-1])
+    return _fit_shapes(base, at, list_single_shapes(at), lambda shapes, dates: build_columns(shapes, dates, span))
+
+
+def fit_pair_shapes(base: LevelModel, at: Floats) -> ShapeFits:
+    """Shapes of two columns."""
+    return _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
+
+
+def fit_triple_shapes(base: LevelModel, at: Floats) -> ShapeFits:
+    """Shapes of three columns."""
+    return _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)
+
+
+def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], drawn: ColumnBuilder) -> ShapeFits:
+    """Within a kind equal weight beforehand for each of its shapes."""
+    fits = base.fit_columns(drawn(shapes, at))
+    counts = Counter(shape.kind for shape in shapes)
+    columns = np.array([0 if shape.kind == "none" else fits.size.shape[1] for shape in shapes])
+    many = np.log([counts[shape.kind] / PRIOR_ODDS.get(shape.kind, 1.0) for shape in shapes])
+    left = np.log(fits.rss / (base.residual_squares + np.finfo(float).tiny))
+    evidence = -fits.freedom / 2 * left - many - columns / 2 * np.log(at.size)
+    return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]))

@@ -1,0 +1,183 @@
+"""Check the computer for a tap test: ports, rights, clock, disk, packages, browser."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import shutil
+import time
+import webbrowser
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import Literal
+
+from acquisition import DeviceError, explain_no_ports, find_driver, scan_ports
+from acquisition.devices import ScannedPort
+from acquisition.ports import SerialLink
+from lobewatch.machine.folder import MachineFolder
+
+MIN_FREE_BYTES = 200 << 20
+"""Free bytes below which a tap test may not end, twenty times what one takes; chosen."""
+AMPLE_FREE_BYTES = 2 << 30
+"""Free bytes below which a year of tests may not fit; chosen."""
+MAX_LATENCY_TIMER = 2
+"""Latency timer of an FTDI port that does no harm (ms); the factory's 16 delays what a rate is measured by."""
+LATENCY_TIMER_FOLDER = Path("/sys/bus/usb-serial/devices")
+"""Where Linux keeps the latency timers of FTDI ports."""
+MIN_CLOCK_YEAR = 2025
+"""Year before which no clock is right that runs this program."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    subject: str
+    """Name of the thing in a word or two."""
+    state: Literal["fine", "note", "hinders"]
+    """State: a note is worth knowing, what hinders stands in the way of a tap test."""
+    text: str
+    """What there is."""
+    cure: str = ""
+    """What to do about it; empty where nothing need be done."""
+
+
+def check_computer(machine: MachineFolder | None = None, now: float | None = None) -> tuple[Finding, ...]:
+    """All findings, in the order in which one would go about a test. machine: looked at, too; now: time (s, UTC)."""
+    folder = machine.path if machine else Path.cwd()
+    moment = datetime.fromtimestamp(time.time() if now is None else now, UTC)
+    return (
+        *_check_versions(),
+        *_check_ports(machine),
+        *_check_latency(LATENCY_TIMER_FOLDER),
+        _check_clock(machine, moment),
+        _check_disk_space(folder),
+        *_check_extras(machine),
+        _check_browser(),
+        _check_load(),
+    )
+
+
+def _check_versions() -> Iterator[Finding]:
+    names = "numpy", "scipy", "h5py", "matplotlib", "pyserial"
+    listed = ", ".join(f"{name} {version(name)}" for name in names)
+    text = f"lobewatch {version('lobewatch')}, Python {platform.python_version()} on {platform.platform(terse=True)}"
+    yield Finding("versions", "fine", f"{text}; {listed}")
+
+
+def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
+    """Ports and what answers; where machine.toml names a port, that one must be there."""
+    survey = scan_ports()
+    for port in survey.ports:
+        yield _check_port(port)
+    for remark in survey.remarks:
+        yield Finding("drivers", "note", f"{remark.about}: {remark.text}", remark.cure)
+    if not survey.ports:
+        yield Finding("ports", "note", "none", explain_no_ports())
+    wanted = machine.machine.daq.port if machine else ""
+    if wanted and wanted not in [port.port.device for port in survey.ports]:
+        yield _check_named_port(wanted)
+
+
+def _check_port(port: ScannedPort) -> Finding:
+    subject = f"port {port.port.device}"
+    if port.problem:
+        text, _, cure = port.problem.partition("; ")
+        return Finding(subject, "hinders", text, cure)
+    if port.answer is None:
+        return Finding(subject, "fine", port.text)
+    return Finding(subject, "fine", f"{port.answer.identity.model} answers ({port.answer.driver})")
+
+
+def _check_named_port(name: str) -> Finding:
+    """A port of machine.toml that is not listed: a pseudo-terminal, the network, or not there."""
+    subject = f"port {name}"
+    try:
+        SerialLink(name).close()
+    except DeviceError as error:
+        return Finding(subject, "hinders", f"named in [daq]: {error.text}", error.cure)
+    return Finding(subject, "fine", "named in [daq], opens")
+
+
+def _check_latency(folder: Path) -> Iterator[Finding]:
+    """Ports whose driver waits before it hands over what has come."""
+    for timer in sorted(folder.glob("*/latency_timer")):
+        try:
+            wait = int(timer.read_text("ascii"))
+        except (OSError, ValueError):
+            continue
+        port = f"latency of {timer.parent.name}"
+        cure = "" if wait <= MAX_LATENCY_TIMER else f"echo 1 | sudo tee {timer}"
+        yield Finding(port, "note" if cure else "fine", f"{wait} ms", cure)
+
+
+def _check_clock(machine: MachineFolder | None, now: datetime) -> Finding:
+    """A clock that is behind what has been written already is wrong."""
+    written = [datetime.fromisoformat(entry.time) for entry in machine.taps()] if machine else []
+    newest = max((moment.astimezone(UTC) for moment in written), default=None)
+    text = f"{now:%Y-%m-%d %H:%M} UTC"
+    cure = "set the clock (`timedatectl set-ntp true` on Linux)"
+    if now.year < MIN_CLOCK_YEAR:
+        return Finding("clock", "hinders", text, cure)
+    if newest is not None and newest > now:
+        return Finding("clock", "hinders", f"{text}, before the newest tap test ({newest:%Y-%m-%d %H:%M})", cure)
+    return Finding("clock", "fine", text)
+
+
+def _check_disk_space(folder: Path) -> Finding:
+    """Room, and whether files can be made there."""
+    subject = f"disk of {folder}"
+    if not os.access(folder, os.W_OK):
+        return Finding(subject, "hinders", "cannot be written", "give yourself the right to write there")
+    free = shutil.disk_usage(folder).free
+    text = f"{free / 1e9:.3g} GB free"
+    if free >= AMPLE_FREE_BYTES:
+        return Finding(subject, "fine", text)
+    return Finding(subject, "hinders" if free < MIN_FREE_BYTES else "note", text, "make room on that disk")
+
+
+def _check_extras(machine: MachineFolder | None) -> Iterator[Finding]:
+    """Extras that are installed; one that the driver of the machine needs must be."""
+    packages: dict[str, list[str]] = {}
+    for line in requires("lobewatch") or ():
+        if match := re.match(r"([\w.-]+).*extra == ['\"]([\w-]+)['\"]", line):
+            packages.setdefault(match[2], []).append(match[1])
+    shown = sorted(set(packages) - {"dev", "bench"})
+    missing = [extra for extra in shown if not all(map(_is_installed, packages[extra]))]
+    there = ", ".join(extra for extra in shown if extra not in missing) or "none"
+    cure = f"for one of {', '.join(missing)}: pip install 'lobewatch[NAME]'" if missing else ""
+    yield Finding("extras", "fine", f"installed: {there}", cure)
+    needed = find_driver(machine.machine.daq.driver).extra if machine else ""
+    if needed in missing:
+        text = f'driver = "{needed}" needs the extra {needed}, which is not installed'
+        yield Finding("driver", "hinders", text, f"pip install 'lobewatch[{needed}]'")
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        version(package)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def _check_browser() -> Finding:
+    """Whether a page can be opened here; another computer can show it, too."""
+    try:
+        name = webbrowser.get().__class__.__name__
+    except webbrowser.Error:
+        return Finding("browser", "note", "none here", "open the address of --screen on a tablet: --listen 0.0.0.0")
+    return Finding("browser", "fine", f"there is one ({name})")
+
+
+def _check_load() -> Finding:
+    """A busy computer measures rates badly."""
+    cores = os.cpu_count() or 1
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    busy = load > cores
+    text = f"{cores} cores, load {load:.1f}"
+    return Finding("processor", "note" if busy else "fine", text, "close other programs" if busy else "")

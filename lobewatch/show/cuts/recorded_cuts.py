@@ -1,0 +1,193 @@
+"""Show recorded cuts: chatter or not, speed, and what the verdict rests on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
+from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
+from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.show.programs.materials import power_json, power_text
+
+FAULT_TEXTS: Mapping[str, str] = {
+    "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
+    "no-cut": "nothing in it gets louder: record from the spindle turning in air into the cut",
+    "no-air": "no 0.15 s of the spindle turning in air beside the cut, or its lines are there as well, so that it is "
+    "not known what is there without a cut; record the spindle in air, then the cut",
+    "knock": "a knock in the cut, as of a hammer; cut again without it",
+    "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
+    "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
+    "speed-not-found": "no spindle speed within 5 % of the one that was set fits its lines; correct the speed",
+    "tacho-contradicts": "the tachometer turns at another speed than the lines of the cut",
+    "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
+    "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away, and give "
+    "pitch_deg where the teeth are unevenly spaced",
+    "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
+    "unexplained-tone": "a tone that neither the spindle, nor its teeth, nor air explains, without the side bands that "
+    "a cut gives to chatter; cut a little deeper, and listen for it without the cut",
+    "slow-sampling": "fewer than three multiples of tooth passing are heard at this sample rate; take a higher one",
+}
+"""Fault and cure by the reason why it cannot be told."""
+
+
+MICROPHONE_NOTE = (
+    "by microphone: it hears the shop too, so that a tone of another machine that runs in the cut alone is not known "
+    "from one of the cut, and it does not tell how far the tool moves"
+)
+"""What a microphone cannot tell."""
+MIN_RATE_FACTOR = 2 * MIN_TOOTH_HARMONICS
+"""Sample rate over tooth passing from which on enough multiples are below half of it."""
+
+
+NEXT_STEP_TEXTS: Mapping[str, str] = {
+    "stable": "lobewatch suggest names the next test cut; a deeper one teaches more",
+    "chatter": "cut less deep or at another speed; lobewatch suggest names the next test cut",
+    "flip": "cut at another speed, or less deep; lobewatch suggest names the next test cut",
+    "cannot tell": "listen again; this one teaches nothing",
+}
+"""Next step by the word."""
+
+
+def next_step_text(comparison: CutComparison) -> str:
+    """The next step, in a line."""
+    return NEXT_STEP_TEXTS[comparison.detected.verdict]
+
+
+def reason_text(comparison: CutComparison) -> str:
+    """What the word rests on, or why it cannot be told, in a line."""
+    heard = comparison.detected
+    return _fault_text(comparison) if heard.verdict == "cannot tell" else _energy_text(heard.energy_ratio)
+
+
+def _fault_text(comparison: CutComparison) -> str:
+    """Fault and cure, with the numbers of this cut."""
+    reason, tone = comparison.detected.reason, comparison.detected.tone
+    if reason == "speed-not-found" and math.isfinite(comparison.detected.distant_rpm):
+        return f"{FAULT_TEXTS[reason]}; these lines fit {comparison.detected.distant_rpm:.0f} rpm"
+    if reason == "tacho-contradicts":
+        return f"{FAULT_TEXTS[reason]}: {_speed_conflict_text(comparison)}"
+    if reason == "slow-sampling":
+        return f"{FAULT_TEXTS[reason]}: {MIN_RATE_FACTOR * comparison.tooth_passing_frequency:.0f} Hz or more"
+    if reason == "unexplained-tone":
+        mode = comparison.nearest_mode_frequency(tone)
+        away = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
+        return f"at {tone:.1f} Hz{away}: {FAULT_TEXTS[reason]}"
+    return FAULT_TEXTS[reason]
+
+
+def _speed_conflict_text(comparison: CutComparison) -> str:
+    """Both speeds, and what is to be looked at."""
+    heard, set_rpm = comparison.detected, comparison.setting.speed_rpm
+    measured, lines = heard.measured_rpm or math.nan, heard.distant_rpm
+    both = f"{measured:.1f} rpm, not the {lines:.1f} rpm that {'was set' if lines == set_rpm else 'the lines fit'}"
+    if not is_pulse_multiple(measured / lines):
+        return f"{both}; correct --speed, or name the column that is meant"
+    size = "small" if measured > lines else "large"
+    return f"{both}; --pulses is {round(max(measured / lines, lines / measured))} times too {size}, or correct --speed"
+
+
+def _energy_text(ratio: float) -> str:
+    percent = f"{100 * ratio:.2g}" if ratio < 1 else f"{100 * ratio:.0f}"
+    return f"beside the lines of the spindle: {percent} % of their energy"
+
+
+def cut_verdict_text(comparison: CutComparison) -> str:
+    """The word, in a line."""
+    heard, chatter = comparison.detected, comparison.detected.chatter
+    if heard.verdict == "cannot tell":
+        return f"cannot tell ({heard.reason}): {_fault_text(comparison)}"
+    if chatter is None:
+        return "stable"
+    named = "period-two chatter" if heard.verdict == "flip" else "chatter"
+    return f"{named} at {chatter.frequency:.1f} +- {max(2 * chatter.error, 0.1):.1f} Hz"
+
+
+def recorded_cut_texts(comparison: CutComparison) -> list[str]:
+    """The word, and what it rests on."""
+    heard, chatter, texts = comparison.detected, comparison.detected.chatter, [cut_verdict_text(comparison)]
+    if heard.spindle_speed is not None:
+        off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+        texts.append(
+            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
+            f"{comparison.tooth_passing_frequency:.1f} Hz; listened to {_analysed_seconds(comparison):.2f} s"
+        )
+    if heard.measured_rpm is not None:
+        is_silent = math.isnan(heard.measured_rpm)
+        texts.append(f"tachometer: {'no speed in the cut' if is_silent else f'{heard.measured_rpm:.1f} rpm'}")
+    if math.isfinite(heard.energy_ratio):
+        texts.append(_energy_text(heard.energy_ratio))
+    if chatter is not None:
+        lobe = comparison.lobe_number
+        texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(chatter.peaks)} side bands")
+    if comparison.sensor == "microphone":
+        texts.append(MICROPHONE_NOTE)
+    if comparison.power is not None:
+        texts.append(power_text(comparison.power, comparison.setting.cut))
+    return texts + _prediction_texts(comparison)
+
+
+def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:
+    """What was heard of each cut in a recording; saved: names under which they are kept."""
+    texts = list[str]()
+    for number, comparison in enumerate(comparisons):
+        parts = comparison.detected.parts
+        head = [f"cut {number + 1} of {len(comparisons)}, {parts.begin:.2f} to {parts.end:.2f} s:"]
+        texts += head if len(comparisons) > 1 else []
+        texts += [*recorded_cut_texts(comparison), *(f"saved {name}" for name in saved[number : number + 1])]
+    return texts
+
+
+def _prediction_texts(comparison: CutComparison) -> list[str]:
+    if comparison.predicted is None:
+        return []
+    word = "stable" if comparison.predicted.stable else "chatter"
+    text = f"by the tap tests, at rest: {word}, at this depth {comparison.predicted.frequency:.1f} Hz"
+    if comparison.frequency_difference is not None:
+        text += f", {comparison.frequency_difference:.1f} Hz from what was heard modulo tooth passing"
+    return [text]
+
+
+def _analysed_seconds(comparison: CutComparison) -> float:
+    spectrum = comparison.detected.spectrum
+    return math.nan if spectrum is None else 1 / spectrum.bin_width
+
+
+def recorded_cut_json(comparison: CutComparison) -> dict[str, Any]:
+    """A cut with all that was heard of it."""
+    heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
+    return {
+        "word": heard.verdict,
+        "reason": heard.reason,
+        "chatter_frequency_hz": None if chatter is None else chatter.frequency,
+        "chatter_frequency_hz_std": None if chatter is None else chatter.error,
+        "elsewhere_rpm": heard.distant_rpm,
+        "unexplained_tone_hz": heard.tone,
+        "sensor": comparison.sensor,
+        "speed_rpm": heard.speed_rpm,
+        "speed_rpm_std": None if heard.spindle_speed is None else 60 * heard.spindle_speed.error,
+        "commanded_rpm": comparison.setting.speed_rpm,
+        "measured_rpm": heard.measured_rpm,
+        "depth_mm": 1e3 * comparison.setting.depth,
+        "tooth_frequency_hz": comparison.tooth_passing_frequency,
+        "energy_ratio": heard.energy_ratio,
+        "lobe": comparison.lobe_number,
+        "side_bands_hz": [] if chatter is None else sorted(chatter.peaks.frequency.tolist()),
+        **power_json(comparison.power),
+        "predicted": None if expected is None else ("stable" if expected.stable else "chatter"),
+        "predicted_frequency_hz": None if expected is None else expected.frequency,
+        "predicted_apart_hz": comparison.frequency_difference,
+        "begin_s": heard.parts.begin,
+        "end_s": heard.parts.end,
+        "steady_begin_s": heard.parts.steady_begin,
+        "steady_end_s": heard.parts.steady_end,
+    }
+
+
+def recording_json(comparisons: Sequence[CutComparison], beside: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """The cut in a recording; several stand in `cuts`. beside: more of each."""
+    each = [recorded_cut_json(comparison) for comparison in comparisons]
+    for cut, more in zip(each, beside, strict=False):
+        cut.update(more)
+    return each[0] if len(each) == 1 else {"cuts": each}

@@ -1,0 +1,79 @@
+"""Plot the spectrum of recorded cuts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
+from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
+from lobewatch.show.figures.drawing import (
+    ALARM_ORANGE,
+    EVENT_GREY,
+    FIRST_GREY,
+    GOOD_GREEN,
+    NEWEST_BLUE,
+    new_axes,
+    save_figure,
+)
+from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
+from lobewatch.tool.assembly import Assembly
+
+LINE_KIND_MARKS = {
+    "turns": ("turns of the spindle", FIRST_GREY, "|"),
+    "tooth": ("tooth passing", NEWEST_BLUE, "o"),
+    "air": ("there in air", EVENT_GREY, "x"),
+    "chatter": ("chatter", ALARM_ORANGE, "D"),
+}
+"""Label, colour and mark of lines."""
+MIN_SHOWN_AMPLITUDE = 1e-4
+"""Share of the loudest amplitude down to which is drawn."""
+
+
+def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
+    """Write the picture of the cuts in a recording to a file."""
+    save_figure(plot_cut_spectrum(comparisons), path)
+
+
+def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
+    """Amplitude over frequency, a panel for each cut; the word alone where it did not get as far as a spectrum."""
+    figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
+    for axis, comparison in zip(axes, comparisons, strict=True):
+        _draw_spectrum(axis, comparison)
+    return figure
+
+
+def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
+    """One cut."""
+    spectrum = comparison.detected.spectrum
+    setting = comparison.setting
+    named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
+    word = cut_verdict_text(comparison).partition(":")[0]
+    axis.set_title(f"{named}: {word}", loc="left", fontsize=11, fontweight="bold")
+    axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
+    if spectrum is None:
+        return
+    inside = spectrum.frequency <= min(MAX_CURVE_FREQUENCY, spectrum.sample_rate / 2)
+    amplitude = np.sqrt(spectrum.power[inside])
+    axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
+    for name, lines in group_peaks(comparison.detected).items():
+        label, colour, mark = LINE_KIND_MARKS[name]
+        axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
+    if comparison.assembly is not None:
+        _draw_modes(axis, comparison.assembly)
+    top = float(np.max(amplitude))
+    axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(MIN_SHOWN_AMPLITUDE * top, 3 * top))
+    axis.legend(loc="upper right", ncols=3, fontsize=8)
+
+
+def _draw_modes(axis: Axes, assembly: Assembly) -> None:
+    """Modes of the tool as it was tapped."""
+    for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
+        for number, mode in enumerate(modes or ()):
+            label = f"modes in {name}, at rest" if number == 0 else None
+            axis.axvline(mode.frequency, color=GOOD_GREEN, ls=dashes, lw=1, label=label)

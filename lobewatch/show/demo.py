@@ -1,0 +1,91 @@
+"""Show the tap tests of the demo: true and measured values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from lobewatch.monitoring.trend import date_of_days
+from lobewatch.show.terminal.output import new_table
+from lobewatch.show.trend import reach_text
+from lobewatch.tap.demo import DemoTap, LevelForecast, SpindleState
+
+STATE_KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
+"""Names of the figures of a SpindleState in JSON."""
+STATE_NAMES = ("f_1", "zeta", "K", "bearing stiffness")
+"""Names of these figures for people."""
+DEMO_COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
+"""Heading, size of the unit and decimals."""
+
+
+def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
+    """All tap tests, and the forecast beside the truth."""
+    levels = {
+        forecast.level: {**forecast.reached.to_row(), "truth": _date_text(forecast.truth)} for forecast in forecasts
+    }
+    return {"taps": [_demo_tap_json(tap) for tap in taps], "forecast": levels, "report": str(report)}
+
+
+def _date_text(days: float | None) -> str | None:
+    return None if days is None else f"{date_of_days(days):%Y-%m-%d}"
+
+
+def _demo_tap_json(tap: DemoTap) -> dict[str, Any]:
+    about = {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
+    return about | {"truth": _state_json(tap.plan.truth), "found": _state_json(tap.result)}
+
+
+def _state_json(state: SpindleState) -> dict[str, float]:
+    return dict(zip(STATE_KEYS, astuple(state), strict=True))
+
+
+def demo_texts(
+    taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path
+) -> list[str | Table]:
+    """Tap tests, worst errors, and the forecast beside the truth, for people; scatter: of f_1, as a share of it."""
+    in_x = [tap for tap in taps if tap.plan.direction == "x"]
+    first, last = in_x[0], in_x[-1]
+    measured = last.result.relative_to(first.result).stiffness
+    true = last.plan.truth.relative_to(first.plan.truth).stiffness
+    return [
+        "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
+        f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
+        _demo_table(taps),
+        "worst error: " + ", ".join(_worst_errors(taps)),
+        f"K over the whole demo, in x: {100 * measured:+z.2f} % found, {100 * true:+z.2f} % true",
+        *(
+            []
+            if not forecasts
+            else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]
+        ),
+        *(_forecast_text(forecast, taps[-1].plan.date) for forecast in forecasts),
+        f"report: {report}",
+    ]
+
+
+def _forecast_text(forecast: LevelForecast, last: datetime) -> str:
+    true = _date_text(forecast.truth) or "never, or not for years"
+    return f"{forecast.level}: {reach_text(forecast.reached, last)}; true {true}"
+
+
+def _demo_table(taps: Sequence[DemoTap]) -> Table:
+    rows = new_table("<test", *(word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")))
+    for tap in taps:
+        pairs = zip(astuple(tap.plan.truth), astuple(tap.result), strict=True)
+        cells = [
+            f"{value / scale:.{digits}f}"
+            for pair, (_, scale, digits) in zip(pairs, DEMO_COLUMNS, strict=True)
+            for value in pair
+        ]
+        rows.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
+    return rows
+
+
+def _worst_errors(taps: Sequence[DemoTap]) -> list[str]:
+    errors = zip(*(astuple(tap.result.relative_to(tap.plan.truth)) for tap in taps), strict=True)
+    return [f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(STATE_NAMES, errors, strict=True)]

@@ -1,1 +1,0 @@
-"""Ports, devices and sensors for people and as JSON."""

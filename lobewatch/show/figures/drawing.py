@@ -1,0 +1,189 @@
+"""Shared by all figures: style, axes, files, and labels that do not overlap."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import LogFormatter
+
+from lobewatch.show.terminal.output import make_printable
+
+NEWEST_BLUE = "#0072B2"
+FIRST_GREY = "#777777"
+ALARM_ORANGE = "#D55E00"
+GOOD_GREEN = "#009E73"
+UNKNOWN_GREY = "#767676"
+EVENT_GREY = "#555555"
+FIGURE_STYLE: dict[Any, Any] = {
+    "font.size": 10,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "lobewatch",
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+}
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture in the format that the ending names; ValueError for one that is not known."""
+    if path.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise ValueError(
+            f"{path}: a picture cannot end in {path.suffix!r}; name a file that ends in .svg, .png or .pdf"
+        )
+    _disable_math_text(figure)
+    with mpl.rc_context(FIGURE_STYLE):
+        figure.savefig(path, dpi=150)
+
+
+def render_svg(figure: Figure) -> str:
+    """The picture as an <svg> element."""
+    text = io.StringIO()
+    _disable_math_text(figure)
+    with mpl.rc_context(FIGURE_STYLE):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def _disable_math_text(figure: Figure) -> None:
+    """Texts stand as they are: a program may be called "cost $5 to $6". Logarithmic axes have plain numbers then.
+
+    Characters that no picture can hold are replaced.
+    """
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+        text.set_text(make_printable(text.get_text()))
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):
+        axis.set_major_formatter(LogFormatter())
+        axis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
+
+
+def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """A figure of this size (inches) with rows of axes, one above the other."""
+    with mpl.rc_context(FIGURE_STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
+    return figure, list(axes[:, 0])
+
+
+LabelSide = Literal["right", "left", "above", "below"]
+LABEL_SIDES: dict[LabelSide, tuple[float, float]] = {
+    "right": (1, 0),
+    "left": (-1, 0),
+    "above": (0, 1),
+    "below": (0, -1),
+}
+LABEL_FONT_SIZE = 8.5
+"""Size of the letters (points)."""
+PHONE_FONT_SIZE = 11.5
+"""The same of a small picture on a phone, where letters are larger than the picture is (report.css)."""
+MAX_HIDDEN_SHARE = 0.15
+"""Share of its area, at most, that words may cover or lie outside before they are left out."""
+LETTER_WIDTH, LINE_HEIGHT = 0.62, 1.35
+"""A letter and a line, at most, over the size."""
+LABEL_DISTANCE = 9.0
+"""Distance from a place to its words (points)."""
+LABEL_BACKGROUND = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
+"""Look of the paper behind words that stand on lines."""
+
+
+class _Box(NamedTuple):
+    """A rectangle in points of the axes."""
+
+    left: float
+    low: float
+    right: float
+    high: float
+
+    @property
+    def area(self) -> float:
+        """Area (points squared)."""
+        return (self.right - self.left) * (self.high - self.low)
+
+    def overlap(self, box: _Box) -> float:
+        """Area in common."""
+        wide = min(self.right, box.right) - max(self.left, box.left)
+        high = min(self.high, box.high) - max(self.low, box.low)
+        return wide * high if wide > 0 and high > 0 else 0.0
+
+
+class LabelPlacer:
+    """Words in one picture, whose limits are set already."""
+
+    def __init__(self, axes: Axes, room: float = LABEL_FONT_SIZE, *, may_lack: bool = False) -> None:
+        """None yet. room: size of letters (points) to leave room for; may_lack: words without room are left out."""
+        self._axes = axes
+        self._room = room
+        self._above = LABEL_DISTANCE / 2 * room / LABEL_FONT_SIZE
+        self._may_lack = may_lack
+        self._taken: list[_Box] = []
+
+    def add(
+        self,
+        text: str,
+        place: tuple[float, float],
+        colour: str = "black",
+        sides: Sequence[LabelSide] = tuple(LABEL_SIDES),
+    ) -> None:
+        """Put words to that side of a place where they cover least of what is there, the first of several."""
+        boxes = {side: self._box(text, place, side) for side in sides}
+        best = min(boxes, key=lambda side: self._covered(boxes[side]))
+        if self._may_lack and self._covered(boxes[best]) > MAX_HIDDEN_SHARE * boxes[best].area:
+            return
+        self._taken.append(boxes[best])
+        right, up = LABEL_SIDES[best]
+        self._axes.annotate(
+            text,
+            place,
+            xytext=(LABEL_DISTANCE * right, self._above * up),
+            textcoords="offset points",
+            fontsize=LABEL_FONT_SIZE,
+            color=colour,
+            ha={1: "left", -1: "right"}.get(int(right), "center"),
+            va={1: "bottom", -1: "top"}.get(int(up), "center"),
+            bbox=LABEL_BACKGROUND,
+        )
+
+    def reserve_area(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+        """No words between two corners, where there is a choice."""
+        self._taken.append(_Box(*self._points(low), *self._points(high)))
+
+    def reserve_mark(self, place: tuple[float, float], size: float) -> None:
+        """No words over a mark of this size (points), where there is a choice."""
+        x, y = self._points(place)
+        self._taken.append(_Box(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
+
+    def _box(self, text: str, place: tuple[float, float], side: LabelSide) -> _Box:
+        lines, (right, up) = text.split("\n"), LABEL_SIDES[side]
+        wide, high = LETTER_WIDTH * self._room * max(map(len, lines)), LINE_HEIGHT * self._room * len(lines)
+        x, y = self._points(place)
+        middle = x + right * (LABEL_DISTANCE + wide / 2), y + up * (self._above + high / 2)
+        return _Box(middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
+
+    def _covered(self, box: _Box) -> float:
+        """Area of other words, and area outside of the axes."""
+        inside = box.overlap(_Box(0, 0, *self._size))
+        return box.area - inside + sum(box.overlap(taken) for taken in self._taken)
+
+    def _points(self, place: tuple[float, float]) -> tuple[float, float]:
+        shares = (
+            (value - low) / (high - low)
+            for value, (low, high) in zip(place, (self._axes.get_xlim(), self._axes.get_ylim()), strict=True)
+        )
+        x, y = (share * size for share, size in zip(shares, self._size, strict=True))
+        return x, y
+
+    @property
+    def _size(self) -> tuple[float, float]:
+        box = self._axes.get_window_extent()
+        points = 72 / self._axes.figure.dpi
+        return box.width * points, box.height * points

@@ -1,0 +1,311 @@
+"""Plot measured modes and the spindle model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
+from lobewatch.logbook.chart_data import ModelFigureData
+from lobewatch.show.figures.drawing import ALARM_ORANGE, FIGURE_STYLE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE
+from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
+
+CIRCLES_PER_ROW = 4
+"""Circles in a row."""
+MAX_CIRCLES = 8
+"""Circles at most: of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
+MIN_LABEL_SPACING = 0.014
+"""Between labels of modes that are close (share of the axis)."""
+LEGEND_SHARE = 0.08
+"""Room for it below all lines (share of the axis)."""
+ORDER_AXIS_TOP = 10.5
+"""Just above the poles of the highest order."""
+CIRCLE_HALF_WIDTHS = 3.0
+"""A circle is drawn over this many half-power half-widths on either side."""
+
+
+TRUST_MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
+"""Mark behind the frequency of a mode."""
+
+
+def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
+    """|Accelerance| measured, fitted and what is left; LSCF poles of every order, with those named that are stable but
+    no modes; circle and phase of each mode. Of free decays the spectrum of the first one, and no circles."""
+    circles = sorted((mode for mode in modes if mode.has_stiffness), key=_circle_rank)[:MAX_CIRCLES]
+    rows = -(-len(circles) // CIRCLES_PER_ROW)
+    with mpl.rc_context(FIGURE_STYLE):
+        figure = Figure(figsize=(9.0, 6.0 + 2.4 * rows), layout="constrained")
+        grid = figure.add_gridspec(2 + rows, CIRCLES_PER_ROW, height_ratios=[3.2, 2.2, *rows * [2.4]])
+        top = figure.add_subplot(grid[0, :])
+        chart = figure.add_subplot(grid[1, :], sharex=top)
+        _draw_accelerance(top, state, modes)
+        _draw_stabilization_chart(chart, state, modes)
+        _draw_circles(figure, grid, state, sorted(circles, key=lambda mode: mode.frequency))
+    top.set_title(title, pad=10 + 6 * max((len(_mode_label(mode)) for mode in modes), default=0))
+    return figure
+
+
+def _circle_rank(mode: Mode) -> tuple[int, float]:
+    """Trusted modes first, of those the one with the highest peak."""
+    return list(Trust).index(assess_trust(mode)), -(mode.frequency**2) * mode.peak
+
+
+def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
+    f = state.frf.frequency
+    axes.semilogy(f, np.abs(state.frf.accelerance), color=FIRST_GREY, lw=0.8, label="measured")
+    for i, band in enumerate(state.bands):
+        part = f[band.lines]
+        size = (2 * np.pi * part) ** 2
+        left = state.residual(band)[0]
+        fitted = state.frf.receptance[band.lines] - left
+        axes.semilogy(
+            part, np.abs(fitted) * size, color=NEWEST_BLUE, ls="--", label="fit in its bands" if i == 0 else None
+        )
+        axes.semilogy(part, np.abs(left) * size, color=ALARM_ORANGE, lw=0.6, label="measured - fit" if i == 0 else None)
+    places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
+    for mode, place in zip(modes, places, strict=True):
+        axes.annotate(
+            _mode_label(mode),
+            (place, 1.0),
+            xytext=(0, 2),
+            textcoords="offset points",
+            xycoords=("data", "axes fraction"),
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=8,
+        )
+    low, high = axes.get_ylim()
+    is_frf = all(mode.has_stiffness for mode in modes)
+    axes.set_ylabel("|accelerance| (m/s²/N)" if is_frf else "|spectrum of a decay| (m/s)")
+    axes.set(xlim=(f[0], f[-1]), ylim=(low * (low / high) ** LEGEND_SHARE, high))
+    axes.tick_params(labelbottom=False)
+    axes.legend(loc="lower right", ncols=3)
+
+
+def _mode_label(mode: Mode) -> str:
+    return f"{_frequency_text(mode.frequency)}{TRUST_MARKS[assess_trust(mode)]}"
+
+
+def _frequency_text(frequency: float) -> str:
+    return f"{frequency:.0f}" if frequency >= 100 else f"{frequency:.3g}"
+
+
+def _spread_labels(places: Sequence[float], least: float) -> list[float]:
+    """Rising places, each moved up as far as it must be to stand this far from the one before."""
+    moved: list[float] = []
+    for place in places:
+        moved.append(max(place, moved[-1] + least) if moved else place)
+    return moved
+
+
+def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
+    for band in state.bands:
+        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=FIRST_GREY, alpha=0.10, lw=0)
+        chart = band.data.chart
+        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=FIRST_GREY, ms=3)
+    for chart in stabilisation_charts(state):
+        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=NEWEST_BLUE, ms=3)
+    axes.plot([], [], "x", color=FIRST_GREY, ms=3, label="pole (in the bands)")
+    axes.plot([], [], "o", color=NEWEST_BLUE, ms=3, label="stable pole")
+    for mode in modes:
+        axes.axvline(mode.frequency, color=NEWEST_BLUE, lw=0.6)
+    others = candidate_frequencies(state)
+    for frequency, place in zip(
+        others, _spread_labels(others.tolist(), MIN_LABEL_SPACING * np.ptp(axes.get_xlim())), strict=True
+    ):
+        axes.annotate(
+            _frequency_text(frequency),
+            (place, ORDER_AXIS_TOP),
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=7,
+            color=NEWEST_BLUE,
+        )
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
+    axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
+    axes.yaxis.set_major_locator(MultipleLocator(2))
+    axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
+
+
+def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequence[Mode]) -> None:
+    for k, mode in enumerate(modes):
+        axes = figure.add_subplot(grid[2 + k // CIRCLES_PER_ROW, k % CIRCLES_PER_ROW])
+        band = min(state.bands, key=lambda band: float(np.min(np.abs(band.fit.frequency - mode.frequency))))
+        _draw_circle(axes, state, band, mode)
+
+
+def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) -> None:
+    """Mobility of the mode over its resonance: lines measured, with all that is fitted beside it taken off; the fit.
+
+    The line from the origin to the natural frequency has the angle of the modal constant: 0 degrees for a real mode of
+    a driving point.
+    """
+    f = state.frf.frequency[band.lines]
+    reach = CIRCLE_HALF_WIDTHS * mode.damping_ratio * mode.frequency
+    near = np.abs(f - mode.frequency) < reach
+    fine = np.linspace(mode.frequency - reach, mode.frequency + reach, 300)
+    points = _mobility(f, mode.receptance(f) + state.residual(band)[0])[near]
+    curve = _mobility(fine, mode.receptance(fine))
+    top = complex(np.exp(1j * np.angle(mode.constant)) * np.max(np.abs(curve)))
+    axes.axhline(0.0, color=FIRST_GREY, lw=0.5)
+    axes.plot(points.real, points.imag, ".", color=FIRST_GREY, ms=4, label="measured")
+    axes.plot(curve.real, curve.imag, color=NEWEST_BLUE, lw=1, label="fit")
+    axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM_ORANGE, lw=1, label="phase")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title(
+        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\nmobility (mm/s/N)",
+        fontsize=8,
+    )
+    axes.tick_params(labelsize=7)
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def _mobility(frequency: NDArray[np.float64], receptance: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Mobility (mm/s/N)."""
+    return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
+
+
+def _phase_text(mode: Mode) -> str:
+    """Phase of the modal constant against that of a real mode, with its error."""
+    if not mode.phase_deg:
+        return "real"
+    return f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°"
+
+
+Floats = NDArray[np.float64]
+STEEL_GREY = "#c9d3dc"
+MODE_LINES = ((NEWEST_BLUE, "-"), (ALARM_ORANGE, "--"), (GOOD_GREEN, "-."), (FIRST_GREY, ":"))
+"""Colour and dashes of the modes, in order."""
+
+
+def plot_model(picture: ModelFigureData) -> Figure:
+    """All pictures of the model on one page."""
+    with mpl.rc_context(FIGURE_STYLE):
+        figure = Figure(figsize=(12.0, 10.0), layout="constrained")
+        axes: dict[str, Axes] = figure.subplot_mosaic(
+            [["shaft", "curve"], ["shapes", "whirl"], ["frf", "frf"]], height_ratios=[0.8, 1.2, 1.1]
+        )
+        figure.suptitle(picture.title)
+    draw_shaft(axes["shaft"], picture.spindle)
+    draw_shapes(axes["shapes"], picture.modes)
+    axes["shapes"].sharex(axes["shaft"])
+    draw_stiffness_curve(axes["curve"], picture.curve, picture.points)
+    draw_whirl(axes["whirl"], picture.whirl, picture.highest_speed)
+    draw_model_frf(axes["frf"], picture.model_frf, picture.measured_frf)
+    axes["frf"].set_title(f"frequency response {picture.frf_place}")
+    return figure
+
+
+def draw_shaft(axes: Axes, spindle: Spindle) -> None:
+    """Longitudinal section to scale, the tool tip at the left; bearings are triangles, joints dashed lines."""
+    start = 0.0
+    for segment in spindle.segments:
+        _draw_segment(axes, segment, start)
+        start += segment.length
+    for bearing in spindle.bearings:
+        radius = _radius_at(spindle, bearing.position) * 1e3
+        for side in (-1, 1):
+            marker = "^" if side < 0 else "v"
+            axes.plot(
+                bearing.position * 1e3, side * (radius + 5), marker, color=NEWEST_BLUE, ms=7, mec="white", mew=0.5
+            )
+    for mass in spindle.masses:
+        axes.plot(mass.position * 1e3, 0, "o", color=ALARM_ORANGE, ms=9, mec="white")
+    for joint in spindle.joints:
+        axes.axvline(joint.position * 1e3, color=ALARM_ORANGE, ls="--", lw=1)
+    axes.axhline(0, color="black", lw=0.6, ls=(0, (12, 3, 2, 3)))
+    axes.set(xlabel="distance from the tool tip (mm)", ylabel="radius (mm)", title="shaft, to scale")
+    axes.set_xlim(-0.02 * start * 1e3, 1.02 * start * 1e3)
+    axes.set_aspect("equal", adjustable="datalim", anchor="C")
+    axes.grid(visible=False)
+
+
+def _draw_segment(axes: Axes, segment: Segment, start: float) -> None:
+    z = np.array([start, start + segment.length]) * 1e3
+    outer, bore = np.array([segment.diameters_at(share) for share in (0.0, 1.0)]).T * 500
+    for side in (-1, 1):
+        if segment.mass_diameter is not None:
+            axes.fill_between(z, side * outer, side * segment.mass_diameter * 500, color=STEEL_GREY, alpha=0.4, lw=0)
+        axes.fill_between(z, side * bore, side * outer, facecolor=STEEL_GREY, edgecolor="#5b6770", lw=0.8)
+
+
+def _radius_at(spindle: Spindle, position: float) -> float:
+    """Largest outer radius of the segments that reach a place (m)."""
+    ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
+    slack = 1e-6 * ends[-1]
+    near = [
+        max(segment.diameters_at(0.0)[0], segment.diameters_at(1.0)[0])
+        for segment, a, b in zip(spindle.segments, ends[:-1], ends[1:], strict=True)
+        if a - slack <= position <= b + slack
+    ]
+    return max(near) / 2
+
+
+def draw_shapes(axes: Axes, modes: Modes) -> None:
+    """Deflection of each mode, scaled to its largest, upwards at the tip."""
+    for number, (colour, dashes) in zip(range(modes.frequency.size), MODE_LINES, strict=False):
+        shape = modes.deflection[number]
+        shape = shape / np.max(np.abs(shape)) * (np.sign(shape[0]) or 1.0)
+        label = f"mode {number + 1}: {modes.frequency[number]:.0f} Hz"
+        axes.plot(modes.position * 1e3, shape, color=colour, ls=dashes, lw=1.6, label=label)
+    axes.axhline(0, color="black", lw=0.6)
+    axes.set(xlabel="distance from the tool tip (mm)", ylabel="deflection / its largest (-)", title="mode shapes")
+    axes.set_ylim(-1.1, 1.1)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
+
+
+def draw_stiffness_curve(axes: Axes, curve: tuple[Floats, Floats], points: tuple[Floats, Floats]) -> None:
+    """Frequency over bearing stiffness, with the tap tests on it."""
+    axes.semilogx(curve[0] / 1e6, curve[1], color=NEWEST_BLUE, lw=1.6, label="model")
+    if points[0].size:
+        axes.plot(points[0] / 1e6, points[1], "o", color=FIRST_GREY, ms=4, label="tap tests")
+        axes.plot(points[0][-1] / 1e6, points[1][-1], "o", color=ALARM_ORANGE, ms=7, mec="white", label="newest")
+    axes.set(xlabel="bearing stiffness (N/µm)", ylabel="frequency (Hz)", title="followed mode over bearing stiffness")
+    axes.legend(loc="lower right")
+
+
+def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
+    """Forward and backward whirl over speed, seen from the housing and from the shaft."""
+    speed = whirl.speed_rpm / 1e3
+    for number, (colour, _) in zip(range(whirl.forward.shape[0]), MODE_LINES, strict=False):
+        first = number == 0
+        lines: Sequence[tuple[Floats, str, str]] = (
+            (whirl.forward[number], "-", "forward, from the housing"),
+            (whirl.backward[number], "--", "backward, from the housing"),
+            (whirl.rotating_forward[number], "-", "the same, turning with the shaft"),
+            (whirl.rotating_backward[number], "--", ""),
+        )
+        for index, (values, dashes, label) in enumerate(lines):
+            style: dict[str, Any] = {"lw": 1.5, "alpha": 1.0} if index < 2 else {"lw": 0.8, "alpha": 0.55}
+            axes.plot(speed, values, color=colour, ls=dashes, label=label if first and label else None, **style)
+    top = float(np.max(whirl.forward)) * 1.1
+    axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once a revolution")
+    axes.axvspan(0, highest_speed / 1e3, color=GOOD_GREEN, alpha=0.10, lw=0, label="speed range of the machine")
+    axes.set(xlabel="spindle speed (1000 rpm)", ylabel="frequency (Hz)", title="whirl speeds")
+    axes.set(xlim=(0, speed[-1]), ylim=(0, top))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
+
+
+def draw_model_frf(axes: Axes, model: Frf, measured: Frf | None) -> None:
+    """Magnitude of receptance, model against measured."""
+    if measured is not None:
+        shown = measured.in_band((float(model.frequency[0]), float(model.frequency[-1])))
+        axes.semilogy(
+            shown.frequency, np.abs(shown.receptance) * 1e9, color=FIRST_GREY, lw=1.0, label="measured, newest"
+        )
+    axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=NEWEST_BLUE, lw=1.6, ls="--", label="model")
+    axes.set(xlabel="frequency (Hz)", ylabel="|receptance| (nm/N)")
+    axes.set_xlim(model.frequency[0], model.frequency[-1])
+    axes.legend(loc="upper right")

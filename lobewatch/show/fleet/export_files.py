@@ -1,0 +1,279 @@
+"""Export tap tests of many machines to SQLite, CSV or Parquet files."""
+
+from __future__ import annotations
+
+import glob
+import gzip
+import os
+import secrets
+import sqlite3
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import DataError
+from acquisition.file_io import make_folder, sync_folder
+from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
+from lobewatch.machine.folder_lock import FolderLock
+from lobewatch.show.terminal.output import format_csv_cell
+
+
+class ExportOutcome(NamedTuple):
+    """The tap tests that were exported, and what there is to say besides."""
+
+    tap_tests: int
+    """Number of tap tests of the machines that could be read."""
+    fields: Mapping[str, Any]
+    """Fields for other programs: the place under its name first."""
+    sentences: Sequence[str] = ()
+    """Sentences for people."""
+
+
+EXPORT_COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *TAP_NUMBER_COLUMNS, "remarks")
+"""Columns of a line, in order."""
+EMPTY_TABLE = TapTable("", "", (), (), (), (), (), np.empty((0, len(TAP_NUMBER_COLUMNS))))
+
+
+@contextmanager
+def open_duckdb(tables: Iterable[TapTable], purpose: str) -> Iterator[Any]:
+    """A connection to DuckDB in memory that has the lines; DataError, which names the purpose, without DuckDB and for
+    what it cannot read or write."""
+    try:
+        import duckdb
+    except ImportError as error:
+        raise DataError(f'{purpose} needs DuckDB; install it with: pip install "lobewatch[fleet]"') from error
+    parts = [_table_arrays(table) for table in tables] or [_table_arrays(EMPTY_TABLE)]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in EXPORT_COLUMNS}
+    named = ", ".join("to_timestamp(time)::TIMESTAMP AS time" if n == "time" else n for n in EXPORT_COLUMNS)
+    with closing(duckdb.connect(config={"threads": 1})) as base:
+        base.register("whole", whole)
+        try:
+            base.execute(f"CREATE TABLE lines AS SELECT {named} FROM whole")
+            yield base
+        except duckdb.Error as error:
+            raise DataError(f"{purpose}: {error}") from error
+
+
+def write_parquet(base: Any, query: str, path: Path) -> int:
+    """Write what a query gives as Parquet; the number of lines."""
+    name = path.as_posix().replace("'", "''")
+    return int(base.execute(f"COPY ({query}) TO '{name}' (FORMAT parquet, COMPRESSION zstd)").fetchone()[0])
+
+
+def _table_arrays(table: TapTable) -> dict[str, NDArray[Any]]:
+    """Columns of a table as arrays, by name."""
+    n, of_series = len(table.tap_id), np.array(table.series_numbers, np.int64)
+    tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
+    return {
+        "folder": np.full(n, table.folder, object),
+        "machine": np.full(n, table.machine, object),
+        "tap_id": np.array(table.tap_id, object),
+        "time": np.array(table.time, np.float64),
+        "tool": tools[of_series - 1],
+        "direction": directions[of_series - 1],
+        "series": of_series,
+        "remarks": np.array(table.remarks, object),
+        **dict(zip(TAP_NUMBER_COLUMNS, table.numbers.T, strict=True)),
+    }
+
+
+CSV_DIGITS, CSV_ERROR_DIGITS = 7, 3
+"""Significant digits of a number in CSV: a part in ten million, finer than any of them is known, and of its error."""
+SQLITE_SCHEMA = """
+CREATE TABLE machine (id INTEGER PRIMARY KEY, folder TEXT NOT NULL, machine TEXT NOT NULL);
+CREATE TABLE series (id INTEGER PRIMARY KEY, machine_id INTEGER NOT NULL REFERENCES machine, series INTEGER NOT NULL,
+  tool TEXT NOT NULL, direction TEXT NOT NULL);
+CREATE TABLE tap (series_id INTEGER NOT NULL REFERENCES series, tap_id TEXT NOT NULL, seconds REAL NOT NULL,
+  remarks TEXT NOT NULL, {numbers});
+CREATE VIEW taps AS SELECT folder, machine, tap_id, strftime('%Y-%m-%dT%H:%M:%SZ', seconds, 'unixepoch') AS time,
+  tool, direction, series, {names}, remarks
+  FROM tap JOIN series ON series.id = series_id JOIN machine ON machine.id = machine_id;
+"""
+"""One line a tap test is the view `taps`; what repeats stands once."""
+_POWERS_OF_TEN = 10.0 ** np.arange(23)
+"""Powers of ten that are numbers of the computer."""
+
+Floats = NDArray[np.float64]
+
+
+def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
+    """Write a file by the ending of its name, whole or not at all.
+
+    DataError for an ending that is not known, and for Parquet without DuckDB.
+    """
+    write = next((writer for ending, writer in TABLE_WRITERS.items() if path.name.endswith(ending)), None)
+    if write is None:
+        raise DataError(f"{path}: {path.suffix or 'no ending'} is no kind of table; give {', '.join(TABLE_WRITERS)}")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        count = write(tables, temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+    return ExportOutcome(count, {"file": str(path)})
+
+
+def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
+    count = series = 0
+    insert = f"INSERT INTO tap VALUES ({', '.join('?' * (4 + len(TAP_NUMBER_COLUMNS)))})"
+    with closing(sqlite3.connect(path, isolation_level=None)) as base:
+        base.execute("PRAGMA journal_mode = OFF")
+        base.execute("PRAGMA synchronous = OFF")  # a new file under another name: whole, or thrown away
+        names = ", ".join(TAP_NUMBER_COLUMNS)
+        base.executescript(
+            SQLITE_SCHEMA.format(numbers=", ".join(f"{name} REAL" for name in TAP_NUMBER_COLUMNS), names=names)
+        )
+        base.execute("BEGIN")
+        for machine, table in enumerate(tables, 1):
+            base.execute("INSERT INTO machine VALUES (?, ?, ?)", (machine, table.folder, table.machine))
+            series_rows = [(series + n, machine, n, *place) for n, place in enumerate(table.series, 1)]
+            base.executemany("INSERT INTO series VALUES (?, ?, ?, ?, ?)", series_rows)
+            of_series = [series + n for n in table.series_numbers]
+            numbers = _compact_numbers(table.numbers).T.tolist()
+            base.executemany(insert, zip(of_series, table.tap_id, table.time, table.remarks, *numbers, strict=True))
+            count, series = count + len(of_series), series + len(table.series)
+        base.execute("COMMIT")
+    return count
+
+
+def _compact_numbers(numbers: Floats) -> Floats:
+    """Whole where that is a part in ten million at most: SQLite keeps it in half the bytes."""
+    return np.where(numbers > 1e7, np.rint(numbers), numbers)
+
+
+def _write_csv(tables: Iterable[TapTable], path: Path) -> int:
+    with path.open("wb") as file:
+        return _write_csv_rows(tables, file)
+
+
+def _write_gzip(tables: Iterable[TapTable], path: Path) -> int:
+    with path.open("wb") as file, gzip.GzipFile("", "wb", 1, file, mtime=0) as zipped:
+        return _write_csv_rows(tables, zipped)
+
+
+def _write_csv_rows(tables: Iterable[TapTable], file: IO[bytes] | gzip.GzipFile) -> int:
+    count = 0
+    file.write(",".join(EXPORT_COLUMNS).encode() + b"\n")
+    for table in tables:
+        file.write("".join(_csv_rows(table)).encode())
+        count += len(table.tap_id)
+    return count
+
+
+def _csv_rows(table: TapTable) -> Iterator[str]:
+    begin = f"{format_csv_cell(table.folder)},{format_csv_cell(table.machine)},"
+    series = [f"{format_csv_cell(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
+    times = np.datetime_as_string(np.floor(table.time).astype("datetime64[s]")).tolist()
+    taps = zip(table.tap_id, times, table.series_numbers, _number_cells(table.numbers), table.remarks, strict=True)
+    return (f"{begin}{tap_id},{time}Z,{series[n - 1]},{cells},{remarks}\n" for tap_id, time, n, cells, remarks in taps)
+
+
+def _number_cells(numbers: Floats) -> list[str]:
+    """Cells of each line with commas between, by the encoder of JSON, which is quick; nothing for NaN."""
+    if not len(numbers):
+        return []
+    digits = np.array([CSV_ERROR_DIGITS if name.endswith("_std") else CSV_DIGITS for name in TAP_NUMBER_COLUMNS])
+    cells = msgspec.json.encode(round_significant(numbers, digits).tolist()).decode()
+    return cells[2:-2].replace("null", "").replace(".0,", ",").split("],[")
+
+
+def round_significant(values: Floats, digits: NDArray[np.intp]) -> Floats:
+    """Values to significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = digits - 1 - np.floor(np.log10(np.abs(values)))
+    places = np.clip(np.nan_to_num(places), 1 - _POWERS_OF_TEN.size, _POWERS_OF_TEN.size - 1).astype(np.intp)
+    up, down = _POWERS_OF_TEN[np.maximum(places, 0)], _POWERS_OF_TEN[np.maximum(-places, 0)]
+    return np.asarray(np.rint(values * up / down) * down / up)
+
+
+def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
+    with open_duckdb(tables, ".parquet") as base:
+        return write_parquet(base, "SELECT * FROM lines", path)
+
+
+TABLE_WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {
+    ".sqlite": _write_sqlite,
+    ".csv": _write_csv,
+    ".csv.gz": _write_gzip,
+    ".parquet": _write_parquet,
+}
+"""Writer of a table by the ending of the file name."""
+
+
+EXPORT_LOCK_WAIT = 60.0
+"""Time for which another export into the folder is waited for (s); chosen."""
+MISSING_QUERY = """
+CREATE TABLE missing AS SELECT strftime(time, '%Y-%m') AS month, * FROM lines ANTI JOIN present USING (folder, tap_id)
+"""
+OUTDATED_QUERY = """
+SELECT DISTINCT month FROM present LEFT JOIN lines USING (folder, tap_id)
+WHERE folder IN (SELECT unnest(?::VARCHAR[])) AND (lines.time IS NULL OR {differ}) ORDER BY month
+"""
+
+
+def append_months(tables: Iterable[TapTable], folder: Path) -> ExportOutcome:
+    """Add what is missing there, in `month=YYYY-MM/` (of the time in UTC), a file a month, each whole or not at all.
+
+    A tap test is known by folder and tap_id. Files that are there are never altered. DataError without DuckDB, for a
+    file there that is no such table, and where another export goes on for longer than PATIENCE.
+    """
+    tables = [*tables]
+    with open_duckdb(tables, f"--append {folder}") as base:
+        make_folder(folder)
+        with FolderLock(folder).hold(EXPORT_LOCK_WAIT):
+            for left in folder.glob("month=*/.*.tmp"):  # of an export that was killed
+                left.unlink()
+            _load_existing(base, folder)
+            base.execute(MISSING_QUERY)
+            months = base.execute("SELECT DISTINCT month FROM missing ORDER BY month").fetchall()
+            added = sum(_write_month(base, folder, month) for (month,) in months)
+        (count,) = base.execute("SELECT count(*) FROM lines").fetchone()
+        outdated = _outdated_months(base, [table.folder for table in tables])
+    sentences = [f"{added} of them are new there"]
+    if outdated:
+        months = ", ".join(f"month={month}" for month in outdated)
+        sentences.append(
+            f"{months}: some there were excluded or analysed anew since; to have them as they are now, delete "
+            f"{'this folder' if len(outdated) == 1 else 'these folders'} and export again"
+        )
+    return ExportOutcome(count, {"folder": str(folder), "added": added, "outdated_months": outdated}, sentences)
+
+
+def _load_existing(base: Any, folder: Path) -> None:
+    """The lines that are there as the table `present`."""
+    base.execute("CREATE TABLE present AS SELECT *, '' AS month FROM lines LIMIT 0")
+    files = [glob.escape(str(file)) for file in sorted(folder.glob("month=*/*.parquet"))]
+    if files:
+        read = "read_parquet(?, hive_partitioning = true, hive_types_autocast = false, union_by_name = true)"
+        base.execute(f"INSERT INTO present BY NAME SELECT {', '.join(EXPORT_COLUMNS)}, month FROM {read}", [files])
+
+
+def _write_month(base: Any, folder: Path, month: str) -> int:
+    """Add a file whose name follows from the tap tests in it, so that the same are never there under two names."""
+    lines = f"SELECT * EXCLUDE (month) FROM missing WHERE month = '{month}' ORDER BY folder, time, tap_id"
+    keys = f"SELECT md5(string_agg(folder || chr(10) || tap_id, chr(10))) FROM ({lines})"
+    name = f"{base.execute(keys).fetchone()[0]}.parquet"
+    place = folder / f"month={month}"
+    make_folder(place)
+    temporary = place / f".{name}.tmp"
+    try:
+        count = write_parquet(base, lines, temporary)
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(place / name)
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync_folder(place)
+    return count
+
+
+def _outdated_months(base: Any, folders: list[str]) -> list[str]:
+    differ = " OR ".join(f"present.{name} IS DISTINCT FROM lines.{name}" for name in EXPORT_COLUMNS[3:])
+    return [month for (month,) in base.execute(OUTDATED_QUERY.format(differ=differ), [folders]).fetchall()]

@@ -1,0 +1,132 @@
+"""Show the status of many machines: rows for dashboard and report, text and CSV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+from rich.cells import cell_len, set_cell_size
+
+from acquisition import merge_remarks
+from dsm import format_with_error
+from lobewatch.fleet.fleet import FleetMachine
+from lobewatch.monitoring.threshold_dates import (
+    UNIX_EPOCH,
+    ThresholdDates,
+    build_forecast_rows,
+    build_limit_row,
+    find_next_limit,
+)
+from lobewatch.show.terminal.output import format_csv, make_printable
+from lobewatch.show.terminal.status_labels import status_label
+
+SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
+"""Reasons that stand beside the others as the fall and the date."""
+
+
+def fleet_rows(machines: Sequence[FleetMachine]) -> list[dict[str, Any]]:
+    """Rows in the order of the standings; the series is the one that fell most."""
+    return [fleet_row(machine) for machine in machines]
+
+
+def fleet_row(machine: FleetMachine) -> dict[str, Any]:
+    """Row of one machine."""
+    summary, dated = machine.summary, machine.current
+    ahead = find_next_limit(summary.limits)
+    worst = summary.series[0] if summary.series else None
+    remarks = merge_remarks(dated.remarks)
+    reasons = [remark.finding for remark in remarks if remark.code not in SEPARATE_REASON_CODES]
+    return {
+        "key": machine.key,
+        "name": summary.name,
+        "light": dated.status,
+        "is_early": dated.is_early,
+        "word": status_label(dated.status, dated.is_early),
+        "can_be_judged": dated.is_readable,
+        "fall": worst.drop if worst else None,
+        "fall_std": worst.drop_std if worst else None,
+        "series": worst.name if worst else "",
+        "last_tap": summary.last_tap,
+        "days_left": dated.days_left,
+        "reasons": reasons,
+        "note": "; ".join(reasons),
+        "why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue"),
+        "next_step": dated.next_step,
+        "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
+        "next_limit": build_limit_row(ahead),
+        "limit": next_limit_text(ahead, dated.time),
+        "forecast": build_forecast_rows(summary.fates, summary.limits),
+        "has_port": summary.has_port,
+        "programs": summary.programs,
+        "points": worst.points if worst else (),
+        "limits": [percent for percent, _ in summary.limits],
+    }
+
+
+def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:
+    """The fixed limit that is reached next: "5 %: 2026-11 to 2027-02"; empty where nothing can be foretold."""
+    if limit is None:
+        return ""
+    percent, reach = limit
+    first, last = _month_text(reach.earliest or reach.forecast_end), _month_text(reach.latest)
+    when = f"{first} to {last}" if last else f"not before {first}"
+    is_past = reach.latest is not None and reach.latest <= now.timestamp() / 86400
+    return f"{percent:g} %: {'by now, at this rate' if is_past else when}"
+
+
+def _month_text(days: float | None) -> str:
+    return "" if days is None else f"{UNIX_EPOCH + timedelta(days=days):%Y-%m}"
+
+
+FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
+"""Keys of a row of the dashboard, in the order of the CSV."""
+FLEET_HEADINGS = ("machine", "light", "fallen (%)", "last tap", "limit ahead")
+
+
+def fleet_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A line a machine, with its worst reason and the next step below it."""
+    lines = [FLEET_HEADINGS, *map(_fleet_cells, rows)]
+    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
+    shown = ["  ".join(map(set_cell_size, line, widths)).rstrip() for line in lines]
+    texts = [[], *map(_machine_notes, rows)]
+    return "\n".join(part for line, below in zip(shown, texts, strict=True) for part in (line, *below))
+
+
+def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A line a machine below the headings."""
+    return format_csv([FLEET_COLUMNS, *([row[name] for name in FLEET_COLUMNS] for row in rows)])
+
+
+def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
+    return _to_one_line(row["key"]), light, _drop_text(row), _due_text(row), row["limit"]
+
+
+def _machine_notes(row: Mapping[str, Any]) -> list[str]:
+    """Its name where the folder has another, the worst reason, and what to do."""
+    first, *further = row["reasons"] or [row["why"]]
+    why = first + (f" (and {len(further)} more)" if further else "")
+    named = row["name"] if row["name"] != row["key"] else ""
+    return [f"  {_to_one_line(text)}" for text in (": ".join(filter(None, (named, why))), row["next_step"]) if text]
+
+
+def _to_one_line(text: str) -> str:
+    return make_printable(text).replace("\n", " ").replace("\t", " ")
+
+
+def _drop_text(row: Mapping[str, Any]) -> str:
+    if row["fall"] is None:
+        return ""
+    if row["fall_std"] == 0:
+        return "first test"
+    return format_with_error(row["fall"], row["fall_std"])
+
+
+def _due_text(row: Mapping[str, Any]) -> str:
+    left = row["days_left"]
+    if left is None:
+        return ""
+    last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
+    return f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")

@@ -1,0 +1,111 @@
+"""Show what one tap test measured, and the results at the end of tap tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from acquisition import Conditions, Remark
+from dsm import RemainingPreload
+from lobewatch.logbook import Logbook
+from lobewatch.machine import REFERENCE_CUT
+from lobewatch.measurement import Measurement, check_modes_together
+from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS, find_accepted_codes, format_not_asked
+from lobewatch.monitoring.series_history import build_series_history, estimate_preload
+from lobewatch.show.history import condition_texts
+from lobewatch.show.models import calibration_json
+from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
+from lobewatch.show.programs.lobes import lobes_json
+from lobewatch.show.programs.verdicts import program_texts, programs_json, verdict_table
+from lobewatch.show.terminal.output import emit, notes, remark_json, remark_lines
+from lobewatch.show.terminal.status_labels import status_label
+from lobewatch.tap.session import TapSession
+from lobewatch.tool import compute_lobes
+
+
+def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
+    """A measurement, the diagrams of its tool as it was known then, and the programs as they stand now."""
+    assembly = logbook.assembly(until=m.tap_id)
+    return {
+        "tap_id": m.tap_id,
+        "time": m.time.isoformat(),
+        "tool": m.tool,
+        "direction": m.direction,
+        "conditions": _tap_conditions(m, logbook).specified,
+        "modes": [mode_json(mode) for mode in m.modes],
+        "followed": mode_json(m.followed) if m.followed else None,
+        "calibration": calibration_json(m.calibration) if m.calibration else None,
+        "preload_left": _remaining_preload(m, logbook),
+        "lobes": [lobes_json(name, lobes) for name, lobes in compute_lobes(assembly, logbook.machine).items()],
+        "remarks": [remark_json(remark) for remark in assembly.remarks],
+    }
+
+
+def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
+    """A measurement for people."""
+    named = [f"tool {m.tool}", f"direction {m.direction}", *condition_texts(_tap_conditions(m, logbook))]
+    texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
+    if m.modes:
+        shown = sort_modes(m.modes, rejected=False)
+        texts += [mode_table(shown), *grouped_remark_lines(shown, check_modes_together(m.modes))]
+    if m.followed is not None:
+        texts.append(f"followed: {m.followed.frequency:.2f} Hz")
+    if m.calibration is not None:
+        texts += [str(part) for part in (m.calibration, _remaining_preload(m, logbook)) if part is not None]
+    assembly = logbook.assembly(until=m.tap_id)
+    lobes = compute_lobes(assembly, logbook.machine).get(REFERENCE_CUT)
+    if lobes is not None:
+        low = lobes.minimum
+        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
+    asked = [remark for remark in logbook.status().remarks if remark.about == f"tap test {m.tap_id}"]
+    further = [remark for remark in assembly.remarks if remark.code not in RECORDING_QUESTIONS]
+    return [*texts, *remark_lines(further), *map(_question_text, asked)]
+
+
+def _remaining_preload(m: Measurement, logbook: Logbook) -> RemainingPreload | None:
+    """Against the start of its series, as it was known then."""
+    rows = [row for row in logbook.history.series(m.tool, m.direction) if row.time <= m.time]
+    return (
+        estimate_preload(build_series_history(rows), logbook.machine) if rows and rows[-1].tap_id == m.tap_id else None
+    )
+
+
+def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
+    return logbook.files.place(m.tap_id).entry.conditions
+
+
+def _question_text(question: Remark) -> str:
+    """A question with its code."""
+    return f"question ({question.code}): {question.text}"
+
+
+def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: bool, details: bool) -> None:
+    """Print what was stored and what it says; as JSON the last test. details: modes, model and doubt, too."""
+    for session in finished:
+        measurement = session.measurement
+        notes.print(*(f"saved {tap_id}\n" for tap_id in session.saved), sep="", end="")
+        notes.print(*(f"accepted: {code}\n" for code in find_accepted_codes(measurement.remarks)), sep="", end="")
+        if session.unasked:
+            notes.print(format_not_asked(session.unasked, session.saved, logbook.questions), markup=False)
+    last = finished[-1]
+    payload = measurement_json(last.measurement, logbook) | {"programs": programs_json(logbook.verdicts())}
+    if last.across is not None:
+        payload["across"] = {"tap_id": last.across.tap_id}
+    emit(payload, as_json, *_result_texts(logbook, finished, details))
+
+
+def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> list[str | Table]:
+    texts: list[str | Table] = []
+    for session in finished:
+        outcome = session.state.outcome
+        texts += measurement_texts(session.measurement, logbook) if details else []
+        texts += [session.across.text] if details and session.across is not None else []
+        texts += [] if outcome is None or details else [f"{session.state.title}:", *outcome.texts]
+    if details:
+        texts += program_texts(logbook)
+    elif verdicts := logbook.verdicts():
+        texts += [verdict_table(verdicts), "lobewatch check says what decides; --details shows modes, model and doubt"]
+    standing = logbook.status()
+    return [*texts, f"{status_label(standing.status, standing.is_early)}  next: {standing.next_step}"]

@@ -1,0 +1,96 @@
+"""Show the comparison with the paper as text and JSON."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from lobewatch.paper import Claim, Comparison, PaperStudy
+
+PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
+PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
+"""Characters of the columns: the whole fits 80."""
+
+PAPER_DIGITS = 7
+"""Digits of a number of the paper, where it has so many."""
+
+
+def paper_json(study: PaperStudy, page: Path | None) -> dict[str, Any]:
+    """Every number and every claim, and the page that was written."""
+    return {
+        "numbers": [
+            {
+                "section": section.title,
+                "quantity": row.quantity,
+                "where": row.where,
+                "unit": row.unit,
+                "paper": row.printed,
+                "ours": row.ours,
+                "difference": row.difference,
+                "reason": row.reason,
+            }
+            for section in study.sections
+            for row in section.comparisons
+        ],
+        "claims": [
+            {"claim": claim.text, "verdict": claim.verdict, "evidence": claim.evidence} for claim in study.claims
+        ],
+        "page": page and str(page),
+    }
+
+
+def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
+    """One table of all numbers, the reason of each below it, then the claims; so many characters a line."""
+    yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, beside a surrogate of the"
+    yield "spindle (its drawing is not public): fitted to the frequencies in the paper."
+    for section in study.sections:
+        yield from ("", section.title, _table_line(PAPER_HEADINGS))
+        for row in section.comparisons:
+            yield _table_line(paper_cells(row))
+            yield from _indent(row.reason, width)
+    yield from ("", "What the paper claims, and whether it holds on the surrogate")
+    for claim in study.claims:
+        yield from textwrap.wrap(claim_text(claim), width)
+        yield from _indent(claim.evidence, width)
+
+
+def claim_text(claim: Claim) -> str:
+    """A claim with the word for it."""
+    return f"{claim.verdict}: {claim.text}"
+
+
+def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
+    """Quantity, place, both values, unit and difference."""
+    printed = "-" if row.printed is None else number_text(row.printed, PAPER_DIGITS, whole=False)
+    return row.quantity, row.where, printed, number_text(row.ours, row.digits), row.unit, difference_text(row)
+
+
+def number_text(value: float, digits: int, *, whole: bool = True) -> str:
+    """A number with so many significant digits, all of them or as many as it needs; a large or small one by powers."""
+    form = "#" if whole else ""
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        return f"{value:{form}.{digits}g}".removesuffix(".")
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return f"{float(mantissa):{form}.{digits}g}".removesuffix(".") + f"e{int(power)}"
+
+
+def difference_text(row: Comparison) -> str:
+    """By how much ours is larger, as a share; percents differ by points."""
+    if row.difference is None or row.printed is None:
+        return ""
+    if row.unit == "%":
+        return f"{row.ours - row.printed:+.1f} pts"
+    return "0" if abs(row.difference) < 5e-7 else f"{100 * row.difference:+.2g} %"
+
+
+def _table_line(texts: tuple[str, ...]) -> str:
+    sides = "<<>><>"
+    return " ".join(
+        f"{text:{side}{width}}" for text, side, width in zip(texts, sides, PAPER_COLUMN_WIDTHS, strict=True)
+    ).rstrip()
+
+
+def _indent(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="    ")

@@ -1,0 +1,339 @@
+"""Show replays of recorded files, previews of them, and rebuilds, with their progress."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from acquisition import DataError, Fact, Remark
+from acquisition.files.contents.description import Origin
+from dsm import format_rounded
+from lobewatch.history import HistoryRow
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
+from lobewatch.logbook.replay_preview import ReplayPreview
+from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
+from lobewatch.show.measurement import measurement_json, measurement_texts
+from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
+from lobewatch.show.programs.verdicts import program_texts, programs_json
+from lobewatch.show.terminal.output import emit, new_table, notes, remark_json, remark_lines
+from modal import Mode
+
+REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
+"""Names of the steps of a replay for people."""
+REBUILD_PROGRESS_STEP = 10
+"""Tap tests between two lines of a rebuild."""
+
+
+class ReplayProgress:
+    """A bar a step, on a terminal only; called with the step, how many files are done, and of how many."""
+
+    def __init__(self) -> None:
+        """Nothing is shown yet."""
+        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        self._bars = Progress(*columns, console=notes, transient=True, disable=not notes.is_terminal)
+        self._tasks: dict[str, int] = {}
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bars away."""
+        self._bars.stop()
+
+    def __call__(self, step: str, done: int, of: int) -> None:
+        """So many are done."""
+        if step not in self._tasks:
+            self._tasks[step] = self._bars.add_task(REPLAY_STEP_NAMES[step], total=of)
+        self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
+
+
+def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
+    """A line every few tap tests of the machine of this name; called with how many are done, and of how many."""
+
+    def show(done: int, of: int) -> None:
+        if done % REBUILD_PROGRESS_STEP == 0:
+            notes.print(f"{name}: {done} of {of} tap tests", markup=False)
+
+    return show
+
+
+MAX_PREVIEWS_IN_FULL = 6
+"""Files that are told in full at most; more of them get a line each."""
+
+
+def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
+    """Print what would become of files; passed: other files of the folders. DataError where some cannot be used."""
+    files = [preview_json(preview) for preview in previews]
+    payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
+    emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
+    if any(preview.rejection for preview in previews):
+        raise DataError(_refusal_text(previews))
+
+
+def preview_json(preview: ReplayPreview) -> dict[str, Any]:
+    """One file."""
+    measurement, tap, recording = preview.measurement, preview.tap, preview.recording
+    about: dict[str, Any] = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
+    if measurement is None or tap is None or recording is None:
+        return about
+    return about | {
+        "format": recording.title,
+        "facts": [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in recording.facts],
+        "time": measurement.time.isoformat(),
+        "tool": measurement.tool,
+        "direction": measurement.direction,
+        "hits": [flags.words for flags in tap.flags],
+        "lines": tap.frf.frequency.size if tap.frf else None,
+        "averages": tap.frf.n_averages if tap.frf else None,
+        "modes": [mode_json(mode) for mode in measurement.modes],
+        "followed": mode_json(measurement.followed) if measurement.followed else None,
+        "questions": [{"code": asked.code, "text": asked.text} for asked in find_open_questions(measurement.remarks)],
+    }
+
+
+def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
+    """All files: in full where there are few, else in a line each, with what is asked and refused below."""
+    if len(previews) <= MAX_PREVIEWS_IN_FULL:
+        return [
+            *(line for preview in previews if not preview.rejection for line in _preview_lines(preview)),
+            *_refused_lines(previews),
+        ]
+    rows = new_table("<date", "<series", "hits", "frequency (Hz)", "<", "~file")
+    for preview in previews:
+        rows.add_row(*_preview_row(preview))
+    return [rows, *_preview_notes(previews)]
+
+
+def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
+    """How many would be stored, are known, refused and passed over."""
+    fresh = sum(preview.tap is not None for preview in previews)
+    n_known = sum(bool(preview.stored_tap_id) for preview in previews)
+    refused = sum(bool(preview.rejection) for preview in previews)
+    passed = f", {n_passed} other files in the folders passed over" if n_passed else ""
+    count = f"{fresh} of {len(previews)} file(s) would be stored, {n_known} stored already, {refused} cannot be used"
+    return f"{count}{passed}; nothing is stored (--dry-run)"
+
+
+def _refusal_text(previews: Sequence[ReplayPreview]) -> str:
+    """How many files cannot be used."""
+    refused = sum(bool(preview.rejection) for preview in previews)
+    return f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above"
+
+
+def _preview_lines(preview: ReplayPreview) -> list[str]:
+    if preview.stored_tap_id:
+        return [f"{preview.file}: stored already as {preview.stored_tap_id}"]
+    measurement, tap, recording = preview.measurement, preview.tap, preview.recording
+    if measurement is None or tap is None or recording is None:
+        return []
+    lines = [
+        f"{preview.file}: {recording.title}, {_hits_text(preview)}",
+        *(f"  {line}" for line in fact_lines(recording.facts)),
+    ]
+    modes = sort_modes(measurement.modes, rejected=False)[:8]
+    lines.append(f"  modes: {', '.join(map(_mode_text, modes)) or 'none'}")
+    followed = "none" if measurement.followed is None else f"{measurement.followed.frequency:.2f} Hz"
+    lines.append(f"  followed: {followed}")
+    asked = find_open_questions(measurement.remarks)
+    plausible = "  plausible for this machine: nothing would be asked"
+    return [
+        *lines,
+        *(f"  question ({question.code}): {question.text}" for question in asked),
+        *([] if asked else [plausible]),
+    ]
+
+
+def _mode_text(mode: Mode) -> str:
+    f_std, zeta_std, k_std = mode.standard_error.tolist()
+    stiffness = f", {format_rounded(mode.stiffness, k_std, 1e6)} N/um" if mode.has_stiffness else ""
+    return f"{format_rounded(mode.frequency, f_std)} Hz ({format_rounded(mode.damping_ratio, zeta_std, 0.01)} %{stiffness})"
+
+
+def _hits_text(preview: ReplayPreview) -> str:
+    """Hits with their verdicts."""
+    if preview.tap is None or not preview.tap.hits:
+        return "an FRF"
+    words = Counter(flags.words for flags in preview.tap.flags)
+    return f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
+
+
+def _preview_row(preview: ReplayPreview) -> list[str]:
+    measurement, tap = preview.measurement, preview.tap
+    if measurement is None or tap is None:
+        return ["", "", "", "", "stored already" if preview.stored_tap_id else "refused", preview.file.name]
+    asked = find_open_questions(measurement.remarks)
+    good = f"{len(tap.accepted)}/{len(tap.hits)}" if tap.hits else "FRF"
+    frequency = "" if measurement.followed is None else f"{measurement.followed.frequency:.2f}"
+    series, day = f"{measurement.tool} {measurement.direction}", f"{measurement.time:%Y-%m-%d}"
+    return [day, series, good, frequency, "asked about" if asked else "plausible", preview.file.name]
+
+
+def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
+    """Lines on what was taken for want of a word, asked and refused; each once."""
+    facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
+    asked = (
+        (preview.file.name, f"question ({question.code}): {question.text}")
+        for preview in previews
+        if preview.measurement is not None
+        for question in find_open_questions(preview.measurement.remarks)
+    )
+    return [*fact_lines(_merge_facts(facts), NON_FILE_ORIGINS), *group_by_message(asked), *_refused_lines(previews)]
+
+
+def _refused_lines(previews: Sequence[ReplayPreview]) -> list[str]:
+    return group_by_message(
+        (str(preview.file), f"cannot be used: {preview.rejection}") for preview in previews if preview.rejection
+    )
+
+
+def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
+    """Facts, those that are another for each of many files as the first and the last."""
+    values: dict[tuple[str, Origin], list[str]] = {}
+    for fact in facts:
+        values.setdefault((fact.name, fact.origin), []).append(fact.value)
+    for (name, origin), texts in values.items():
+        shown = texts if len(texts) <= MAX_NAMED_FILES else [f"{texts[0]} to {texts[-1]}"]
+        yield from (Fact(name, text, origin) for text in shown)
+
+
+MAX_TAPS_IN_FULL = 3
+"""Tap tests that are told in full at most; more of them are summed up."""
+MIN_FILES_TO_COUNT = 12
+"""Files of a replay above which those that were stored already are told by their number ..."""
+MAX_KNOWN_LISTED = 3
+"""... unless these at most were."""
+
+
+def emit_replay(
+    outcome: ReplayOutcome,
+    logbook: Logbook,
+    n_files: int,
+    passed: Sequence[Path],
+    accepted: Sequence[str],
+    *,
+    as_json: bool,
+) -> None:
+    """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
+    _print_known(outcome.already_stored, n_files)
+    if passed:
+        notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
+    payload, texts = dict[str, Any](), list[str | Table]()
+    if as_json:
+        payload = replay_json(outcome, logbook) | {"accepted": list(accepted), "questions": logbook.questions}
+    else:
+        texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    emit(payload, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
+
+
+def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
+    """Files that were stored already: each where they are few."""
+    if n_files > MIN_FILES_TO_COUNT and len(stored) > MAX_KNOWN_LISTED:
+        notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
+        return
+    for file, tap_id in stored.items():
+        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
+
+
+def replay_json(stored: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
+    """All that was stored, with the lobes of each, known and refused."""
+    return {
+        "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored.new_tap_ids],
+        "programs": programs_json(logbook.verdicts()) if stored.new_tap_ids else [],
+        "known": {str(file): tap_id for file, tap_id in stored.already_stored.items()},
+        "refused": {str(file): why for file, why in stored.rejected.items()},
+        "taken": list(stored.assumed_facts),
+    }
+
+
+def replay_texts(stored: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
+    """A few tap tests in full, many as their series; then the programs."""
+    fresh = set(stored.new_tap_ids)
+    if len(fresh) <= MAX_TAPS_IN_FULL:
+        texts = [
+            text for tap_id in stored.new_tap_ids for text in measurement_texts(logbook.measurement(tap_id), logbook)
+        ]
+    else:
+        rows = logbook.history.rows
+        asked = {row.tap_id: row.questions for row in rows}
+        questions = question_remarks(
+            asked, logbook.folder.path, [tap_id for tap_id in stored.new_tap_ids if tap_id in asked]
+        )
+        texts = [_series_table([row for row in rows if row.tap_id in fresh])]
+        texts += [f"asked of {question.finding}" for question in questions]
+    if stored.assumed_facts:
+        texts.append(f"taken where the files do not say: {', '.join(stored.assumed_facts)}")
+    return [*texts, *(program_texts(logbook) if fresh else [])]
+
+
+def _series_table(shown: Sequence[HistoryRow]) -> Table:
+    """A line for each tool and direction."""
+    series: dict[tuple[str, str], list[HistoryRow]] = {}
+    for row in shown:
+        series.setdefault((row.tool, row.direction), []).append(row)
+    rows = new_table(
+        "<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)"
+    )
+    for (tool, direction), tests in series.items():
+        modes = [row.mode for row in tests if row.mode is not None]
+        ends = (modes[0], modes[-1]) if modes else ()
+        values = [
+            " .. ".join(text % value for value in values)
+            for text, values in (
+                ("%.1f", [mode.frequency for mode in ends]),
+                ("%.2f", [100 * mode.damping_ratio for mode in ends]),
+                ("%.1f", [mode.stiffness / 1e6 for mode in ends if mode.has_stiffness]),
+            )
+        ]
+        days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
+        rows.add_row(tool, direction, str(len(tests)), *days, *values)
+    return rows
+
+
+class MachineRebuild(NamedTuple):
+    """Outcome of a rebuild of one machine."""
+
+    repairs: Sequence[str]
+    """Sentences on the files that were mended, a line each."""
+    n_taps: int
+    """Number of tap tests in the new history."""
+    is_saved: bool
+    """Whether the new history is on the disk."""
+    remarks: Sequence[Remark]
+    """Remarks on the machine after it."""
+
+
+def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
+    """One machine."""
+    remarks = [remark_json(remark) for remark in rebuild.remarks]
+    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": remarks}
+
+
+def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
+    """One machine for people."""
+    if rebuild.is_saved:
+        history = f"history.rows: made anew from {rebuild.n_taps} tap test(s)"
+    else:
+        history = "history.rows: not made anew (see above); the next command that can write makes it"
+    return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
+
+
+def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> dict[str, Any]:
+    """The machines of a folder, by name."""
+    return {"machines": {name: rebuild_json(rebuild) for name, rebuild in rebuilds.items()}}
+
+
+def folder_rebuild_texts(rebuilds: Mapping[str, MachineRebuild], n_machines: int) -> list[str]:
+    """The machines of a folder for people; n_machines: those that could not be rebuilt too."""
+    lines = [f"{name}: {text}" for name, rebuild in rebuilds.items() for text in rebuild_texts(rebuild)]
+    return [*lines, f"{len(rebuilds)} of {n_machines} machines rebuilt"]

@@ -1,0 +1,219 @@
+"""Stability lobes of the report: the newest diagram, and diagrams over time."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from lobes import StabilityLobes
+from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.history import HistoryRow
+from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.logbook.analysis import Analysis
+from lobewatch.machine import Machine
+from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
+from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
+from lobewatch.show.programs.advice import ProgramAdvice
+from lobewatch.show.report.section import NumberTable, tabulate_lobes
+from lobewatch.tool import Assembly, compute_lobes, speed_grid
+from lobewatch.tool.assembly import compute_tip_lobes
+from lobewatch.verdicts import Setting, Verdict
+from lobewatch.verdicts.frequency_drop import model_softening
+from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
+from modal import Mode
+
+Floats = NDArray[np.float64]
+
+
+class LobeDiagram(NamedTuple):
+    """What is drawn of one cut."""
+
+    cut: str
+    """Name of the cut: the reference cut, or else the first program of the tool."""
+    now: StabilityLobes
+    """Lobes of the newest tap tests."""
+    depths: Mapping[str, Floats]
+    """Limiting depths at first, where that is known, and now (m), shape (n,), by the dates of the tap tests."""
+    verdicts: Sequence[Verdict]
+    """Verdicts on the programs with the same cut."""
+    advice: Sequence[Setting]
+    """Settings recommended for them."""
+    band: LimitBand | None
+    """How far the doubt moves the limit."""
+    heard: Sequence[CutEntry]
+    """Test cuts of the same cut."""
+    learned: LobesAtSpeed | None
+    """What test cuts have taught of the turning spindle."""
+
+    def figure(self, *, is_small: bool = False) -> Figure:
+        """The picture; a small one stands beside words."""
+        return plot_lobes(
+            self.now.speed_rpm,
+            self.depths,
+            self.verdicts,
+            "",
+            self.band,
+            self.advice,
+            self.heard,
+            self.learned,
+            is_small=is_small,
+        )
+
+    @property
+    def edges(self) -> dict[str, Floats]:
+        """Depths beside those of now and of then (m), by name."""
+        edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
+        if self.learned is not None:
+            edges |= {"at speed": self.learned.lobes.depth, "at speed, lowest": self.learned.band.low}
+            edges |= {"at speed, highest": self.learned.band.high}
+        return edges
+
+
+def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence[ProgramAdvice]) -> LobeDiagram | None:
+    """The diagram of a tool as tapped; None where it has no lobes."""
+    machine = analysis.machine
+    lobes = compute_lobes(assembly, machine)
+    if not lobes:
+        return None
+    cut, now = next(iter(lobes.items()))
+    first = analysis.first_assembly(assembly)
+    depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
+    cuts = machine.cuts(assembly.tool)
+    same = [program for program in programs if cuts.get(program.verdict.program.name) == cuts[cut]]
+    settings = (
+        setting for program in same for setting in (program.advice.best, program.advice.deepest_here) if setting
+    )
+    verdicts = [program.verdict for program in same]
+    return LobeDiagram(
+        cut,
+        now,
+        depths | {assembly.label: now.depth},
+        verdicts,
+        list(dict.fromkeys(settings)),
+        compute_limit_band(now, cut, assembly, machine),
+        select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0]),
+        compute_lobes_at_speed(verdicts, machine),
+    )
+
+
+MAX_LOBE_DIAGRAMS = 24
+"""Tap tests shown, at most."""
+MAX_LOBE_SPEEDS = 600
+"""Speeds given of each diagram, at most."""
+MAX_FORECAST_DROP = 0.5
+"""Fall of the frequencies from which on no diagram is foretold: no such spindle still cuts; chosen."""
+FORECAST_MONTHS = (6, 12)
+"""Months after the newest test that are foretold."""
+
+
+class LobeHistory(NamedTuple):
+    """Diagrams of one cut, oldest first; at least two."""
+
+    cut: str
+    """Name of the cut."""
+    speed_rpm: Floats
+    """Speeds common to all (rpm), shape (n,)."""
+    times: Sequence[datetime]
+    """Times of the tap tests, m of them."""
+    depth: Floats
+    """Limiting depths after each tap test (m), shape (m, n)."""
+    ahead: Mapping[str, Floats]
+    """Limiting depths that are foretold (m), shape (n,), by what each diagram is called."""
+    heard: Sequence[CutEntry] = ()
+    """Test cuts of the same cut, as they were heard."""
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the diagrams."""
+        return [*(f"{time:%Y-%m-%d}" for time in self.times), *self.ahead]
+
+    @property
+    def numbers(self) -> NumberTable:
+        """Speed, and depth in mm for each."""
+        step = max(math.ceil(self.speed_rpm.size / MAX_LOBE_SPEEDS), 1)
+        depths = [*self.depth, *self.ahead.values()]
+        return tabulate_lobes(
+            self.speed_rpm[::step], {name: depth[::step] for name, depth in zip(self.labels, depths, strict=True)}
+        )
+
+    @property
+    def marks(self) -> NumberTable | None:
+        """The cuts, each with the number of the diagram (from 1) from which on it was known; None without any.
+
+        A cut that is younger than the newest tap test belongs to that.
+        """
+        diagrams = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
+        lines = [
+            [at, cut.word, f"{cut.at:%Y-%m-%d}", cut.speed_rpm, 1e3 * cut.depth, cut.chatter_frequency_hz]
+            for at, cut in zip(diagrams, self.heard, strict=True)
+        ]
+        heads = ["from diagram", "heard", "date", "speed (rpm)", "depth (mm)", "chatter (Hz)"]
+        return NumberTable(heads, lines) if lines else None
+
+
+def compute_lobe_history(
+    cut: str,
+    rows: Sequence[HistoryRow],
+    assembly: Assembly,
+    series: Sequence[SeriesStatus],
+    machine: Machine,
+    cuts: Sequence[CutEntry] = (),
+) -> LobeHistory | None:
+    """Over the rows of a series that show the cut; None where fewer than two do.
+
+    assembly: that of now; series: of the same tool, where it goes; cuts: all that were heard. All modes fall alike,
+    K follows the model.
+    """
+    shown = [row for row in rows if row.x or row.y]
+    picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MAX_LOBE_DIAGRAMS)).round().astype(int)).tolist()
+    diagrams = [(shown[i].time, compute_row_lobes(shown[i], machine, [cut]).get(cut)) for i in picked]
+    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
+    if len(limits) < 2:
+        return None
+    trends = {side.direction: side.trend for side in series if side.tool == assembly.tool and side.trend is not None}
+    times, depths = zip(*limits, strict=True)
+    ahead = _forecast_depths(cut, assembly, trends, machine)
+    heard = select_test_cuts(cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
+    return LobeHistory(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
+
+
+def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
+    depths: dict[str, Floats] = {}
+    for months in FORECAST_MONTHS:
+        shares = {name: _forecast_drop(trend, months) for name, trend in trends.items()}
+        falls = {name: fall for name, fall in shares.items() if fall is not None}
+        if not falls:
+            break
+        worst = max(falls.values())
+        x, y = (_degraded_modes(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
+        lobes = compute_tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
+        if lobes is not None:
+            at = assembly.time + timedelta(days=months * DAYS_PER_MONTH)
+            depths[f"{at:%Y-%m} (forecast)"] = lobes.depth
+    return depths
+
+
+def _forecast_drop(trend: Trend, months: int) -> float | None:
+    """Share by which the line falls from the last point on; None where nothing is foretold for that long or so far."""
+    forecast, last = trend.forecast, days_since_epoch(trend.points[-1].time)
+    at = last + months * DAYS_PER_MONTH
+    if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
+        return None
+    change = float(np.interp(at, forecast.dates, forecast.mean_line)) - float(forecast.fitted[-1])
+    share = -math.expm1(min(change, 0.0) / 100)
+    return share if share < MAX_FORECAST_DROP else None
+
+
+def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
+    stiffness_at, _ = model_softening(assembly)
+    modes = (assembly.x if direction == "x" else assembly.y) or ()
+    return [mode.scaled(1 - fall, stiffness_at(fall), "foretold") for mode in modes]

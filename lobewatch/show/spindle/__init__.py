@@ -1,1 +1,0 @@
-"""Modes and model of a spindle for people and as JSON."""

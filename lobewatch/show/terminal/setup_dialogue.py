@@ -1,0 +1,100 @@
+"""Ask the questions of `lobewatch init` in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from lobewatch.machine.setup_questions.draft import DetectedDaq, MachineDraft, SetupQuestion, find_daqs
+from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS
+from lobewatch.machine.setup_questions.sensor_questions import DAQ_QUESTION
+from lobewatch.show.terminal.output import notes
+
+
+def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> MachineDraft:
+    """A draft with the answers of options, by the names of the questions; ValueError that names the option."""
+    for question in SETUP_QUESTIONS:
+        if question.name in answers:
+            draft = _answer_by_option(draft, question, answers)
+            if question is DAQ_QUESTION and draft.daq.problem:
+                _print_notes(f"note: {draft.daq.problem}")
+    if draft.missing_sensors:
+        raise ValueError(
+            f"--{draft.missing_sensors[0]}: missing; a {draft.daq.driver} DAQ does not know its sensors: "
+            "give their input, sensitivity and range"
+        )
+    return draft
+
+
+def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
+    """A draft with what a person answers to each question; answers: those of options, which are not asked.
+
+    EOFError where nobody answers any more.
+    """
+    if questions == SETUP_QUESTIONS:
+        _print_notes(
+            "Enter takes what stands in [brackets], - leaves something open; nothing is written before the end."
+        )
+    for question in questions:
+        number = SETUP_QUESTIONS.index(question) + 1
+        already = question.skip_reason(draft)
+        if question.name in answers:
+            draft = _answer_by_option(draft, question, answers)
+        elif already:
+            _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {already}")
+        else:
+            draft = _ask(_find_daqs(draft) if question is DAQ_QUESTION else draft, question, number)
+    return draft
+
+
+def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Mapping[str, str]) -> MachineDraft:
+    try:
+        return question.apply_answer(draft, answers[question.name]).checked()
+    except ValueError as error:
+        raise ValueError(f"--{question.name} {error}") from error
+
+
+def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDraft:
+    """Put one question until its answer is one."""
+    _print_notes(
+        f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}", f"    for example: {question.example}"
+    )
+    while True:
+        current = question.read_current(draft)
+        notes.print(f"    [{current}] > " if current else "    > ", end="", markup=False)
+        answer = input().strip() or current
+        if not answer:
+            _print_notes("    this is needed")
+            continue
+        try:
+            answered = question.apply_answer(draft, answer).checked()
+        except ValueError as error:
+            _print_notes(f"    {_strip_file_name(error)}")
+            continue
+        _print_notes(*(f"    {text}" for text in _daq_notes(answered) if question is DAQ_QUESTION))
+        return answered
+
+
+def _find_daqs(draft: MachineDraft) -> MachineDraft:
+    _print_notes("\nLooking for a DAQ on the ports ...")
+    looks = find_daqs()
+    _print_notes(*(f"    {i}: {look.port}: {look.text}" for i, look in enumerate(looks, 1)))
+    if not looks:
+        _print_notes("    none answers on a USB port; name its port, or - and give it later with --port")
+    return replace(draft, detected_daqs={**draft.detected_daqs, **{look.port: look for look in looks}})
+
+
+def _daq_notes(draft: MachineDraft) -> list[str]:
+    look: DetectedDaq = draft.daq
+    if look.problem:
+        return [f"{look.problem}; the port is kept: lobewatch ports looks again"]
+    return [f"{look.text}"] if look.text else []
+
+
+def _strip_file_name(error: ValueError) -> str:
+    return str(error).removeprefix("machine.toml: ")
+
+
+def _print_notes(*texts: str) -> None:
+    for text in texts:
+        notes.print(text, markup=False)

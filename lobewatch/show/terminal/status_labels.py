@@ -1,0 +1,25 @@
+"""Labels and style sheet classes of a machine status."""
+
+from __future__ import annotations
+
+from lobewatch.monitoring.status_rules import StatusLevel
+
+STATUS_LABELS = {
+    StatusLevel.ALARM: "✗ ALARM",
+    StatusLevel.UNKNOWN: "? UNKNOWN",
+    StatusLevel.WARN: "! WARNING",
+    StatusLevel.GOOD: "✓ GOOD",
+}
+EARLY_ALARM_LABEL = "✗ EARLY ALARM"
+STATUS_CSS_CLASSES = {StatusLevel.GOOD: "ok", StatusLevel.ALARM: "bad"}
+"""Class of a light in the style sheet; the others are doubtful."""
+
+
+def status_label(light: StatusLevel, is_early: bool = False) -> str:
+    """The light with its symbol."""
+    return EARLY_ALARM_LABEL if is_early else STATUS_LABELS[light]
+
+
+def status_css_class(light: StatusLevel, is_early: bool = False) -> str:
+    """Class of the light in the style sheet."""
+    return "early" if is_early else STATUS_CSS_CLASSES.get(light, "doubt")

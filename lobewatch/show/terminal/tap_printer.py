@@ -1,0 +1,101 @@
+"""Print a tap test as lines of text, for logs and pipes."""
+
+from __future__ import annotations
+
+import threading
+from types import TracebackType
+from typing import Protocol, Self
+
+from rich.console import Console
+from rich.markup import escape
+
+from lobewatch.tap.state import ListedHit, TapState, TapStep
+
+PRINT_INTERVAL = 0.05
+"""Between two looks at the test (s)."""
+
+
+class RunningTest(Protocol):
+    """A live tap test; all of it may be used from any thread."""
+
+    @property
+    def state(self) -> TapState:
+        """The newest picture of it."""
+        ...
+
+    def undo(self) -> None:
+        """Take the last good hit back."""
+        ...
+
+    def stop(self) -> None:
+        """End the test."""
+        ...
+
+    def choose(self, key: str, tool: str = "") -> None:
+        """Say what comes after a test, by the key of a choice of its state."""
+        ...
+
+
+class TapPrinter:
+    """Prints from a thread of its own between __enter__ and __exit__; the test never waits for it."""
+
+    def __init__(self, session: RunningTest, console: Console) -> None:
+        """Nothing is printed yet."""
+        self._session, self._console = session, console
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._follow, name="tap printer", daemon=True)
+        self._before = session.state
+        self._told = 0
+
+    def __enter__(self) -> Self:
+        """Begin to print."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Print what is left."""
+        self._ended.set()
+        self._thread.join()
+
+    def _follow(self) -> None:
+        while not self._ended.wait(PRINT_INTERVAL):
+            self.print_new(self._session.state)
+        self.print_new(self._session.state)
+
+    def print_new(self, state: TapState) -> None:
+        """Print what is new in a state."""
+        before, self._before = self._before, state
+        if state.title != before.title:
+            self._told = 0
+        if state.device != before.device:
+            self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
+        for check in state.checks:
+            if (check.is_notable or not check.passed) and check not in before.checks:
+                symbol = "[bold green]✓[/]" if check.passed else "[bold yellow]![/]"
+                self._console.print(f"{symbol} {escape(check.name)}: {escape(check.text)}")
+        if state.resumed != before.resumed:
+            self._console.print(state.resumed)
+        with_hit = state.word in (TapStep.GOOD, TapStep.REFUSED) and not state.trial
+        is_listed = with_hit or state.word is TapStep.FAILED or state.reason == before.reason
+        if state.reason and not is_listed:
+            self._console.print(escape(state.reason))
+        self._print_hits(state)
+
+    def _print_hits(self, state: TapState) -> None:
+        for hit in state.hits[self._told :]:
+            if hit.earlier:
+                continue
+            good = sum(not earlier.flags for earlier in state.hits[: hit.number])
+            self._console.print(f"{good:3d} / {state.wanted}  {hit_markup(hit)}  ({hit.peak})")
+        self._told = len(state.hits)
+
+
+def hit_markup(hit: ListedHit) -> str:
+    """Symbol, words and cure, with colours."""
+    if hit.undone:
+        return "[bold]↶ UNDONE[/]"
+    if not hit.flags:
+        return "[bold green]✓ GOOD[/]"
+    return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(hit.reason)}"

@@ -1,0 +1,256 @@
+"""Show the trend of a series: chart, sentences, forecast dates, CSV and JSON."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+
+from dsm import RemainingPreload, format_with_error
+from lobewatch.logbook.machine_forecast import MachineForecast
+from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
+from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
+from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
+from lobewatch.monitoring.trend_shapes import TrendShape
+from lobewatch.show.terminal.output import format_csv, new_table
+
+FORECAST_ASSUMPTIONS = (
+    "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
+    " visible, and one time in three or four a fall that slows down or grows exponentially."
+)
+"""What stands below every table of dates."""
+UNKNOWN_NOW_TEXT = "unknown now, see check"
+"""In place of the dates of a program on which there is no word."""
+CHART_WIDTH, CHART_HEIGHT = 60, 12
+"""Characters of the plot itself."""
+CHART_POINT, CHART_LINE = "o", "."
+
+
+def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> dict[str, Any]:
+    """Points, score, alarm, light, preload, forecast; percents are 100 ln of the frequency over that of the first."""
+    trend = series.trend
+    return {
+        "tool": series.tool,
+        "direction": series.direction,
+        "points": [] if trend is None else _points_json(trend),
+        "score": None if trend is None else float(trend.detection.scores[-1]),
+        "alarm": None if trend is None else _alarm_json(trend),
+        "alarms": [alarm.to_row(outlook.status.time) for alarm in outlook.status.alarms],
+        "light": outlook.status.status.value,
+        "fall_percent": series.drop.value,
+        "fall_std_percent": series.drop.std,
+        "preload_left": preload,
+        "rate_percent_per_month": None if trend is None or trend.rate is None else trend.rate._asdict(),
+        "forecast": build_forecast_rows(outlook.programs, outlook.limits),
+    }
+
+
+def trend_csv(series: SeriesStatus) -> str:
+    """A line a point, headings on top."""
+    rows: list[list[Any]] = [["time", "percent", "error_percent", "temperature_c", "taps", "score"]]
+    trend = series.trend
+    if trend is not None:
+        for point, score in zip(trend.points, _score_values(trend), strict=True):
+            numbers = (point.percent, point.error, point.temperature)
+            rows.append([point.time.isoformat(), *map(_csv_number, numbers), len(point.taps), _csv_number(score)])
+    return format_csv(rows)
+
+
+def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> list[str | Table]:
+    """Chart, sentence and table; where no date can be given, why."""
+    trend = series.trend
+    if trend is None:
+        return [f"{series.name}: no tap test that others can be compared with"]
+    further = [f"{side.name}: {change_since_start_text(side)}" for side in outlook.status.series if side is not series]
+    left = [] if preload is None else [str(preload)]
+    return [*chart_lines(trend), trend_sentence(series), *left, *_date_texts(outlook), *further]
+
+
+def _date_texts(outlook: MachineForecast) -> list[str | Table]:
+    why_none = no_dates_text(outlook)
+    if why_none:
+        return [why_none]
+    dates = new_table("~what", "~becomes doubtful", "~is not stable")
+    for line in forecast_date_rows(outlook):
+        dates.add_row(*line)
+    return [dates, FORECAST_ASSUMPTIONS]
+
+
+def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
+    """Name, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
+    now = outlook.status.time
+    programs = [
+        (name, reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
+        if name not in outlook.unknown_programs
+        else (name, UNKNOWN_NOW_TEXT, UNKNOWN_NOW_TEXT)
+        for name, fate in outlook.programs.items()
+    ]
+    return programs + [
+        (f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits
+    ]
+
+
+def no_dates_text(outlook: MachineForecast) -> str:
+    """Why no date can be given, in a sentence; empty where there is one, or nothing is left to foretell."""
+    fates = (reach for fate in outlook.programs.values() for reach in (fate.doubtful, fate.not_stable))
+    reaches = [*fates, *(reach for _, reach in outlook.limits)]
+    if any(reach.forecast_end is not None for reach in reaches) or all(reach.is_measured for reach in reaches):
+        return ""
+    points = max((len(series.trend.points) for series in outlook.status.series if series.trend), default=0)
+    if points >= MIN_FORECAST_POINTS:
+        return "No dates: what was tapped lies too far back to foretell from it."
+    return (
+        f"No dates yet: a forecast needs {MIN_FORECAST_POINTS} points, there {'is' if points == 1 else 'are'} {points}."
+    )
+
+
+def trend_sentence(series: SeriesStatus) -> str:
+    """Course of the series so far, in a sentence."""
+    trend = series.trend
+    if trend is None:
+        return f"{series.name}: unknown"
+    n = len(trend.points)
+    text = f"{series.name}: {change_since_start_text(series)}{f' ({n} points)' if n > 1 else ''}"
+    if trend.forecast is None:
+        known = trend.readings.scatter_prior.single
+        least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
+        fits = "; ± of the fits alone, remounting is not in it" if n > 1 else ""
+        return f"{text}{fits}; an alarm can ring from {least}"
+    return f"{text}; {trend_text(trend)}; scatter {trend.spread:.2f} %, score {_score_text(trend)}; {rate_text(trend)}"
+
+
+def rate_text(trend: Trend) -> str:
+    """Change in % a month at the last point, with its 95 % interval; empty below 8 points."""
+    rate = trend.rate
+    if rate is None:
+        return ""
+    digits = max(2, -math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
+    inside = min(max(rate.value, rate.low), rate.high)
+    value, low, high = (f"{round(percent, digits) + 0.0:+.{digits}f}" for percent in (inside, rate.low, rate.high))
+    return f"{value} % a month now ({low} to {high}, 95 %)"
+
+
+def change_since_start_text(series: SeriesStatus) -> str:
+    """How far it has fallen since it started; of an only test, that there is nothing to compare it with."""
+    if series.is_baseline:
+        return "first test, nothing to compare it with yet"
+    return f"frequency {change_text(series)} since the first tests" if series.drop.is_known else "unknown"
+
+
+def change_text(series: SeriesStatus) -> str:
+    """Change of the frequency since the series started, with its standard error."""
+    fall = series.drop
+    return f"{format_with_error(-fall.value, fall.std)} %" if fall.is_known else "unknown"
+
+
+def trend_text(trend: Trend) -> str:
+    """Its course: since when it falls where that rings, else the shape that fits it best; empty below 8 points."""
+    fallen, since = trend.open_drop, trend.drop_since
+    if fallen is not None and since is not None:
+        course = f"{'fell at once before' if fallen.change.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
+        return f"{course}, settling" if trend.is_run_in else course
+    if trend.likeliest_shape is None or trend.forecast is None:
+        return ""
+    return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
+
+
+def _shape_text(shape: TrendShape, falls: bool) -> str:
+    since, goes, went = f"{date_of_days(shape.start):%Y-%m-%d}", *(("falling", "fell") if falls else ("rising", "rose"))
+    steadily = f"{goes} steadily since {since}"
+    words = {
+        "none": "steady",
+        "line": steadily,
+        "slope": steadily,
+        "step": f"{went} once before {since}, steady since",
+        "slopes": f"{goes} at another rate since {since}",
+        "breaks": f"{goes} at another rate since {since}",
+        "crash": f"{went} at once before {since}, {goes} beside that",
+        "wander": f"{goes} by fits and starts",
+        "bend": f"{goes} at a rate that changes",
+    }
+    return words.get(shape.kind, f"{goes}, {'faster and faster' if shape.accelerates else 'ever more slowly'}")
+
+
+def _score_text(trend: Trend) -> str:
+    score = _score_values(trend)[-1]
+    return f"{score:.1f} (alarm at 3.3 twice)" if math.isfinite(score) else "from 9 points on"
+
+
+def _score_values(trend: Trend) -> list[float]:
+    """Scores, one a point; NaN where none is judged."""
+    return [float(score) for score in trend.detection.scores]
+
+
+def _points_json(trend: Trend) -> list[dict[str, Any]]:
+    return [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in trend.points]
+
+
+def _alarm_json(trend: Trend) -> dict[str, Any] | None:
+    if trend.open_drop is None or trend.drop_since is None:
+        return None
+    fall, since = trend.open_drop.change, trend.drop_since
+    return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
+
+
+def _csv_number(value: float) -> float | str:
+    return value if math.isfinite(value) else ""
+
+
+def reach_text(reach: ThresholdDates, now: datetime) -> str:
+    """When something is reached, for people."""
+    if reach.is_measured:
+        return "already"
+    if reach.forecast_end is None:
+        return "history too short or too old"
+    if reach.earliest is None:
+        return f"not before {date_of_days(reach.forecast_end):%Y-%m}"
+    today = days_since_epoch(now)
+    if reach.latest is None:
+        return f"not before {_day_or_now(reach.earliest, today)}"
+    if reach.latest <= today:
+        return f"by now, at this rate (probably {date_of_days(reach.probable or today):%Y-%m-%d})"
+    earliest, probable, latest = (
+        _day_or_now(days, today) for days in (reach.earliest, reach.probable or today, reach.latest)
+    )
+    return f"between {earliest} and {latest} (80 %), probably {probable}"
+
+
+def _day_or_now(days: float, today: float) -> str:
+    return f"{date_of_days(days):%Y-%m-%d}" if days > today else "now"
+
+
+def chart_lines(trend: Trend) -> list[str]:
+    """Points and fitted line over the dates, fall downwards (%); the points alone below 8 of them."""
+    dates = point_days(trend.points)
+    percent = np.array([point.percent for point in trend.points]) - trend.start
+    low, high = float(percent.min()), float(percent.max())
+    low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
+    columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
+    canvas = np.full((CHART_HEIGHT, CHART_WIDTH), " ")
+    if trend.forecast is not None:
+        at = np.linspace(dates[0], dates[-1], CHART_WIDTH)
+        line = np.interp(at, dates, trend.forecast.fitted - trend.start)
+        canvas[_canvas_indices(np.clip(line, low, high), high, low, CHART_HEIGHT), np.arange(CHART_WIDTH)] = CHART_LINE
+    canvas[_canvas_indices(percent, high, low, CHART_HEIGHT), columns] = CHART_POINT
+    labels = [
+        f"{value:+8.2f} %" if row % 4 == 0 or row == CHART_HEIGHT - 1 else " " * 10
+        for row, value in _axis_ticks(low, high)
+    ]
+    drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]
+    first, last = (f"{date_of_days(days):%Y-%m-%d}" for days in dates[[0, -1]])
+    return [*drawn, " " * 11 + "+" + "-" * CHART_WIDTH, " " * 12 + first + last.rjust(CHART_WIDTH - len(first))]
+
+
+def _axis_ticks(low: float, high: float) -> list[tuple[int, float]]:
+    return list(enumerate(np.linspace(high, low, CHART_HEIGHT).tolist()))
+
+
+def _canvas_indices(values: NDArray[np.float64], start: float, end: float, count: int) -> NDArray[np.intp]:
+    span = end - start
+    share = (values - start) / span if span else np.zeros(values.size)
+    return np.round(share * (count - 1)).astype(np.intp)

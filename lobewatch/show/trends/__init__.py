@@ -1,1 +1,0 @@
-"""The trend of a series for people: chart of characters, sentence, dates, CSV and JSON."""

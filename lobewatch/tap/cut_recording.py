@@ -1,0 +1,332 @@
+"""Record a cut with the accelerometer on the spindle housing and evaluate it live."""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Block, Channel, DataError, Description, Device, DeviceError
+from acquisition.errors import format_error
+from acquisition.files.cut_file import CutSignal
+from acquisition.files.read_cut import read_cut_recording
+from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
+from lobewatch.machine import MachineFolder, check_device_rate
+from lobewatch.machine.settings.requested_cut import CutSetting
+from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, open_device
+from lobewatch.tap.evaluated_hits import StatePublisher
+from lobewatch.tap.live_curves import find_extremes
+
+MAX_CURVE_FREQUENCY = 8000.0
+"""Highest frequency of the curves (Hz)."""
+Floats = NDArray[np.float64]
+
+
+class CutStep(enum.StrEnum):
+    """The word that can be read from 3 m."""
+
+    SENSOR = "SENSOR TO HOUSING"
+    """The accelerometer is moved, the device opened."""
+    LISTENING = "LISTENING"
+    """The spindle is heard to turn in air; the cut is waited for."""
+    CUTTING = "CUTTING"
+    """A cut has begun."""
+    AGAIN = "CUT AGAIN"
+    """It was no use; the next is waited for."""
+    JUDGING = "JUDGING"
+    """The cut is over."""
+    STABLE = "STABLE"
+    """What was heard, as the four words of CutWord."""
+    CHATTER = "CHATTER"
+    FLIP = "FLIP CHATTER"
+    CANNOT_TELL = "CANNOT TELL"
+    FAILED = "FAILED"
+    """Nothing was heard; the reason says why, the cure what to do."""
+
+
+@dataclass(frozen=True, eq=False)
+class CutState:
+    """One picture of listening to a cut."""
+
+    revision: int
+    """Number that rises with every change."""
+    word: CutStep
+    """Word that can be read from 3 m."""
+    title: str
+    """Machine and cut."""
+    device: str = ""
+    """DAQ, port and rate."""
+    reason: str = ""
+    """Sentence on what to do, or on why nothing was heard."""
+    level: float | None = None
+    """Root mean square of the acceleration over the newest 50 ms (m/s^2)."""
+    left: float | None = None
+    """Time for which a cut is still waited for (s)."""
+    cut_seconds: float | None = None
+    """Length of the cut heard so far (s)."""
+    comparison: CutComparison | None = None
+    """Cut as it was heard, beside what was expected of it; None before the end."""
+    saved: str = ""
+    """Name under which it is kept; empty where it is not, or not yet."""
+    plots: Mapping[str, Floats] | None = None
+    """Curves of what was heard, see cut_curves."""
+
+
+def get_result_step(comparison: CutComparison) -> CutStep:
+    """The word on what was heard."""
+    return CutStep[comparison.detected.verdict.upper().replace(" ", "_")]
+
+
+def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
+    """The spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), thinned, no peak lost; empty without one.
+
+    For each name of `marked`, its lines as `MODAL_SHOP_NAME_PATTERN` (Hz) and `NAME_amplitude`; the modes as tapped as `x` and `y` (Hz).
+    """
+    spectrum = comparison.detected.spectrum
+    if spectrum is None:
+        return {}
+    amplitude = np.sqrt(spectrum.power)
+    at = find_extremes([amplitude], int(np.searchsorted(spectrum.frequency, MAX_CURVE_FREQUENCY, side="right")))
+    curves = {"frequency": spectrum.frequency[at], "amplitude": amplitude[at]}
+    for name, lines in group_peaks(comparison.detected).items():
+        curves |= {name: lines.frequency, f"{name}_amplitude": lines.amplitude}
+    if comparison.assembly is not None:
+        for name, modes in (("x", comparison.assembly.x), ("y", comparison.assembly.y)):
+            curves[name] = np.array([mode.frequency for mode in modes or ()])
+    return curves
+
+
+CUT_SEARCH_INTERVAL = 0.5
+"""Time between two looks at what has been heard (s)."""
+KEPT_SIGNAL_SECONDS = 20.0
+"""Length of the newest sound that is kept (s)."""
+MAX_CUT_SECONDS = 8.0
+"""Length after which a cut is judged, whether it ends or not (s)."""
+AIR_AFTER_CUT = 0.3
+"""Length of air that shows that a cut has ended (s)."""
+AIR_BEFORE_CUT = 1.0
+"""Length of air that is kept before a cut (s)."""
+SENSOR_CHECK_DELAY = 1.0
+"""Time after which it is looked at whether anything is heard at all (s)."""
+
+BEGIN_CUT_TEXT = "hearing the spindle turn in air; begin the cut"
+SENSOR_ON_HOUSING_TEXT = "The sensor on the housing, the spindle turning in air: now begin the cut."
+CUT_TOO_SHORT_TEXT = "too short for a word, or no air before it; cut again, a second or longer"
+CUT_RUNNING_TEXT = "A second or longer, then out of the cut: it is judged by itself."
+
+
+@dataclass
+class _SignalBuffer:
+    """Sound heard so far on one channel."""
+
+    channel: Channel
+    row: int
+    rate: float
+
+    def __post_init__(self) -> None:
+        self.codes: list[NDArray[np.int32]] = []
+        self.marks: list[tuple[int, int]] = []
+        self.count = 0
+        self.heard = 0
+
+    def add(self, block: Block) -> None:
+        """Keep a block, and forget what is too old."""
+        codes = block.codes[self.row]
+        overloaded = bool(block.overload >> self.row & 1)
+        if block.lost_before or overloaded:
+            self.marks.append((self.heard, block.lost_before or -1))
+        self.codes.append(codes)
+        self.heard, self.count = self.heard + codes.size, self.count + codes.size
+        while self.count - self.codes[0].size > KEPT_SIGNAL_SECONDS * self.rate:
+            self.count -= self.codes.pop(0).size
+
+    @property
+    def signal(self) -> CutSignal:
+        """Sound that is kept."""
+        codes, first = np.concatenate(self.codes), self.heard - self.count
+        marks = [mark for place, mark in self.marks if place > first]
+        lost = sum(mark for mark in marks if mark > 0)
+        return CutSignal(
+            np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
+        )
+
+    @property
+    def level(self) -> float:
+        """Root mean square about the mean over the newest LEVEL_TIME (m/s^2)."""
+        wanted, newest = round(LEVEL_WINDOW * self.rate), list[NDArray[np.int32]]()
+        for codes in reversed(self.codes):
+            newest.insert(0, codes)
+            if sum(part.size for part in newest) >= wanted:
+                break
+        return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
+
+    def forget(self) -> None:
+        """Drop the sound heard so far, which is no use."""
+        self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
+
+
+def _ignore_state(**_: Any) -> None:
+    """Nobody looks."""
+
+
+def record_cut(
+    device: Device,
+    turn: float,
+    patience: float,
+    show: Callable[[str], None],
+    picture: Callable[..., None] = _ignore_state,
+) -> CutSignal:
+    """The next whole cut that a started device hears; turn: of the spindle (s), patience: until it ends (s).
+
+    show: told what is being waited for; picture: given the fields of CutState that change. DataError without an
+    accelerometer, and where no cut is heard in time; DeviceError where the sensor is dead.
+    """
+    ear, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+    show(BEGIN_CUT_TEXT)
+    for signal in _iterate_signals(device, ear, patience, picture):
+        parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
+        if _has_ended(parts, signal) and parts.reason:
+            ear.forget()
+            show(CUT_TOO_SHORT_TEXT)
+            waiting = {"word": CutStep.AGAIN, "reason": f"{CUT_TOO_SHORT_TEXT.capitalize()}."}
+            picture(**waiting, cut_seconds=None)
+        elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > MAX_CUT_SECONDS):
+            return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
+        elif np.isfinite(parts.begin):
+            picture(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
+        elif ear.heard >= SENSOR_CHECK_DELAY * ear.rate:
+            picture(**waiting, cut_seconds=None)
+    raise DataError(
+        f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
+        "more --seconds"
+    )
+
+
+def _make_buffer(device: Device) -> _SignalBuffer:
+    rows = [i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"]
+    if not rows:
+        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
+    return _SignalBuffer(device.channels[rows[0]], rows[0], device.sample_rate)
+
+
+def _iterate_signals(
+    device: Device, ear: _SignalBuffer, patience: float, picture: Callable[..., None]
+) -> Iterator[CutSignal]:
+    """Sound heard so far, again and again."""
+    next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
+    for block in device.blocks():
+        ear.add(block)
+        seconds = ear.heard / ear.rate
+        if not checked and seconds >= SENSOR_CHECK_DELAY:
+            _check_sensor_signal(ear)
+            checked = True
+        if seconds >= next_level:
+            next_level = seconds + LEVEL_WINDOW
+            picture(level=ear.level, left=max(patience - seconds, 0.0))
+        if seconds >= next_look:
+            next_look = seconds + CUT_SEARCH_INTERVAL
+            yield ear.signal
+        if seconds > patience:
+            return
+
+
+def _check_sensor_signal(ear: _SignalBuffer) -> None:
+    codes = np.concatenate(ear.codes)
+    low, high = ear.channel.rails
+    if np.mean((codes <= low) | (codes >= high)) > 0.5:
+        raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
+    if np.ptp(codes) == 0:
+        raise DeviceError(
+            "the accelerometer hears nothing at all", "is it plugged in, on the housing, and the spindle turning?"
+        )
+
+
+def _has_ended(parts: CutParts, signal: CutSignal) -> bool:
+    return bool(np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT)
+
+
+def acquire_cut(
+    folder: MachineFolder,
+    setting: CutSetting,
+    file: Path | None,
+    port: str,
+    patience: float,
+    description: Description,
+    show: Callable[[str], None],
+    picture: Callable[..., None],
+) -> CutSignal:
+    """The sound at the accelerometer; file: in place of the device, description: what the file does not say itself.
+
+    patience: how long a cut is waited for (s); show: told what to do; picture: as in record_cut. ValueError without a
+    port, DataError for a file that holds no such recording and where no cut is heard, DeviceError where no device
+    answers.
+    """
+    if file is not None:
+        return read_cut_recording(file, description)
+    port = port or folder.machine.daq.port
+    if not port:
+        raise ValueError(f"no port: give --port, --file, or port in [daq] of {folder.toml}")
+    if port.startswith(REPLAY_PREFIX):
+        raise ValueError(f"--port {port}: a recording of hits; give the recording of a cut with --file")
+    show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
+    show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
+    with open_device(folder.machine.daq, port) as device:
+        with folder.locked():
+            check_device_rate(folder, device)
+        picture(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        device.start()
+        return record_cut(device, 60 / setting.speed_rpm, patience, show, picture)
+
+
+def check_sensor_kind(sensor: str, file: Path | None) -> str:
+    """A kind of sensor; ValueError for one that is not known, and for a microphone at a device."""
+    if sensor not in get_args(CutSensor):
+        raise ValueError(f"--sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
+    if sensor == "microphone" and file is None:
+        raise ValueError("--sensor microphone is for a --file; a device hears by its accelerometer")
+    return sensor
+
+
+def check_tacho_options(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
+    """Fields of a description of a tachometer; ValueError at a device, which has none."""
+    if file is None and (tacho or pulses is not None):
+        given = f"--tacho {tacho}" if tacho else f"--pulses {pulses}"
+        raise ValueError(f"{given} is for a --file; of a device only the accelerometer is heard")
+    return {"tacho": tacho, "pulses": pulses}
+
+
+@contextlib.contextmanager
+def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StatePublisher[CutState]]:
+    """Begin with where the sensor belongs; what is raised within is the last of them."""
+    cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
+    title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
+    pictures = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
+    try:
+        yield pictures
+    except KeyboardInterrupt:
+        pictures.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
+        raise
+    except (OSError, RuntimeError, ValueError) as error:
+        pictures.show(word=CutStep.FAILED, reason=format_error(error), level=None, left=None)
+        raise
+
+
+def evaluate_live_cut(
+    logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: StatePublisher[CutState]
+) -> list[CutComparison]:
+    """Listen to a recording, and show the word on its last cut."""
+    pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
+    comparisons = compare_cuts(logbook, setting, signal)
+    last = comparisons[-1]
+    pictures.show(word=get_result_step(last), reason="", comparison=last, plots=build_cut_curves(last))
+    return comparisons

@@ -1,0 +1,236 @@
+"""Tap tests of an aging emulated spindle, compared with the truth."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple, dataclass
+from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from acquisition import UNKNOWN_CONDITIONS, Circumstances, Conditions, DataError, Structure, TapDirection
+from dsm import Spindle
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.machine_forecast import forecast_machine
+from lobewatch.machine import MachineFolder
+from lobewatch.machine.folder_updates import add_event
+from lobewatch.measurement import Measurement
+from lobewatch.monitoring.threshold_dates import ThresholdDates
+from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
+from lobewatch.tap.device_connection import DeviceConnector
+from lobewatch.tap.emulated_spindle import build_structure, open_synchronized_device
+from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
+from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases
+from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.tap_in_progress import begin_tap
+from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
+
+SCATTER_ONLY = MountingVariation()
+"""Tests that differ by their scatter alone."""
+TEST_DAY, TEST_HOUR = 15, 9
+"""Day of the month, and hour, of the tests of a month."""
+DEMO_DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
+"""Directions of the tests of a month, with the minute of the hour at which each is taken."""
+
+
+@dataclass(frozen=True)
+class SpindleState:
+    """A spindle in four figures."""
+
+    frequency: float
+    """First natural frequency (Hz)."""
+    damping_ratio: float
+    """Damping ratio of that mode (-)."""
+    stiffness: float
+    """Stiffness of that mode at the tool tip (N/m)."""
+    bearing_stiffness: float
+    """Stiffness of each bearing (N/m)."""
+
+    def relative_to(self, reference: SpindleState) -> SpindleState:
+        """Relative differences (-)."""
+        return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
+
+
+@dataclass(frozen=True)
+class PlannedTap:
+    """One tap test of the demo before it is taken."""
+
+    date: datetime
+    """Date in the simulated calendar; those of the two tests of a month differ."""
+    direction: TapDirection
+    """Direction in which is tapped."""
+    structure: Structure
+    """Structure that the hammer meets."""
+    truth: SpindleState
+    """Truth: the spindle as emulated."""
+    conditions: Conditions = UNKNOWN_CONDITIONS
+    """Conditions of the test."""
+
+
+@dataclass(frozen=True)
+class TakenTap:
+    """One tap test of the demo, committed."""
+
+    plan: PlannedTap
+    """Test as it was planned, with its truth."""
+    id: str
+    """Identity in the journal."""
+
+
+@dataclass(frozen=True)
+class DemoTap:
+    """One tap test of the demo."""
+
+    plan: PlannedTap
+    """Test as it was planned, with its truth."""
+    result: SpindleState
+    """Spindle as the pipeline measured it."""
+
+
+def plan_taps(
+    folder: MachineFolder,
+    months: int,
+    random: np.random.Generator,
+    scatter: float,
+    story: WearScenario = WearScenario.STEADY,
+    mounting: MountingVariation = SCATTER_ONLY,
+    now: datetime | None = None,
+) -> list[PlannedTap]:
+    """Tap tests in x and y every month of a story up to now; the tool is remounted before each test.
+
+    scatter: standard deviation of f_1 from test to test, as a share of it (-), in place of that of `mounting`: every
+    test has bearings whose stiffness puts f_1 where remounting has moved it. now: the last two are those of its month,
+    or of the month before where that day is still to come; None for the clock's. DataError without [spindle].
+    """
+    wear, mounting = SpindleWear.of(folder, months, story), mounting._replace(scatter=scatter)
+    shifts, warmth = mounting.shifts(months, len(DEMO_DIRECTIONS), random), mounting.temperatures(months)
+    last = _find_last_month(now or datetime.now(UTC))
+    plans = []
+    for month in range(months):
+        year, index = divmod(last - months + 1 + month, 12)
+        spindle = wear.spindle(month)
+        under = UNKNOWN_CONDITIONS if warmth is None else Conditions(temperature_c=round(float(warmth[month]), 1))
+        for (direction, minute), shift in zip(DEMO_DIRECTIONS.items(), shifts[month].tolist(), strict=True):
+            date = datetime(year, index + 1, TEST_DAY, TEST_HOUR, minute, tzinfo=UTC)
+            plans.append(_plan_tap(folder, date, direction, remount_spindle(spindle, shift), under))
+    return plans
+
+
+def _find_last_month(now: datetime) -> int:
+    """The newest month whose tests are past, counted from the year 0."""
+    now = now.astimezone(UTC)
+    tested = now.replace(day=TEST_DAY, hour=TEST_HOUR, minute=max(DEMO_DIRECTIONS.values()), second=0, microsecond=0)
+    return 12 * now.year + now.month - 1 - (now < tested)
+
+
+def age_spindle(
+    folder: MachineFolder,
+    months: int,
+    seed: int,
+    scatter: float,
+    story: WearScenario = WearScenario.STEADY,
+    mounting: MountingVariation = SCATTER_ONLY,
+    *,
+    tcp: bool = False,
+) -> Iterator[TakenTap]:
+    """Take the tap tests of `plan_taps`, each through a real port: a pseudo-terminal, or TCP on loopback."""
+    random = np.random.default_rng(seed)
+    plans = plan_taps(folder, months, random, scatter, story, mounting)
+    replaced = SpindleWear.of(folder, months, story).replaced_at
+    for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
+        if replaced is not None and number == len(DEMO_DIRECTIONS) * replaced:
+            add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)
+        yield TakenTap(plan, _run_tap(folder, plan, hammering, tcp))
+
+
+def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
+    """The results of these tests beside what was emulated; DataError where one does not show the mode followed.
+
+    The history is worked out once, after the last test, and not anew after every one with a word on every program.
+    """
+    return [DemoTap(tap.plan, _get_measured_state(logbook.measurement(tap.id))) for tap in taken]
+
+
+def _plan_tap(
+    folder: MachineFolder, date: datetime, direction: TapDirection, spindle: Spindle, under: Conditions
+) -> PlannedTap:
+    damping = folder.machine.spindle.damping_ratio if folder.machine.spindle else 0.0
+    structure = build_structure(spindle, damping)
+    truth = (structure.frequency[0], damping, structure.stiffness[0], spindle.bearings[0].stiffness)
+    return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under)
+
+
+def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator, tcp: bool) -> str:
+    """Take and commit one tap test as a session without a person does; its id."""
+    machine, toml = folder.machine, folder.toml_text
+    where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
+    about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
+    publisher = TapPublisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    with (
+        open_synchronized_device(plan.structure, random, tcp=tcp) as open_device,
+        threadpool_limits(limits=1),
+        folder.locked(),
+    ):
+        hits = EvaluatedHits(begin_tap(folder, about, resume=False), machine)
+        loop = HitLoop(hits, publisher, OperatorRequests(), guided=False)
+        TapPhases(folder, hits, loop, publisher, guided=False).run(
+            DeviceConnector(folder, open_device, publisher, time.sleep)
+        )
+        folder.commit(hits.tap.finish())
+    return hits.tap.id
+
+
+def _get_measured_state(measurement: Measurement) -> SpindleState:
+    mode, calibration = measurement.followed, measurement.calibration
+    if mode is None or calibration is None:
+        why = "; ".join(map(str, measurement.remarks))
+        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller --scatter")
+    return SpindleState(mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)
+
+
+FORECAST_DROP = 0.02
+"""Fall of the frequency from where it is, that is foretold, as a share; chosen."""
+
+
+class LevelForecast(NamedTuple):
+    """One level, foretold after the last test."""
+
+    level: str
+    """Level for people."""
+    reached: ThresholdDates
+    """When it is reached."""
+    truth: float | None
+    """Date at which the emulated spindle, without scatter, is there (days since 1970); None where it never is."""
+
+
+def forecast_levels(logbook: Logbook, wear: SpindleWear) -> list[LevelForecast]:
+    """Forecasts after the last test: a fall of so much more in x, and each program that will not be stable."""
+    last = logbook.history.rows[-1].time
+    prospect = forecast_machine(logbook, last)
+    x = next((series for series in prospect.status.series if series.direction == "x"), None)
+    if x is None or x.trend is None:
+        return []
+    percent = x.trend.points[-1].percent if x.trend.forecast is None else float(x.trend.forecast.fitted[-1])
+    title = f"f_1 in x {100 * FORECAST_DROP:g} % lower than now"
+    forecasts = [_forecast_level(title, x.trend, percent + 100 * math.log1p(-FORECAST_DROP), wear, last)]
+    for name, critical in prospect.critical_drops.items():
+        reached = prospect.programs[name].not_stable
+        if 0 < critical.not_stable < math.inf and reached.is_known:
+            percent = x.trend.points[-1].percent + 100 * math.log1p(-critical.not_stable)
+            forecasts.append(
+                _forecast_level(f"{name} not stable", x.trend, percent, wear, last)._replace(reached=reached)
+            )
+    return forecasts
+
+
+def _forecast_level(level: str, trend: Trend, percent: float, wear: SpindleWear, last: datetime) -> LevelForecast:
+    """Dates at which a series falls to a level, foretold and true; percent: 100 ln(f/f_first) there."""
+    month = wear.find_month(trend.first_value * math.exp(percent / 100))
+    truth = (
+        None if month is None else days_since_epoch(last + timedelta(days=DAYS_PER_MONTH * (month - wear.months + 1)))
+    )
+    return LevelForecast(level, trend.forecast_level(percent), truth)

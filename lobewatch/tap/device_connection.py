@@ -1,0 +1,266 @@
+"""Open, watch and reconnect the device of a live test."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import (
+    Block,
+    Channel,
+    Device,
+    DeviceError,
+    Event,
+    EventKind,
+    FileSource,
+    Hit,
+    Remark,
+    SensorDataLocation,
+    Source,
+    find_driver,
+    find_usb_identity,
+    find_usb_port,
+)
+from acquisition.channel import ChannelQuantity
+from acquisition.devices import convert_driver_errors
+from acquisition.hits import TapInputs
+from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.setup_tables import DaqTable
+from lobewatch.tap.evaluated_hits import TapPublisher
+from lobewatch.tap.state import Check, TapStep
+from lobewatch.tap.tap_in_progress import TapInProgress
+
+REPLAY_PREFIX = "file:"
+"""Beginning of a port that is no port but a recording, whatever the driver."""
+
+
+class DeviceOpener:
+    """Opens one device again and again: a USB device wherever it is plugged in after the first time.
+
+    A USB device without a serial number, and what is no USB device, is known by the name of its port alone.
+    """
+
+    def __init__(self, daq: DaqTable, port: str) -> None:
+        """A device as [daq] sets it up; port: where it is the first time."""
+        self._daq, self._port = daq, port
+        self._identity: tuple[int, str] | None = None
+
+    def open(self) -> Device:
+        """Open as open_source does; DeviceError while the USB device is nowhere: no other at its port is touched."""
+        if self._identity is not None and find_usb_identity(self._port) != self._identity:
+            port = find_usb_port(*self._identity)
+            if port is None:
+                number = self._identity[1]
+                raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in", "plug it in")
+            self._port = port
+        source = open_device(self._daq, self._port)
+        self._identity = self._identity or find_usb_identity(self._port)
+        return source
+
+
+def open_device(daq: DaqTable, port: str) -> Device:
+    """A connected device on a port, as [daq] sets it up, or the hits of a recording, "file:PATH".
+
+    Raises DeviceError where no device is there, DataError for a file without hits.
+    """
+    if port.startswith(REPLAY_PREFIX):
+        return FileSource(port.removeprefix(REPLAY_PREFIX))
+    with convert_driver_errors(daq.driver, f"opening {port}"):
+        return find_driver(daq.driver).open(port, daq.settings)
+
+
+def find_sensor_data(daq: DaqTable, port: str) -> SensorDataLocation | None:
+    """Place where the device on a port keeps the data of its sensors; None where machine.toml does."""
+    return None if port.startswith(REPLAY_PREFIX) else find_driver(daq.driver).sensor_data
+
+
+LEVEL_WINDOW = 0.05
+"""Length of the live levels (s)."""
+
+
+def describe_device(device: Device) -> str:
+    """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
+    who = device.identity
+    details = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
+    return ", ".join([who.model, *(name + value for name, value in details.items() if value)])
+
+
+class LiveSignal:
+    """Force and acceleration of one connected source, or the acceleration alone."""
+
+    def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `select_input_channels`."""
+        self.inputs = TapInputs.select(source.channels, quantity, direction)
+        """Inputs of the tap test: force and acceleration, or the latter alone; between them that across to it."""
+        self._rate = source.sample_rate
+        self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
+
+    @property
+    def levels(self) -> tuple[float | None, float]:
+        """rms about the mean of force (N; None where none is measured) and acceleration (m/s^2) over LEVEL_TIME."""
+        wanted = round(LEVEL_WINDOW * self._rate)
+        newest: list[NDArray[np.int32]] = []
+        for codes in reversed(self._recent):
+            newest.insert(0, codes[list(self.inputs.rows)])
+            if sum(part.shape[1] for part in newest) >= wanted:
+                break
+        steps = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
+        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
+        return rms[0] if len(rms) > 1 else None, rms[-1]
+
+    def add(self, block: Block) -> None:
+        """Take note of a block."""
+        self._recent.append(block.codes)
+
+    def record(self, blocks: Iterable[Block], duration: float) -> Hit:
+        """The next blocks that make up a duration (s), as one record."""
+        codes, lost = [], 0
+        for block in blocks:
+            codes.append(block.codes[list(self.inputs.rows)])
+            lost += block.lost_before
+            if sum(part.shape[1] for part in codes) >= duration * self._rate:
+                break
+        return self.inputs.make_hit(np.concatenate(codes, axis=1), self._rate, lost_scans=lost)
+
+
+def estimate_resting_rms(baseline: Hit, width: int) -> float:
+    """rms of the acceleration about its mean over `width` samples at rest, the median of all such (m/s^2)."""
+    pieces = baseline.acceleration[: max(baseline.acceleration.size // width, 1) * width]
+    return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))
+
+
+RECONNECT_INTERVAL = 0.5
+"""Time between two tries to find the device again (s)."""
+BUTTON_BOUNCE_TIME = 0.3
+"""Time after a move of the button in which a press is its bouncing (s)."""
+
+
+class Button:
+    """The button of a device, which takes the last good hit back.
+
+    Presses are told from bouncing by the clock of the device: events that wait to be read come all at once.
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        """Not pressed yet; sample_rate: of the scans that events are timed by (Hz)."""
+        self._bounce = BUTTON_BOUNCE_TIME * sample_rate
+        self._moved: int | None = None
+
+    def count_presses(self, events: deque[Event]) -> int:
+        """Take all events that wait, and count the presses in them."""
+        count = 0
+        while events:
+            event = events.popleft()
+            if event.kind == EventKind.BUTTON:
+                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
+                self._moved = event.scan
+        return count
+
+
+class DeviceConnection:
+    """One opened device: its scans, and what it tells beside them."""
+
+    def __init__(self, device: Device, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `select_input_channels`."""
+        self._device = device
+        self.direction = direction
+        """Direction that is tapped, by which one of several accelerations is chosen."""
+        self.signal = LiveSignal(device, quantity, direction)
+        """Its newest samples."""
+        self._button = Button(device.sample_rate)
+        self._fault = ""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """All channels of the device."""
+        return self._device.channels
+
+    @property
+    def sample_rate(self) -> float:
+        """Sample rate (Hz)."""
+        return self._device.sample_rate
+
+    def start(self) -> None:
+        """Begin the stream; what the button did before counts for nothing."""
+        self._device.start()
+        self._device.events.clear()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks that the device sends from now on."""
+        for block in self._device.blocks():
+            self.signal.add(block)
+            yield block
+
+    def count_presses(self) -> int:
+        """Number of presses of its button since this was last asked for."""
+        return self._button.count_presses(self._device.events)
+
+    def poll_fault_text(self) -> str:
+        """Sentence on a pulled sensor cable or a missing supply, or that it is mended, where the device tells; once."""
+        before, self._fault = self._fault, self._device.fault
+        if self._fault == before:
+            return ""
+        return self._fault or "The sensor is connected again."
+
+    def close(self) -> None:
+        """Stop, and give the port back."""
+        self._device.close()
+
+
+class DeviceConnector:
+    """Opens the device of a test, again and again where it must."""
+
+    def __init__(
+        self,
+        folder: MachineFolder,
+        open_device: Callable[[], Device],
+        publisher: TapPublisher,
+        sleep: Callable[[float], None],
+    ) -> None:
+        """Nothing is opened yet."""
+        self._folder, self._open_device, self._publisher, self._sleep = folder, open_device, publisher, sleep
+
+    def connect(self, tap: TapInProgress) -> DeviceConnection:
+        """A started device that the hits of a test may come from.
+
+        Raises DeviceError where there is none, ValueError where it has another set-up than the test was begun with.
+        """
+        device = self._open_device()
+        try:
+            self._check_rate(device)
+            connection = DeviceConnection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
+            tap.accept_device(device.sample_rate, connection.signal.inputs.channels, describe_device(device))
+            connection.start()
+        except BaseException:
+            device.close()
+            raise
+        self._publisher.show(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        return connection
+
+    def reconnect(self, error: DeviceError, tap: TapInProgress, serve: Callable[[], None]) -> DeviceConnection:
+        """Wait for the device, as long as it takes; `serve` is called meanwhile."""
+        while True:
+            reason = f"{error.text}; plug it in: the test goes on at this hit"
+            self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
+            self._sleep(RECONNECT_INTERVAL)
+            serve()
+            try:
+                connection = self.connect(tap)
+            except DeviceError as again:
+                error = again
+            else:
+                self._publisher.show(word=TapStep.WAIT, reason="")
+                return connection
+
+    def _check_rate(self, device: Device) -> None:
+        """Against the clock, of a device that this machine does not know yet."""
+        if has_clock(device) and find_stored_rate(self._folder, device) is None:
+            self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
+        remarks = list[Remark]()
+        check_device_rate(self._folder, device, remarks=remarks)
+        if remarks:
+            self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))

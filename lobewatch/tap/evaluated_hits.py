@@ -1,0 +1,147 @@
+"""Evaluated hits of a live test, their mean, and the published state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+from acquisition import Hit, HitFlags, HitVerdict, RunningMean, evaluate_hit
+from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
+from lobewatch.machine.settings.machine_file import Machine
+from lobewatch.tap.state import TapState
+from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
+
+MIN_HITS_FOR_MEAN = 3
+"""Hits in a mean that others are compared with."""
+
+
+class EvaluatedHits:
+    """The spooled hits of a test, and their mean, which always is that of the good ones."""
+
+    def __init__(self, tap: TapInProgress, machine: Machine) -> None:
+        """Go on with what is spooled."""
+        self.tap = tap
+        """The hits on the disk."""
+        self.wanted = machine.tap.hits
+        """Number of good hits needed."""
+        self.mean = RunningMean()
+        """Mean of the good hits."""
+        self._band = machine.mode.band_hz
+        for hit, flags in zip(tap.hits, tap.flags, strict=True):
+            if not flags:
+                self.mean.add(hit)
+
+    @property
+    def missing(self) -> int:
+        """Number of good hits still to come."""
+        return max(self.wanted - self.tap.good, 0)
+
+    @property
+    def progress(self) -> str:
+        """Progress of the test in words."""
+        return f"{self.tap.good} of {self.wanted} good hits"
+
+    def evaluate(self, hit: Hit) -> HitVerdict:
+        """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter; a good one is
+        in the mean when this returns."""
+        return evaluate_safely(lambda: self._judge(hit))
+
+    def add(self, hit: Hit, verdict: HitVerdict) -> None:
+        """Keep a hit; on the disk when this returns."""
+        self.tap.add(hit, verdict.flags, verdict.text)
+
+    def undo(self) -> int | None:
+        """Take back the last good hit and return its index; None where there is none."""
+        good = [i for i, flags in enumerate(self.tap.flags) if not flags]
+        if not good:
+            return None
+        self._take_out(good[-1], HitVerdict(HitFlags.UNDONE))
+        return good[-1]
+
+    def recheck_first_hits(self) -> tuple[int, HitVerdict] | None:
+        """Judge the first hits, which had no mean to be compared with, against the mean of all others.
+
+        Takes the first of them that does not fit out of the mean, and returns its index and why.
+        """
+        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(self.mean.hits) <= 2 * MIN_HITS_FOR_MEAN:
+            return None
+        for hit in self.mean.hits[:MIN_HITS_FOR_MEAN]:
+            verdict = evaluate_safely(partial(self._compare, hit))
+            if verdict.flags:
+                number = next(i for i, tap_hit in enumerate(self.tap.hits) if tap_hit is hit)
+                self._take_out(number, verdict)
+                return number, verdict
+        return None
+
+    def _judge(self, hit: Hit) -> HitVerdict:
+        mean = self.mean.frf if len(self.mean.hits) >= MIN_HITS_FOR_MEAN else None
+        verdict = evaluate_hit(hit, mean, self._band)
+        if not verdict.flags:
+            self.mean.add(hit)
+        return verdict
+
+    def _compare(self, hit: Hit) -> HitVerdict:
+        """Verdict on a hit of the mean against the others; all else about it was judged when it came."""
+        return HitVerdict.from_findings(evaluate_spectrum(hit, self.mean.estimate_without(hit)))
+
+    def _take_out(self, number: int, verdict: HitVerdict) -> None:
+        self.tap.exclude(number, verdict.flags, verdict.text)
+        self.mean.remove(self.tap.hits[number])
+
+
+class LiveState(Protocol):
+    """Picture of a live test: a frozen dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def revision(self) -> int:
+        """Number that rises with every change."""
+
+
+State = TypeVar("State", bound=LiveState)
+
+
+class StatePublisher(Generic[State]):
+    """The newest picture: only replaced, never changed, by the thread of the test; any thread may read it."""
+
+    def __init__(self, first: State, clock: Callable[[], float]) -> None:
+        """clock: seconds that never go back."""
+        self._state: State = first
+        self._clock, self._shown_at = clock, clock()
+        self.wakes: set[Callable[[], None]] = set()
+        """Functions that are called after every change, by the thread that has made it; none may take time."""
+
+    @property
+    def state(self) -> State:
+        """The newest picture."""
+        return self._state
+
+    @property
+    def age(self) -> float:
+        """Time for which it has stood (s)."""
+        return self._clock() - self._shown_at
+
+    def show(self, **changes: Any) -> None:
+        """Replace the picture by one with these fields of it."""
+        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
+        self._shown_at = self._clock()
+        for wake in tuple(self.wakes):
+            wake()
+
+
+class TapPublisher(StatePublisher[TapState]):
+    """The pictures of a test."""
+
+    def show_hits(self, hits: EvaluatedHits, **changes: Any) -> None:
+        """The list of hits, what follows from it, and other fields with it."""
+        mean = hits.mean
+        self.show(
+            hits=hits.tap.taken,
+            good=hits.tap.good,
+            mean_change=mean.relative_change,
+            settled=mean.has_converged,
+            **changes,
+        )

@@ -1,0 +1,269 @@
+"""A tap test in progress: its hits, set-up and cross FRF."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import (
+    CROSS_TAP,
+    Channel,
+    Circumstances,
+    Hit,
+    HitFlags,
+    HitVerdict,
+    TapTest,
+    Trigger,
+    estimate_frf,
+    evaluate_hit,
+    new_tap_id,
+    write_hit,
+)
+from acquisition.errors import format_os_error
+from acquisition.file_io import make_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_lock import DiskReserve
+from lobewatch.tap.spool import (
+    MAX_RESUME_AGE,
+    SpooledHit,
+    clean_spool,
+    read_spooled_hits,
+    read_spooled_trigger,
+    write_setup,
+)
+from lobewatch.tap.state import ListedHit
+
+
+def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
+    """What `evaluate_program` says of a hit; where it fails, that the hit is refused as NOT_JUDGED, and why it failed."""
+    try:
+        return judge()
+    except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
+        return HitVerdict.from_findings(
+            {HitFlags.NOT_EVALUATED: f"Judging it failed ({type(error).__name__}: {error})"}
+        )
+
+
+DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT)
+"""Errors of a disk without room."""
+
+
+@dataclass
+class TapInProgress:
+    """Hits so far, kept on disk one by one, so that a crash or an unplugged cable costs none of them."""
+
+    id: str
+    """Identity of the tap test to be."""
+    circumstances: Circumstances
+    """Circumstances of the test: who, what, when."""
+    folder: Path
+    """Folder in which its hits are spooled."""
+    hits: list[Hit] = field(default_factory=list)
+    """All hits so far."""
+    flags: list[HitFlags] = field(default_factory=list)
+    """Verdict on each; UNDONE where the operator took a good one back."""
+    reasons: list[str] = field(default_factory=list)
+    """Sentence on what was wrong with each; empty where it is averaged."""
+    numbers: list[int] = field(default_factory=list)
+    """Number of each, in the name of its file."""
+    n_resumed: int = 0
+    """Number of hits that were there when it was gone on with."""
+    trigger: Trigger | None = None
+    """Trigger by which its hits are recorded; None until that is chosen."""
+    baseline: Hit | None = None
+    """Record at rest; None until the self-check has run."""
+    damaged: list[Path] = field(default_factory=list)
+    """Files of an interrupted test that could not be read, where they were set aside."""
+    not_resumed: list[str] = field(default_factory=list)
+    """Interrupted tests that are not gone on with, a sentence each."""
+    reserve: DiskReserve | None = None
+    """Room on the disk that is held for it."""
+
+    @property
+    def good(self) -> int:
+        """Number of hits that may be averaged."""
+        return self.flags.count(HitFlags.OK)
+
+    @property
+    def taken(self) -> tuple[ListedHit, ...]:
+        """Hits as a screen lists them."""
+        hits = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        return tuple(
+            ListedHit(i, flags, format_peak(hit), bool(flags & HitFlags.UNDONE), reason, i <= self.n_resumed)
+            for i, (hit, flags, reason) in hits
+        )
+
+    def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
+        """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
+        earlier = self.hits[-1] if self.hits else self.baseline
+        if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
+            raise self.make_setup_error()
+        if not self.hits:
+            self.circumstances = replace(self.circumstances, device=description)
+
+    def make_setup_error(self) -> ValueError:
+        """The refusal to mix hits of two set-ups."""
+        return ValueError(
+            f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
+            "begin anew with --new"
+        )
+
+    def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
+        """Keep a hit; on the disk when this returns."""
+        number = max(self.numbers, default=-1) + 1
+        self._store(number, hit, flags)
+        self._append(number, hit, flags, reason)
+
+    def add_spooled(self, spooled: SpooledHit) -> None:
+        """Go on with a hit that is on the disk already."""
+        verdict = evaluate_safely(lambda: evaluate_hit(spooled.hit))
+        self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
+        self.circumstances = spooled.circumstances
+        self.n_resumed = len(self.hits)
+
+    def exclude(self, number: int, flags: HitFlags, reason: str) -> None:
+        """Refuse a good hit (by its index) afterwards; it stays stored."""
+        self._store(self.numbers[number], self.hits[number], flags)
+        self.flags[number], self.reasons[number] = flags, reason
+
+    def finish(self) -> TapTest:
+        """The averaged tap test; ValueError where no hit is good."""
+        return average_hits(self.id, self.circumstances, self.hits, self.flags)
+
+    def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
+        self.numbers.append(number)
+        self.hits.append(hit)
+        self.flags.append(flags)
+        self.reasons.append(reason)
+
+    def _store(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        """Write a hit, which is on the disk when this returns; where that is full, in the room that was held."""
+        try:
+            self._write(number, hit, flags)
+        except OSError as error:
+            if error.errno not in DISK_FULL_ERRORS or self.reserve is None or not self.reserve.release():
+                raise
+            self._write(number, hit, flags)
+
+    def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        make_folder(self.folder)
+        if not self.hits and self.trigger is not None:
+            write_setup(self.folder, self.trigger)
+        write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+
+
+def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
+    """The tap test of hits with the verdict on each, each as one sensor felt it; ValueError where none is good."""
+    good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
+    frf = estimate_frf(good) if good[0].has_force else None
+    return TapTest(tap_id, about, frf, tuple(replace(hit, cross_hit=None) for hit in hits), tuple(flags))
+
+
+def format_peak(hit: Hit) -> str:
+    """Largest force of a hit, or without one its largest acceleration, with the unit."""
+    if hit.has_force:
+        return f"{hit.force.max():.0f} N"
+    return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"
+
+
+def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
+    """A new tap test, or the interrupted one of the same tool and direction; DataError where the journal is damaged."""
+    folder.refuse_damage()
+    clean_spool(folder)
+    _remove_committed(folder)
+    damaged, left = list[Path](), list[str]()
+    interrupted = _find_interrupted(folder, circumstances, resume, damaged, left)
+    tap_id = new_tap_id(circumstances)
+    tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
+    tap.damaged, tap.not_resumed = damaged, left
+    return tap
+
+
+def _remove_committed(folder: MachineFolder) -> None:
+    """Hits that an ended program has left behind though their tap test is committed; kept where its file is damaged."""
+    begun = [path for path in folder.spool.iterdir() if path.is_dir()] if folder.spool.is_dir() else []
+    if begun:
+        stored = {entry.id for entry in folder.taps()}
+        for path in begun:
+            if path.name in stored:
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _find_interrupted(
+    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], left: list[str]
+) -> TapInProgress | None:
+    """The newest test of the same tool and direction to go on with, if that is wished; `left`: all others."""
+    committed, newest = folder.committed_ids, None
+    for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
+        if not path.is_dir() or path.name in committed:
+            continue
+        hits = read_spooled_hits(path, damaged)
+        first = next(hits, None)
+        if first is None:
+            continue
+        about = first.circumstances
+        same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
+        if resume and newest is None and same and circumstances.created - about.created < MAX_RESUME_AGE:
+            newest = TapInProgress(path.name, about, path, trigger=read_spooled_trigger(path, damaged))
+            for hit in (first, *hits):
+                newest.add_spooled(hit)
+            conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
+            newest.circumstances = replace(newest.circumstances, conditions=conditions)
+        else:
+            when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
+            left.append(f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed")
+    return newest
+
+
+MIN_CROSS_TAP_HITS = 3
+"""Good hits that a tap across is made of at least; chosen: with fewer nothing is known of their scatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class CrossTapResult:
+    """What became of the tap across."""
+
+    tap_id: str | None
+    """Identity of the tap test that was saved; None where none was."""
+    text: str
+    """Sentence on it for the one who tapped."""
+
+
+def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> CrossTapResult | None:
+    """Save the tap across of a finished test of a driving point; None where no second sensor felt it.
+
+    Its hits are those that are good at the driving point and in the second sensor. Whatever goes wrong with it is said
+    and costs the other one nothing.
+    """
+    felt = [(hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None]
+    if not felt:
+        return None
+    hits, firsts = [hit for hit, _ in felt], [flags for _, flags in felt]
+    verdicts = [flags or evaluate_safely(partial(_evaluate_cross_hit, hit)).flags for hit, flags in felt]
+    good, wanted = verdicts.count(HitFlags.OK), firsts.count(HitFlags.OK)
+    faults = {flags.words for flags, first in zip(verdicts, firsts, strict=True) if flags and not first}
+    part = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
+    if good < MIN_CROSS_TAP_HITS:
+        return _make_unsaved_result(f"of use are {part}; check the sensor along y")
+    about = replace(tap.circumstances, direction=CROSS_TAP)
+    try:
+        test = average_hits(new_tap_id(about), about, hits, verdicts)
+        commit(test)
+    except (ArithmeticError, OSError, ValueError) as error:
+        return _make_unsaved_result(format_os_error(error) if isinstance(error, OSError) else str(error))
+    return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {part}.")
+
+
+def _make_unsaved_result(why: str) -> CrossTapResult:
+    return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
+
+
+def _evaluate_cross_hit(hit: Hit) -> HitVerdict:
+    """Verdict on a hit as the second sensor felt it."""
+    return HitVerdict(HitFlags.NOT_EVALUATED) if np.ptp(hit.acceleration) == 0 else evaluate_hit(hit)

@@ -1,0 +1,156 @@
+"""Choose trigger level and record length from trial hits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition import Channel, Hit, HitFlags, Remark, Trigger, check_hit, estimate_decay_time
+from lobewatch.machine.settings.setup_tables import TapTable
+
+MIN_RECORD_TIME = 0.25
+"""Shortest record chosen, and that of the first trial hit (s); alike from month to month."""
+MAX_RECORD_TIME = 4.0
+"""Longest record chosen (s)."""
+RECORD_TIME_CONSTANTS = 6
+"""Time constants of the slowest mode that a record holds (ISO 7626-5: then the cut-off part is < 0.5 %)."""
+RECORD_TIME_STEP = 0.05
+"""A longer record is a multiple of this (s)."""
+TRIGGER_PEAK_SHARE = 0.1
+"""Trigger level over the median peak of the trial hits; chosen."""
+TRIGGER_NOISE_RATIO = 10.0
+"""Trigger level over the rms of the force at rest, where that is the larger one; chosen."""
+MAX_TRIGGER_PEAK_SHARE = 0.5
+"""Trigger level over the softest trial hit, at most; chosen."""
+FIRST_TRIGGER_RANGE_SHARE = 0.005
+"""Trigger level of the first trial hit over the range of the force, at least; chosen."""
+MIN_RANGE_SHARE, MAX_RANGE_SHARE = 0.02, 0.9
+"""Shares of its range that a channel should stay between; chosen."""
+RANGE_HEADROOM = 2
+"""Range to choose over the peaks of the hits; chosen."""
+MAX_TRIAL_HITS = 3
+"""Trial hits at most."""
+CHANNEL_UNITS = {"force": "N", "acceleration": "m/s^2"}
+_RANGE_FLAGS = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_USABLE_FLAGS = HitFlags.NOT_DECAYED | _RANGE_FLAGS
+"""Flags that a trial hit may have: to find them out is what trial hits are for."""
+
+
+def trigger_from_setup(setup: TapTable, sample_rate: float) -> Trigger | None:
+    """Trigger and record as machine.toml sets them; None where it leaves one of them open."""
+    if setup.trigger_n is None or setup.record_s is None:
+        return None
+    return Trigger(setup.trigger_n, round(setup.record_s * sample_rate), round(setup.pre_trigger_s * sample_rate))
+
+
+class TrialHits:
+    """The trial hits so far, and what they say."""
+
+    def __init__(self, setup: TapTable, baseline: Hit) -> None:
+        """baseline: a record at rest."""
+        self._setup, self._baseline = setup, baseline
+        self._hits: list[Hit] = []
+        self._record = setup.record_s or MIN_RECORD_TIME
+
+    @property
+    def trigger(self) -> Trigger:
+        """Trigger and record as they are known by now."""
+        rate = self._baseline.sample_rate
+        samples = round(self._record * rate)
+        before, quantity = round(self._setup.pre_trigger_s * rate), self._setup.quantity
+        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset())
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is open any more: two hits of the length that stands, or three."""
+        length = self.trigger.n_samples
+        return len(self._hits) >= MAX_TRIAL_HITS or sum(hit.acceleration.size == length for hit in self._hits) >= 2
+
+    @property
+    def text(self) -> str:
+        """Sentence on what to do; when done, on what was chosen, and which range to choose."""
+        if not self.is_done:
+            return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
+        slowest = max(estimate_decay_time(hit) for hit in self._hits)
+        level = f"{self.trigger.level:.3g} {CHANNEL_UNITS[self._setup.quantity]}"
+        chosen = f"Trigger at {level}, record {self._record:g} s, {_format_time_constants(self._record, slowest)}."
+        return " ".join([chosen, *(f"{remark}." for remark in self.remarks)])
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """One for each channel whose range the trial hits do not fit into."""
+        channels = self._hits[0].channels or () if self._hits else ()
+        remarks = (_range_remark(self._hits, i, channel) for i, channel in enumerate(channels))
+        return tuple(remark for remark in remarks if remark is not None)
+
+    def add(self, hit: Hit) -> HitFlags:
+        """Take a trial hit; returns why it is no use, falsy where it is."""
+        flags = check_hit(hit) & ~_USABLE_FLAGS
+        if flags:
+            return flags
+        needed = _choose_record_time(estimate_decay_time(hit), self._setup.pre_trigger_s)
+        self._hits.append(hit)
+        if self._setup.record_s is None:
+            self._record = max(self._record, needed)
+        return flags
+
+    def _level(self) -> float:
+        if self._setup.trigger_n is not None:
+            return self._setup.trigger_n
+        noise = TRIGGER_NOISE_RATIO * float(np.std(self._baseline.signals[0]))
+        if not self._hits:
+            return max(noise, FIRST_TRIGGER_RANGE_SHARE * _get_trigger_range(self._baseline))
+        peaks = [_find_trigger_peak(hit, self._offset()) for hit in self._hits]
+        level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
+        return float(f"{level:.2g}")
+
+    def _offset(self) -> float:
+        """Value at rest that the trigger level counts from: that of the acceleration, which may feel gravity."""
+        return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
+
+
+def _find_trigger_peak(hit: Hit, offset: float) -> float:
+    """Largest value of what triggers."""
+    return float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - offset)))
+
+
+def _choose_record_time(time_constant: float, before: float) -> float:
+    """Length of a record (s) that holds enough time constants after its pre-trigger part."""
+    needed = min(before + RECORD_TIME_CONSTANTS * time_constant, MAX_RECORD_TIME)
+    return max(MIN_RECORD_TIME, RECORD_TIME_STEP * math.ceil(needed / RECORD_TIME_STEP - 1e-9))
+
+
+def _format_time_constants(record: float, time_constant: float) -> str:
+    if not math.isfinite(time_constant):
+        return "the response does not fall in it: is the spindle still?"
+    count = record / max(time_constant, 1e-6)
+    short = "" if count >= RECORD_TIME_CONSTANTS else f", fewer than {RECORD_TIME_CONSTANTS}"
+    return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
+
+
+def _get_trigger_range(hit: Hit) -> float:
+    """Largest value of the channel that triggers (N or m/s^2)."""
+    return _get_full_scale(hit.channels[0]) if hit.channels else float("inf")
+
+
+def _get_full_scale(channel: Channel) -> float:
+    return channel.full_scale / abs(channel.sensitivity)
+
+
+def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark | None:
+    name, unit = channel.quantity, CHANNEL_UNITS[channel.quantity]
+    peaks = [float(np.max(np.abs(hit.signals[number]))) for hit in hits]
+    full = _get_full_scale(channel)
+    share = max(peaks) / full
+    if MIN_RANGE_SHARE <= share <= MAX_RANGE_SHARE:
+        return None
+    too_large, percent = share < MIN_RANGE_SHARE, float(f"{100 * share:.2g}")
+    wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
+    return Remark(
+        "range-too-large" if too_large else "range-too-small",
+        name,
+        f"the hits reach {percent:g} % of the range of {full:.3g} {unit}",
+        f"choose a range or a sensor of about {wanted:.2g} {unit}{'' if too_large else ', or hit softer'}",
+    )

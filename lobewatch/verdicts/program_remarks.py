@@ -1,0 +1,203 @@
+"""Remarks on a program: tool limits, assumed defaults, and the decisive cause of uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
+from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.monte_carlo import MonteCarloResult
+from lobewatch.verdicts.program_samples import FEED_ANGLE_STEP, N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
+
+MISSING_TOOL_FACTS = {
+    MissingToolData.TOOL_MATERIAL: "tool_material in its [[tool]]",
+    MissingToolData.MATERIAL: "material in the program (Kt and Kr alone are of no group of ISO 513)",
+}
+"""What is asked for beside the cutting speed, where that is not known."""
+TOOL_MAKER_KEYS = (MissingToolData.CUTTING_SPEED, MissingToolData.FEED_PER_TOOTH)
+"""Keys of [[tool]] that stand for what its maker says."""
+
+
+def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
+    """Speed and feed per tooth of a program that its tool does not bear, with what it does and the source."""
+    limits = find_tool_limits(machine, table)
+    if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
+        reach = CutRange(machine, table, limits)
+        cure = "choose another tool" if limits.is_empty else f"turn at {reach.low_rpm:g} to {reach.high_rpm:g} rpm"
+        is_over = table.speed_rpm > limits.tool.max_speed_rpm
+        own = "correct max_speed_rpm" if is_over else "enter what its maker says as cutting_speed_m_min"
+        yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
+    feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
+    if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
+        text = f"feed_per_tooth_mm = {feed:g} is outside {_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
+        cure = "feed within that, or enter what its maker says as feed_per_tooth_mm"
+        yield _tool_limit_remark(table, f"{text} ({borne.source})", cure)
+
+
+def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
+    """Question for what advice on a program would have to know of its tool."""
+    if limits.is_guessed:
+        whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
+        asked = " and ".join(text for unknown, text in MISSING_TOOL_FACTS.items() if unknown in limits.missing)
+        own = [key for key in TOOL_MAKER_KEYS if key is MissingToolData.CUTTING_SPEED or key in limits.missing]
+        cure = "; or ".join(filter(None, [asked, f"{' and '.join(own)} in its [[tool]]"]))
+        text = f"what the tool bears is not known: speeds {whose} are advised"
+        yield Remark("tool-not-described", table.tool, text, f"write {cure}")
+
+
+def _tool_limit_remark(table: ProgramTable, text: str, cure: str) -> Remark:
+    return Remark("outside-tool-limits", table.name, text, f"{cure} in [[tool]] {table.tool!r}")
+
+
+def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
+    if table.speed_rpm > limits.tool.max_speed_rpm:
+        return f"{table.speed_rpm:g} rpm are more than max_speed_rpm = {limits.tool.max_speed_rpm:g} of its tool"
+    speed, borne = math.pi * table.tool_diameter_mm / 1e3 * table.speed_rpm, limits.cutting_speed_m_min
+    if borne is None:
+        return f"{table.speed_rpm:g} rpm are outside the speeds of the spindle"
+    allowed = f"{_range_text(borne.low, borne.high)} m/min, {_tool_text(table, limits)}"
+    return f"{table.speed_rpm:g} rpm are {_number_text(speed)} m/min at the edge, outside {allowed} ({borne.source})"
+
+
+def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
+    """Who bears that, in words."""
+    tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
+    where = "in a slot" if limits.cut == "slot" else "at the side"
+    return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
+        f" of {table.material}" if table.material else ""
+    )
+
+
+def _range_text(low: float, high: float) -> str:
+    return f"{_number_text(low)} to {_number_text(high)}"
+
+
+def _number_text(value: float) -> str:
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+NARROW_CUT_IMMERSION = 0.5
+"""Radial depth over diameter below which a corner engages the tool far more than the straight before it ..."""
+ASSUMED_CORNER_FACTOR = 1.5
+"""... as one with so many times the radius of the tool does, which stands for corners."""
+MAX_HELIX_IMMERSION = 0.2
+"""Radial depth over diameter below which a helix moves the limit."""
+CROSS_NOT_TAPPED_CODE = "cross-not-tapped"
+"""Code of the remark that asks for a cross tap."""
+MIN_CROSS_LIMIT_RATIO = 1.04
+"""Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
+
+
+def assumption_remarks(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Iterator[Remark]:
+    """Remarks on what is assumed because the program does not say it."""
+    if (
+        table.immersion < NARROW_CUT_IMMERSION
+        and table.corner_radius_mm is None
+        and not isinstance(table.radial_depth_mm, tuple)
+    ):
+        yield _corner_remark(table, machine, judgement)
+    if machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
+        yield Remark(
+            "helix-not-written",
+            table.name,
+            f"helix_deg is not written, and taken as 0: at a/D {min(table.immersions):.2g} edges with a helix may have "
+            "0.7 to 1.7 times the limit",
+            "write helix_deg, 0 for straight edges",
+        )
+    if judgement.axes_ratio > MIN_CROSS_LIMIT_RATIO:
+        yield Remark(
+            CROSS_NOT_TAPPED_CODE,
+            table.name,
+            "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
+            f"its limit by up to {100 * (judgement.axes_ratio - 1):.0f} %",
+            "tap --direction xy: hit in x, sensor in y",
+        )
+
+
+def _corner_remark(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Remark:
+    radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
+    inside, radial = table.corner_immersion(radius), table.radial_mm[1]
+    limit = _limit_at_immersion(inside, table, machine, judgement.samples)
+    share = f", {100 * limit / judgement.median.limit:.0f} % of it" if limit < judgement.median.limit < math.inf else ""
+    return Remark(
+        "one-engagement",
+        table.name,
+        f"judged at {radial:g} mm radial depth all the way: a corner of {radius:g} mm radius takes as much as "
+        f"{inside * table.tool_diameter_mm:.2g} mm, and the limit is about {1e3 * limit:.2g} mm there{share}",
+        f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; [{radial:g}, {radial:g}] where the path is "
+        "straight",
+    )
+
+
+def _limit_at_immersion(immersion: float, table: ProgramTable, machine: Machine, draws: ProgramSamples) -> float:
+    """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
+    cut, middle = replace(machine.build_cut(table), immersion=immersion), draws.rows[np.array([0])]
+    fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
+    speed = np.array([table.speed_rpm])
+    return min(float(ZeroOrderBatch.of(middle.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
+
+
+N_CAUSE_SAMPLES = 60
+"""Number of draws that chatter, of which it is seen what each lacks to be stable."""
+
+
+def find_decisive_cause(judgement: MonteCarloResult, depth: float) -> str:
+    """The cause without which most of the draws that chatter at a depth (m) would not.
+
+    Where none of them chatters a direction that was not tapped is all that is left open.
+    """
+    draws, doubt = judgement.samples, judgement.samples.uncertainty
+    if "untapped" in doubt.modes or not np.any(judgement.chatters):
+        return "untapped"
+    places, middle = np.flatnonzero(judgement.chatters)[:N_CAUSE_SAMPLES], draws.rows[np.array([0])]
+    shares = {}
+    for cause in doubt.causes:
+        rows = doubt.sample(middle, N_PROGRAM_SAMPLES, without=cause)[places]
+        shares[cause] = float(np.mean(replace(draws, rows=rows).growth(depth) < 0))
+    return max(shares, key=lambda cause: shares[cause])
+
+
+def uncertainty_advice(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
+    """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else.
+
+    cuts: number of test cuts that have taught of it.
+    """
+    text, cure = {
+        "coefficients": (
+            f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
+            "measure them" if table.material else "measure them, or name the material",
+        ),
+        "speed": ("the spindle speed decides", "run it in the middle of a window of speeds"),
+        "clamping": (
+            "the scatter from tap test to tap test decides",
+            "tap again: from 8 tests on the scatter of this very tool counts",
+        ),
+        "tap": ("the error of the tap test decides", "tap again with more hits"),
+        "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
+        "wear": (
+            f"wear decides: chatters above Kt {tangential / 1e6:.0f} N/mm2",
+            'run it with new edges and write wear = "new"',
+        ),
+        "workpiece": (
+            "the wall that is cut is thin: it gives way, and its modes are not known",
+            "support it and take thin = true out, or find the depth by test cuts",
+        ),
+        "cuts": (
+            f"the spindle at speed decides, as {cuts} test cuts have left it open",
+            f"make the next test cut: lobewatch suggest names it for {table.name!r}",
+        ),
+        "cross": ("the axes of the modes decide, which taps in x and in y leave open", "tap --direction xy"),
+        "question": (
+            f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
+            "answer the question, or tap again",
+        ),
+        "untapped": assembly.missing_direction,
+    }[cause]
+    return Remark("doubt-decides", table.name, text, cure)

@@ -1,0 +1,278 @@
+"""Estimate the safe depth over speed from few samples, before a setting is evaluated.
+
+Zero order narrows; where it is not exact, the multipliers of the middle of the doubt are looked at at coarser speeds,
+so that what it does not see (low immersion, flip) counts. Nothing is judged yet.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from lobes import Cut, MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
+from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
+from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.principal_directions import lowest_zero_order_lobes
+from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
+from lobewatch.verdicts.setting_robustness import ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, sweep_extremes
+from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR as ROOM
+from lobewatch.verdicts.uncertainty import Uncertainty
+from lobewatch.verdicts.zero_order_batch import is_force_constant
+
+N_GROWING_SAMPLES = 24
+"""Number of draws that grow most at the depth that is likely ..."""
+N_FLEXIBLE_SAMPLES = 8
+"""... and of those with the largest force on the most flexible mode, whatever grows there."""
+N_CRITICAL_FEEDS = 2
+"""Number of directions of feed, the worst around the speed, in which they are looked at."""
+CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
+"""Shares of a depth at which they are."""
+DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
+"""Shares of the step between two of these, one calm and one not, at which they are once more."""
+DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
+"""Factor of the depth up to which is looked, where all of it is calm, and where hardly any of it is ..."""
+MIN_SEARCHED_DEPTH = 1e-5
+"""... down to this (m)."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalSamples:
+    """A cut at one speed."""
+
+    likely_depth: float
+    """Depth that is likely (m): the scale of what is looked at."""
+    samples: ProgramSamples
+    """All draws at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth to spare."""
+    likely_first: NDArray[np.intp]
+    """Places of the few that are likely the first to chatter."""
+    chattered: frozenset[int] = frozenset()
+    """Draws that count too since they have chattered elsewhere."""
+
+    @property
+    def selected(self) -> ProgramSamples:
+        """Those that count."""
+        more = np.add.outer([0, len(self.samples.rows) // 2], sorted(self.chattered)).ravel().astype(np.intp)
+        return self.samples[np.union1d(self.likely_first, more)]
+
+    def deepest_stable(self, most: float) -> float:
+        """The deepest up to a depth at which, and below which, all that count are stable with depth to spare (m)."""
+        few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
+        calm = find_deepest_stable(few, depth)
+        while calm == depth < ROBUST_DEPTH_FACTOR * most:
+            depth = min(DEPTH_GROWTH_FACTOR * depth, ROBUST_DEPTH_FACTOR * most)
+            calm = find_deepest_stable(few, depth)
+        while calm == 0 and depth > MIN_SEARCHED_DEPTH:
+            depth *= DEPTH_SHRINK_FACTOR
+            calm = find_deepest_stable(few, depth)
+        return calm / ROBUST_DEPTH_FACTOR
+
+    def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
+        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,).
+
+        In the worst direction of feed: it says where to look, no more.
+        """
+        few = self.selected.with_lowest_cuts(0.0)
+        wanted = np.repeat(ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
+        return np.asarray(np.max(few.sweep(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
+
+
+def select_critical_samples(
+    program: Program,
+    cuts: Sequence[Cut],
+    spindle: Assembly,
+    doubt: Uncertainty,
+    fall: float,
+    stiffness_at: StiffnessAt,
+    spare: float,
+) -> CriticalSamples:
+    """Those of a program (SI), with all cuts on its way, at its speed; its depth is what is likely.
+
+    spare: depth to spare in the middle of the doubt, relative.
+    """
+    drawn = draw_likely_samples(program, cuts, spindle, doubt)
+    order = np.argsort(-drawn.median_growth_near(program.depth, fall, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    drawn = replace(drawn, cuts=tuple(cuts[place] for place in order), limits=drawn.limits[order])
+    aged = sweep_extremes(drawn, fall, stiffness_at)
+    grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
+    force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
+    middle = drawn.rows[np.zeros(1, dtype=np.intp)]
+    push = (1 + spare) / ROBUST_DEPTH_FACTOR
+    middle = replace(middle, tangential=push * middle.tangential, radial=push * middle.radial)
+    first = np.concatenate(
+        (np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES], [grown.size])
+    )
+    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, middle)), np.unique(first))
+
+
+def find_deepest_stable(draws: ProgramSamples, most: float) -> float:
+    """The deepest up to a depth (m) at which, and below which, all draws are stable (m); 0 where it is hardly any."""
+    depths = most * CRITICAL_DEPTH_SHARES
+    grown = np.max(draws.growth(depths), axis=0)
+    if np.all(grown < 0):
+        return most
+    first = int(np.argmax(grown >= 0))
+    low = float(depths[first - 1]) if first else 0.0
+    between = low + (depths[first] - low) * DEPTH_BRACKET_SHARES
+    finer = np.max(draws.growth(between), axis=0)
+    depth = np.concatenate(([low], between, [depths[first]]))
+    value = np.concatenate(([grown[first - 1] if first else -np.inf], finer, [grown[first]]))
+    bad = int(np.argmax(value >= 0))
+    if not np.isfinite(value[bad - 1]):
+        return low
+    return float(depth[bad - 1] - value[bad - 1] * (depth[bad] - depth[bad - 1]) / (value[bad] - value[bad - 1]))
+
+
+LIKELY_SPEED_STEP = 0.002
+"""Relative step of the speeds."""
+COARSE_SPEED_STEPS = 6
+"""Steps between two speeds at which the multipliers are looked at ..."""
+TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
+"""... and shares of the limit by zero order at which they are ..."""
+FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
+"""... and of the way from the last of these to the deepest that matters, where none of them chatters."""
+N_LIKELY_FEEDS = 2
+"""Number of directions of feed, those that zero order has as the worst at a speed, in which they are."""
+MIN_REMOVAL_SHARE = 0.75
+"""Share of the most chips that zero order has, as many of which must be thinkable at a speed for a look."""
+MAX_DEPTH_FACTOR = 1.3
+"""Limits beyond so many times the deepest that may be cut, with all to spare, are not told apart."""
+LIKELY_FREQUENCY_MARGIN = 0.003
+"""Relative distance of the frequency that is counted on beside speed and fall."""
+MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
+"""Relative distance of two tops that are worth looking at both, and of speeds that are none."""
+POCKET_VALLEY_SHARE = 0.8
+"""Share of the shallower of two pockets, less than which is likely between them."""
+
+
+@dataclass(frozen=True, eq=False)
+class LikelyDepths:
+    """Depths that are likely to be safe."""
+
+    speeds: Floats
+    """Speeds (rpm), rising, shape (n,)."""
+    depths: Floats
+    """Depth (mm) likely to be safe there, no deeper than tool and drive allow, shape (n,)."""
+
+    def window_centers(self, depth_mm: float) -> list[float]:
+        """The middle (rpm) of each window of speeds at which a depth (mm) is likely."""
+        return [float(self.speeds[run[run.size // 2]]) for run in _split_runs(self.depths >= depth_mm)]
+
+    def removal_peaks(self, count: int) -> list[tuple[float, float]]:
+        """Speeds (rpm) and depths (mm) with more chips than beside them, the most first; then others apart."""
+        chips = np.pad(self.depths * self.speeds, 1)
+        tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
+        order = np.argsort(-chips[1:-1], kind="stable")
+        taken: list[int] = []
+        for places, apart in (
+            (order[np.isin(order, tops)], MIN_PEAK_SPEED_DISTANCE),
+            (order, MIN_OTHER_SPEED_DISTANCE),
+        ):
+            for place in places.tolist():
+                if all(abs(place - top) * LIKELY_SPEED_STEP > apart for top in taken):
+                    taken.append(place)
+        return [(float(self.speeds[place]), float(self.depths[place])) for place in taken[:count]]
+
+    def is_same_pocket(self, first: float, second: float) -> bool:
+        """Whether nearly as much is likely all the way between two speeds (rpm): they lie in one pocket."""
+        ends = np.searchsorted(self.speeds, sorted((first, second)))
+        between = self.depths[ends[0] : ends[1] + 1]
+        return between.size < 2 or bool(np.min(between) >= POCKET_VALLEY_SHARE * min(between[0], between[-1]))
+
+
+def estimate_likely_depths(
+    reach: CutRange, cuts: Sequence[Cut], spindle: Assembly, doubt: Uncertainty, fall: float, spare: float
+) -> LikelyDepths:
+    """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
+
+    cuts: all that the program makes on its way; spare: depth to spare in the middle of the doubt at least.
+    """
+    number = max(int(math.log(reach.high_rpm / reach.low_rpm) / LIKELY_SPEED_STEP), 1)
+    speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
+    by_cut = (
+        np.array([lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts])
+        * 1e3
+    )
+    deepest, safe = reach.depth_limits(speeds), max(doubt.tangential.high, 1 + spare)
+    by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
+    beside = doubt.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROOM)
+    steps, ahead = math.ceil((beside + fall / 2) / LIKELY_SPEED_STEP), round(fall / 2 / LIKELY_SPEED_STEP)
+
+    def around(limits: Floats) -> Floats:
+        lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
+        return np.asarray(np.minimum(lowest / safe, deepest))
+
+    limit = np.min(by_cut, axis=0)
+    if not all(map(is_force_constant, cuts)):
+        chips = speeds * around(limit)
+        thinkable = speeds * np.minimum(
+            deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe
+        ) >= MIN_REMOVAL_SHARE * np.max(chips)
+        wanted = scipy.ndimage.maximum_filter1d(thinkable, 4 * steps + 1)
+        limit = _limits_by_multipliers(spindle, cuts, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
+    return LikelyDepths(speeds, around(limit))
+
+
+def _limits_by_multipliers(
+    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: NDArray[np.bool_]
+) -> Floats:
+    """Limits (mm) by multipliers, up to a depth (mm) (n,), where wanted (n,), between few speeds; else by zero order.
+
+    by_cut: limits by zero order (cuts, n).
+    """
+    places = np.unique(np.append(np.arange(0, speeds.size, COARSE_SPEED_STEPS), speeds.size - 1))
+    places = places[wanted[places]]
+    systems = [
+        build_milling_system(spindle.x, spindle.y, vectors) for vectors in spindle.principal_directions.sign_patterns
+    ]
+    worst, true = np.argsort(by_cut[:, places], axis=0)[:N_LIKELY_FEEDS], deepest[places].copy()
+    for (i, cut), system in itertools.product(enumerate(cuts), systems):
+        here = np.flatnonzero(np.any(worst == i, axis=0))
+        rows = rows_at_speeds(system, cut, speeds[places[here]])
+        limit = _first_crossing(rows, np.min(by_cut[:, places[here]], axis=0), deepest[places[here]])
+        true[here] = np.minimum(true[here], limit)
+    between = np.interp(np.log(speeds), np.log(speeds[places]), true)
+    return np.asarray(np.where(wanted, between, np.min(by_cut, axis=0)))
+
+
+def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
+    """Depth (mm) (r,) at which growth first reaches zero, on a line between looks; inf where it does not.
+
+    mean: limit by zero order (mm) (r,); most: depth up to which it matters.
+    """
+    ends = np.minimum(mean * TRIED_ZERO_ORDER_SHARES[-1], most)[:, np.newaxis]
+    tried = np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis])
+    limit = _interpolate_crossing(rows, tried)
+    beyond = np.flatnonzero(np.isinf(limit) & (ends[:, 0] < most))
+    further = ends[beyond] * (1 - FURTHER_DEPTH_SHARES) + most[beyond, np.newaxis] * FURTHER_DEPTH_SHARES
+    limit[beyond] = _interpolate_crossing(rows[beyond], further)
+    return limit
+
+
+def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
+    """The same between depths (mm) (r, d)."""
+    if not depths.size:
+        return np.empty(0)
+    grown = growth_rate(rows, depths / 1e3, count_pieces(rows, float(np.max(depths)) / 1e3, COARSE_CYCLES_PER_PIECE))
+    first, row = np.argmax(grown >= 0, axis=1), np.arange(len(grown))
+    before = np.maximum(first - 1, 0)
+    low, high = grown[row, before], grown[row, first]
+    share = np.where(first > 0, -low / np.where(high == low, 1.0, high - low), 0.5)
+    begin = np.where(first > 0, depths[row, before], 0.0)
+    return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
+
+
+def _split_runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """Places without a gap between them."""
+    places: NDArray[np.intp] = np.flatnonzero(wanted)
+    runs: Sequence[NDArray[np.intp]] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    return [run for run in runs if run.size]

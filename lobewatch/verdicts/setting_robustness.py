@@ -1,0 +1,126 @@
+"""Robustness of a setting against changes of speed, depth and natural frequency.
+
+The depth that only just is safe is so at one speed alone: the tip of a pocket has no width. A setting is recommended
+where there is room on all sides, and no nearer to an edge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.machine import Machine
+from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.tap_series import expected_frequency_drop
+from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.program_samples import ProgramSamples
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A speed and a depth that would be called stable."""
+
+    speed_rpm: float
+    """Spindle speed (rpm), in steps of 10 unless it is the program's own."""
+    depth_mm: float
+    """Axial depth (mm), in steps of 0.05 unless it is the program's own."""
+    window_rpm: tuple[float, float]
+    """Slowest and fastest speed around it at which the depth would be called stable too."""
+    depth_margin: float
+    """Limit in the middle of the doubt over depth, less 1."""
+    drop_margin: float
+    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+
+
+WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
+"""Relative step of a window of speeds, most steps on each side, and parts in which they are looked at."""
+ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
+"""Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
+ROBUST_DEPTH_FACTOR = 1.05
+"""Factor of the depth up to which it must be ..."""
+MIN_ROBUST_DROP = 0.01
+"""... and fall of the frequency that it must stand at least."""
+CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
+"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
+
+Floats = NDArray[np.float64]
+
+
+def sweep_extremes(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+    """All draws at the slower speed, then after the fall: the ends of what must be safe."""
+    return _sweep_speeds_and_drops(draws, [1 / ROBUST_SPEED_FACTOR, 1], [0, fall], stiffness_at)
+
+
+def sweep_neighborhood(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+    """All draws at these ends, after half of the fall, and at the faster speed."""
+    return _sweep_speeds_and_drops(
+        draws, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, fall, fall / 2, 0], stiffness_at
+    )
+
+
+def _sweep_speeds_and_drops(
+    draws: ProgramSamples, speeds: list[float], falls: list[float], stiffness_at: StiffnessAt
+) -> ProgramSamples:
+    stiffness = np.array([stiffness_at(fall) for fall in falls])
+    return draws.sweep(np.array(speeds), 1 - np.array(falls), stiffness)
+
+
+def find_speed_window(
+    near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
+) -> tuple[float, float]:
+    """Slowest and fastest speed (rpm) around one up to which a depth (m) is safe on all draws."""
+    steps = np.arange(MAX_WINDOW_STEPS + 1.0)
+    slow, fast = (
+        _last_stable_ratio(near, hardest, np.power(1 + WINDOW_SPEED_STEP, sign * steps), depth) for sign in (-1, 1)
+    )
+    slowest, fastest = max(speed * slow, reach.low_rpm), min(speed * fast, reach.high_rpm)
+    return min(math.ceil(slowest / SPEED_STEP_RPM) * SPEED_STEP_RPM, speed), max(
+        math.floor(fastest / SPEED_STEP_RPM) * SPEED_STEP_RPM, speed
+    )
+
+
+def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
+    """Fall of the frequency, relative, up to which a depth (m) is safe on these draws."""
+    grown = _sweep_speeds_and_drops(
+        hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at
+    ).critical_growth(depth)
+    return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
+
+
+def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Floats, depth: float) -> float:
+    """The last of these speeds, over the present one, which is the first, up to which all draws are stable."""
+    last = 0
+    for steps in np.array_split(np.arange(1, ratio.size), N_WINDOW_PARTS):
+        grown = hardest.sweep(ratio[steps]).critical_growth(depth).reshape(steps.size, -1)
+        last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
+        if last < steps[-1]:
+            break
+    while last > 0 and np.any(near.scale(speed=float(ratio[last])).critical_growth(depth) >= 0):
+        last //= 2
+    return float(ratio[last])
+
+
+def _last_stable_row(grown: Floats) -> int:
+    """Row up to which all of growth (k, draws) is negative from the first on."""
+    calm = np.all(grown < 0, axis=1)
+    return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
+
+
+N_TAP_INTERVALS = 2
+"""Number of tap intervals that it must last ..."""
+DEFAULT_NEEDED_DROP = 0.02
+"""... or fall of the frequency that it must stand where no rate is known; chosen."""
+
+
+def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
+    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
+    days = N_TAP_INTERVALS * machine.machine.tap_interval_days
+    falls = [expected_frequency_drop(series, days) for series in assembly.series.values()]
+    return max(
+        (DEFAULT_NEEDED_DROP if fall is None else max(fall, MIN_ROBUST_DROP) for fall in falls),
+        default=DEFAULT_NEEDED_DROP,
+    )

@@ -1,0 +1,257 @@
+"""Uncertainty of a program by cause, and Monte Carlo samples drawn from it.
+
+Half-widths of independent uniform distributions; where test cuts have taught, the draws that they have left. Whatever
+is said of a program over its doubt comes from these draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import MillingRows
+from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, UncertaintyTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.principal_directions import PrincipalDirections
+from lobewatch.tool.tap_series import Scatter
+from modal import Mode
+
+DEFAULT_TAP_SCATTER = Scatter(0.003, 0.10, 0.03)
+"""Scatter from tap test to tap test, until a series tells its own; chosen."""
+MIN_SAMPLE_FACTOR = 0.02
+"""Least share of its middle value that anything is drawn with ..."""
+MAX_MODE_PHASE = np.radians(89)
+"""... and largest phase (rad)."""
+WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
+"""Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
+CROSS_CAUSE = "cross"
+"""Cause of the doubt of the axes of modes: what direct taps leave open."""
+TEST_CUT_CAUSE = "cuts"
+"""Cause of the doubt of modes that test cuts have taught: all that they have left open."""
+
+Floats = NDArray[np.float64]
+
+
+class FactorRange(NamedTuple):
+    """Lowest and highest value of a number, as factors on its middle or on that at rest."""
+
+    low: float
+    """Lowest factor; at most 1 where it is on the middle."""
+    high: float
+    """Highest factor; at least 1 where it is on the middle."""
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedSamples:
+    """Spindles at speed that explain the test cuts, r of equal weight, around their mean; n modes in x, then y."""
+
+    frequency: Floats
+    """Natural frequencies over their mean, shape (r, n)."""
+    damping_ratio: Floats
+    """Damping ratios over their mean, shape (r, n)."""
+    stiffness: Floats
+    """Modal stiffnesses over their mean, shape (r, n)."""
+    phase_change: Floats
+    """Phases less those of the middle (rad), shape (r, n)."""
+    tangential: Floats
+    """Kt over its mean, shape (r,)."""
+    ratio: Floats
+    """Kr/Kt over its mean, shape (r,)."""
+
+    def build_rows(self, middle: MillingRows, count: int, without: str) -> MillingRows:
+        """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
+        take = np.arange(count) % len(self.tangential)
+        rows, spindle = middle[np.zeros(count, dtype=np.intp)], float(without != TEST_CUT_CAUSE)
+        force, direction = (
+            1 + (factor[take] - 1) * (without != "coefficients") for factor in (self.tangential, self.ratio)
+        )
+        return replace(
+            rows,
+            frequency=rows.frequency * (1 + (self.frequency[take] - 1) * spindle),
+            damping_ratio=rows.damping_ratio * (1 + (self.damping_ratio[take] - 1) * spindle),
+            stiffness=rows.stiffness * (1 + (self.stiffness[take] - 1) * spindle),
+            phase=rows.phase + self.phase_change[take] * spindle,
+            tangential=rows.tangential * force,
+            radial=rows.radial * force * direction,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Doubt of a program, by what it comes from."""
+
+    modes: Mapping[str, Floats]
+    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
+    (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
+    that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
+    tap_correlation: Floats
+    """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
+    speed: float
+    """Relative half-width of the spindle speed."""
+    tangential: FactorRange
+    """Range of the cutting coefficient Kt over the middle."""
+    ratio: FactorRange
+    """Range of Kr/Kt, the direction of the force, over the middle."""
+    wear: float = 1.0
+    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the least
+    is 1."""
+    axes: PrincipalDirections | None = None
+    """Axes of the modes, and what is open of them; None where they count as known."""
+    learned: LearnedSamples | None = None
+    """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Names of all that it comes from."""
+        across = [CROSS_CAUSE] if self.axes is not None and self.axes.are_uncertain else []
+        return (*self.modes, *across, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
+
+    def sample(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
+        """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
+
+        without: a cause that is taken as known.
+        """
+        rows = self._sample_new_edges(middle, count, seed, without)
+        if self.wear == 1 or without == "wear":
+            return rows
+        worn = np.empty(count)
+        worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
+        return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
+
+    def _sample_new_edges(self, middle: MillingRows, count: int, seed: int, without: str) -> MillingRows:
+        if self.learned is not None:
+            rows = self.learned.build_rows(middle, count, without)
+            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
+            return self._with_sampled_axes(
+                replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
+            )
+        random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
+        factor = np.ones((count, middle.frequency.shape[1], 3))
+        turned = np.zeros(factor.shape[:2])
+        for cause, widths in self.modes.items():
+            uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
+            moved = widths * self._correlated(cause, np.concatenate(uniform, axis=-1))
+            if cause != without:
+                factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
+                turned += moved[..., 3]
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != "speed")
+        tangential, ratio = (
+            span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._coefficient_ranges
+        )
+        if without == "coefficients":
+            tangential, ratio = np.ones((2, count))
+        rows = middle[np.zeros(count, dtype=np.intp)]
+        drawn = replace(
+            rows,
+            frequency=rows.frequency * factor[..., 0],
+            damping_ratio=rows.damping_ratio * factor[..., 1],
+            stiffness=rows.stiffness * factor[..., 2],
+            phase=np.clip(rows.phase + turned, -MAX_MODE_PHASE, MAX_MODE_PHASE),
+            speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR),
+            tangential=rows.tangential * np.maximum(tangential, MIN_SAMPLE_FACTOR),
+            radial=rows.radial * np.maximum(tangential, MIN_SAMPLE_FACTOR) * np.maximum(ratio, 0.0),
+        )
+        return self._with_sampled_axes(drawn, seed, without)
+
+    def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
+        """With axes drawn from what is open of them."""
+        if self.axes is None or not self.axes.are_uncertain or without == CROSS_CAUSE:
+            return rows
+        return replace(rows, vector=self.axes.sample(len(rows), seed))
+
+    def _correlated(self, cause: str, uniform: Floats) -> Floats:
+        """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
+        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == "tap" else uniform
+
+    @property
+    def _coefficient_ranges(self) -> tuple[FactorRange, FactorRange]:
+        return self.tangential, self.ratio
+
+
+def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
+    """The doubt of a cut with a tool as it is known at some time, at rest."""
+    tangential, ratio = _coefficient_ranges(table, machine)
+    modes = [*(assembly.x or ()), *(assembly.y or ())]
+    mixing = np.array([_tap_correlation(mode) for mode in modes])
+    speed, wear = machine.doubt.speed_percent / 100, wear_factor_of(table, machine)
+    return Uncertainty(
+        _mode_uncertainty(assembly, machine.doubt),
+        mixing,
+        speed,
+        tangential,
+        ratio,
+        wear,
+        assembly.principal_directions,
+    )
+
+
+def wear_factor_of(table: CutTable, machine: Machine) -> float:
+    """Largest factor of wear on the cutting coefficients: what the program says, else [doubt]."""
+    said = table.wear if isinstance(table, ProgramTable) else None
+    return WEAR_FACTORS[said or machine.doubt.wear]
+
+
+def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:
+    """Half-widths of the modes by cause, shape (n, 4) each."""
+    x, y = assembly.x or (), assembly.y or ()
+    absent = np.zeros((len(x) + len(y), 4))
+    if assembly.predicted:
+        widths = {"prediction": np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
+    else:
+        sides = (("x", len(x)), ("y", len(y)))
+        clamping = [np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides]
+        clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
+        widths = {"tap": np.array([_tap_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
+    if len(assembly.directions) == 1:
+        unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
+        widths["untapped"] = absent
+        absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
+    return widths
+
+
+def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Scatter:
+    """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
+    scatter = assembly.scatter(side if side in assembly.directions else assembly.directions[0]) or DEFAULT_TAP_SCATTER
+    percents = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
+    sizes = [width if wish is None else wish / 100 for width, wish in zip(scatter[:3], percents, strict=True)]
+    return Scatter(sizes[0], sizes[1], sizes[2], scatter.phase_deg)
+
+
+def _prediction_uncertainty(mode: Mode, given: UncertaintyTable) -> tuple[float, float, float, float]:
+    """Half-widths of a mode that is predicted; its phase may be none at all, or twice what it is taken for."""
+    frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
+    return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
+
+
+def _tap_error(mode: Mode) -> Floats:
+    """95 % of the error of the tap test, relative, of the phase in rad; 0 where it is not known."""
+    values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
+    error = np.append(mode.standard_error, mode.phase_deg_std)
+    return np.asarray(np.nan_to_num(mode.quantile() * error / values))
+
+
+def _tap_correlation(mode: Mode) -> Floats:
+    """Root of the correlations of the errors of a mode whose phase was fitted, shape (4, 4); else 1."""
+    error = np.sqrt(np.diag(mode.joint_covariance))
+    if not np.all(error > 0):
+        return np.eye(4)
+    value, vector = np.linalg.eigh(mode.joint_covariance / np.outer(error, error))
+    _, triangle = np.linalg.qr((vector * np.sqrt(np.maximum(value, 0.0))).T)
+    return np.asarray((triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, np.newaxis]).T)
+
+
+def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
+    """Kt and Kr/Kt over the middle: the published range where there is one, else that of [doubt]."""
+    middle = machine.coefficients(table)
+    if middle.tangential_range is None or middle.ratio_range is None:
+        share = machine.doubt.coefficients_percent / 100
+        return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
+    ratio = middle.radial / middle.tangential
+    return (
+        FactorRange(*(limit / middle.tangential for limit in middle.tangential_range)),
+        FactorRange(*(limit / ratio for limit in middle.ratio_range)),
+    )

@@ -1,0 +1,284 @@
+"""Zero-order approximation (ZOA) of many spindles at once.
+
+With the mean force matrix H0, G = [[Gx, Gxy], [Gxy, Gy]] and tau between two teeth, motion exp(s t) sustains itself
+where
+
+    det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
+
+Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal.
+Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import Cut, MillingRows
+from lobes.tooth_force import interval_forces, mean_force, mean_regeneration, rotate_to_machine
+
+FREQUENCIES_PER_WAVE = 16
+"""Frequencies in which the regeneration of the longest delay turns once, at least."""
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:
+    """Frequencies (Hz) (r, k), rising, with as many more as the delays of a cut ask for at tooth frequencies (Hz)."""
+    longest = max(cut.delays) * cut.teeth / (2 * np.pi)
+    low, high = float(np.min(grid)), float(np.max(grid))
+    even = np.arange(low, high, float(np.min(teeth)) / longest / FREQUENCIES_PER_WAVE)
+    return np.sort(np.hstack((grid, np.broadcast_to(even, (len(grid), even.size)))), axis=1)
+
+
+def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -> tuple[Floats, Floats]:
+    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+
+    As `lobes.uneven_limits`: b = -1 / Re(L s) where Im(L s) = 0, between the frequencies on a line; inf and NaN where
+    there is none.
+    """
+    depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+    for i in range(teeth.shape[1]):
+        turned = loop * mean_regeneration(cut, grid / teeth[:, i, np.newaxis])
+        before, after = turned[:, :-1], turned[:, 1:]
+        crosses = (before.imag < 0) != (after.imag < 0)
+        share = before.imag / np.where(crosses, before.imag - after.imag, 1.0)
+        real = np.where(crosses, before.real + share * (after.real - before.real), 0.0)
+        row, step = np.arange(len(grid)), np.argmin(real, axis=1)
+        limited = real[row, step] < 0
+        depth[limited, i] = -1 / real[row, step][limited]
+        frequency = grid[row, step] + share[row, step] * (grid[row, step + 1] - grid[row, step])
+        chatter[limited, i] = frequency[limited]
+    return depth, chatter
+
+
+FREQUENCY_GRID_REACH = 0.7
+"""Distance from each natural frequency up to which frequencies are looked at, relative ..."""
+FREQUENCY_GRID_POINTS = 49
+"""... and number of them, dense near it."""
+MAX_BATCH_NUMBERS = 300_000
+"""Numbers that are worked on at once."""
+NEWTON_STEPS = 14
+"""Steps of the search for a root."""
+CONSTANT_FORCE_TOLERANCE = 1e-6
+"""Change of the force over the turn, relative to its mean, that is none."""
+
+
+class ModeColumns(NamedTuple):
+    """One mode of each spindle, shape (r, 1) each."""
+
+    frequency: Floats
+    """Natural frequency (rad/s)."""
+    damping_ratio: Floats
+    """Damping ratio (-)."""
+    stiffness: Floats
+    """Modal stiffness (N/m)."""
+    displacement: Floats
+    """Share of its coordinate that the tip shows (-)."""
+    velocity: Floats
+    """Share of its velocity over the natural frequency that the tip shows (-)."""
+    coupling: Floats
+    """Product of its parts in the direction of the force and that of the displacement (-)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroOrderBatch:
+    """r spindles with a cut, by its mean force."""
+
+    rows: MillingRows
+    """Spindles, each with its cut and feed."""
+    force: Floats
+    """Mean force matrix of each (Pa), in the directions x and y of the machine, shape (r, 2, 2)."""
+
+    @classmethod
+    def of(cls, rows: MillingRows) -> ZeroOrderBatch:
+        """Spindles fed each in its own direction, by the mean force of their cut."""
+        tangential, radial = _unit_mean_forces(rows.cut)
+        force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
+        return cls(rows, rotate_to_machine(force, rows.feed_angle))
+
+    def limits(self, speed_rpm: Floats, deepest: float = np.inf) -> tuple[Floats, Floats]:
+        """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
+
+        Both of shape (r, s); inf and NaN where there is none, and perhaps where it is more than `deepest` (m).
+        """
+        speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
+        depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
+        size = max(1, MAX_BATCH_NUMBERS // (speeds.shape[1] * FREQUENCY_GRID_POINTS * self.rows.direction.size))
+        for first in range(0, len(self.rows), size):
+            part = slice(first, first + size)
+            spindles = ZeroOrderBatch(self.rows[part], self.force[part])
+            depth[part], chatter[part] = spindles._limits_of_part(speeds[part] * self.rows.cut.teeth / 60, deepest)
+        return depth, chatter
+
+    def _limits_of_part(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
+        """Limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
+        grid, cut = self._frequency_grid(), self.rows.cut
+        if cut.pitch:
+            grid = refine_frequency_grid(grid, cut, teeth)
+        depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+        for loop in self._eigenvalues(grid):
+            limit, frequency = (
+                find_uneven_limits(grid, loop, cut, teeth)
+                if cut.pitch
+                else _find_even_limits(grid, loop, teeth, deepest)
+            )
+            chatter = np.where(limit < depth, frequency, chatter)
+            depth = np.minimum(limit, depth)
+        return depth, chatter
+
+    def fastest_growth(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
+        """Growth (1/s) and frequency (Hz) of the motion that grows fastest, at a speed (rpm) each and a depth (m).
+
+        Both of shape (r,).
+        """
+        tau = 60 / (self.rows.cut.teeth * speed_rpm)
+        low, high = 0.9 * np.min(self.rows.frequency, axis=1), 1.3 * np.max(self.rows.frequency, axis=1)
+        number = int(np.ceil(np.max((high - low) * tau / np.pi))) * 2 + 2
+        root = 1j * (low[:, np.newaxis] + (high - low)[:, np.newaxis] * np.linspace(0, 1, number))
+        for _ in range(NEWTON_STEPS):
+            value, slope = self._characteristic(root, tau[:, np.newaxis], depth)
+            step = value / np.where(slope == 0, 1e-300, slope)
+            root = root - step * np.minimum(1.0, 0.3 / tau[:, np.newaxis] / np.maximum(np.abs(step), 1e-12))
+        value, slope = self._characteristic(root, tau[:, np.newaxis], depth)
+        good = (np.abs(value / slope) * tau[:, np.newaxis] < 1e-3) & (root.imag > 0)
+        best = np.argmax(np.where(good, root.real, -np.inf), axis=1)
+        fastest = np.where(np.any(good, axis=1), root[np.arange(len(root)), best], np.nan)
+        return np.asarray(fastest.real), np.asarray(fastest.imag / (2 * np.pi))
+
+    def _characteristic(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
+        """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
+        (gx, dx), (gy, dy) = self._receptance_with_derivative(s, 0, 0), self._receptance_with_derivative(s, 1, 1)
+        h = self.force[..., np.newaxis]
+        wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
+        gain, dgain = depth * (1 - wave), depth * tau * wave
+        trace, dtrace = h[:, 0, 0] * gx + h[:, 1, 1] * gy, h[:, 0, 0] * dx + h[:, 1, 1] * dy
+        product = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]
+        minor, dminor = product * gx * gy, product * (dx * gy + gx * dy)
+        if self._is_rotated:
+            gxy, dxy = self._receptance_with_derivative(s, 0, 1)
+            both = h[:, 0, 1] + h[:, 1, 0]
+            trace, dtrace = trace + both * gxy, dtrace + both * dxy
+            minor, dminor = minor - product * gxy**2, dminor - 2 * product * gxy * dxy
+        return (
+            1 + gain * trace + gain**2 * minor,
+            dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor,
+        )
+
+    @property
+    def _is_rotated(self) -> bool:
+        """Whether a force in x moves the tip in y."""
+        return bool(np.any(np.prod(self.rows.vector, axis=-1)))
+
+    def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:
+        """Receptance from one direction to another at frequencies (rad/s) (r, k)."""
+        total = np.zeros(frequency.shape, np.complex128)
+        for mode in self._modes(force, shown):
+            r = frequency / mode.frequency
+            elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
+            share = mode.coupling / (mode.stiffness * (elastic * elastic + damped * damped))
+            total.real += (mode.displacement * elastic + moving * damped) * share
+            total.imag += (moving * elastic - mode.displacement * damped) * share
+        return total
+
+    def _receptance_with_derivative(self, s: Complexes, force: int, shown: int) -> tuple[Complexes, Complexes]:
+        """Receptance from one direction to another at s (r, k) (1/s), and its derivative."""
+        total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
+        for mode in self._modes(force, shown):
+            r = s / mode.frequency
+            flexible = 1 / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
+            part = (mode.displacement + mode.velocity * r) * flexible
+            total += mode.coupling * part
+            bend = part * (2 * mode.stiffness * (mode.damping_ratio + r))
+            slope += mode.coupling * (mode.velocity - bend) * flexible / mode.frequency
+        return total, slope
+
+    def _modes(self, force: int, shown: int) -> Iterator[ModeColumns]:
+        """Modes that a force in one direction moves in another."""
+        place, velocity = self.rows.tip_participation
+        axes, vector = self.rows.axes.tolist(), self.rows.vector
+        if force not in axes or shown not in axes:
+            return
+        share = vector[..., axes.index(force)] * vector[..., axes.index(shown)]
+        parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity, share
+        for k in np.flatnonzero(np.any(share, axis=0)):
+            yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
+
+    def _frequency_grid(self) -> Floats:
+        """Frequencies (Hz), rising, shape (r, k)."""
+        width = self.rows.damping_ratio[..., np.newaxis]
+        around = width * np.sinh(np.linspace(-1, 1, FREQUENCY_GRID_POINTS) * np.arcsinh(FREQUENCY_GRID_REACH / width))
+        grid = (self.rows.frequency / (2 * np.pi))[..., np.newaxis] * (1 + around)
+        return np.sort(grid.reshape(len(self.rows), -1), axis=1)
+
+    def _eigenvalues(self, grid: Floats) -> list[Complexes]:
+        """Both eigenvalues of H0 G at frequencies (r, k), each followed over them."""
+        gx, gy = (self._receptance(2 * np.pi * grid, axis, axis) for axis in (0, 1))
+        h = self.force[..., np.newaxis]
+        half, product = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2, gx * gy
+        if self._is_rotated:
+            gxy = self._receptance(2 * np.pi * grid, 0, 1)
+            half, product = half + (h[:, 0, 1] + h[:, 1, 0]) * gxy / 2, product - gxy**2
+        root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * product)
+        jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
+        root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
+        return [half + root, half - root]
+
+
+def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
+    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
+    """
+    turn = 0.5 - _unwrap(np.angle(loop)) / np.pi
+    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)
+    depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+    steps = np.flatnonzero(np.any(low, axis=0))
+    if not steps.size:
+        return depth, frequency
+    first, last = steps[0], steps[-1] + 1
+    low, grid, real, turn = low[:, first:last], *(part[:, first : last + 1] for part in (grid, loop.real, turn))
+    place = grid[:, np.newaxis] / teeth[..., np.newaxis]
+    place += turn[:, np.newaxis]
+    whole = np.floor(place)
+    crosses = whole[..., 1:] != whole[..., :-1]
+    crosses &= low[:, np.newaxis]
+    row, speed, step = np.unravel_index(np.flatnonzero(crosses), crosses.shape)
+    before, after = place[row, speed, step], place[row, speed, step + 1]
+    share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
+    crossing = real[row, step] + share * (real[row, step + 1] - real[row, step])
+    limit = np.where(crossing < 0, -1 / (2 * np.minimum(crossing, -1e-300)), np.inf)
+    begins = np.flatnonzero(np.diff(row * teeth.shape[1] + speed, prepend=-1))
+    depth[row[begins], speed[begins]] = np.minimum.reduceat(limit, begins)
+    lowest = np.flatnonzero(limit == depth[row, speed])
+    row, speed, step, share = row[lowest], speed[lowest], step[lowest], share[lowest]
+    frequency[row, speed] = grid[row, step] + share * (grid[row, step + 1] - grid[row, step])
+    return depth, frequency
+
+
+def _unwrap(angle: Floats) -> Floats:
+    """Angles (r, k) without jumps of a turn."""
+    step = np.diff(angle, axis=1)
+    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(step / (2 * np.pi)), axis=1)
+    return angle
+
+
+def is_force_constant(cut: Cut) -> bool:
+    """Whether the force does not change over the turn: then the mean force is all of it."""
+    force = interval_forces(cut, 64)[0]
+    return (
+        not cut.pitch
+        and cut.helix_lag == 0
+        and bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
+    )
+
+
+def _unit_mean_forces(cut: Cut) -> tuple[Floats, Floats]:
+    """Mean force matrices for Kt alone and Kr alone, each 1, in the frame of the feed."""
+    first = mean_force(replace(cut, tangential=1.0, radial=0.0, feed_angle=0.0))
+    return first, mean_force(replace(cut, tangential=1.0, radial=1.0, feed_angle=0.0)) - first

@@ -1,0 +1,151 @@
+"""Search a fitted band for modes without a peak of their own and for close pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from modal.bands.extraction import FittedBand, Floats
+from modal.bands.fit_peaks import MIN_MODE_PEAK_SHARE, are_modes
+from modal.bands.residual_analysis import (
+    has_lower_aic,
+    has_rounding_residual,
+    has_white_residual,
+    passes_f_test,
+    residual_noise,
+    systematic_error,
+)
+from modal.fitting import MAX_RESIDUAL_TERMS, fit_band, mode_pair_gain, residual_term_gain
+from modal.poles import select_physical_poles
+
+HIDDEN_MODE_F_RATIO = 40.0
+"""A mode without a peak of its own lowers the sum of squares by this many times what its unknowns do by chance."""
+RESIDUAL_TERM_F_RATIO = 6.0
+"""A further residual term lowers it by this many times what two unknowns do by chance."""
+MAX_HIDDEN_MODE_ERROR = 1 / 6
+"""Relative standard error that damping ratio and stiffness of a mode without a peak have at most."""
+
+
+def refine_dense_band(band: FittedBand) -> FittedBand:
+    """The band with those modes added that have no peak of their own, where the sum of squares asks for them.
+
+    The same where its fit leaves nothing but independent errors, or rounding.
+    """
+    if has_white_residual(band.fit) or has_rounding_residual(band):
+        return band
+    bent = _add_residual_terms(band)
+    for starts in _trial_modes(band, split=bent.terms > band.terms):
+        height = np.full(starts.shape[1], np.max(band.height))
+        fit = fit_band(band.data.frequency, band.data.target, band.data.weight, starts, band.terms)
+        if fit is None or not passes_f_test(fit, band.fit, RESIDUAL_TERM_F_RATIO) or not has_lower_aic(fit, bent.fit):
+            continue
+        if passes_f_test(fit, band.fit, HIDDEN_MODE_F_RATIO) and np.all(
+            are_modes(fit, band.data.frequency, height, MAX_HIDDEN_MODE_ERROR)
+        ):
+            refitted = _add_residual_terms(replace(band, fit=fit, height=height))
+            if _is_well_determined(refitted):
+                return refitted
+        if has_white_residual(fit) and np.all(are_modes(fit, band.data.frequency, height, np.inf)):
+            bent = replace(bent, close_frequencies=tuple(sorted(fit.frequency.tolist())))
+    return bent
+
+
+def _is_well_determined(band: FittedBand) -> bool:
+    """Whether all its modes are known well enough when what the model lacks counts, too."""
+    more, fit = systematic_error(band), band.fit
+    error = np.sqrt(np.diag(more.factor * fit.covariance + more.covariance)).reshape(-1, fit.frequency.size)
+    sizes = error[2 : 2 + len(fit.constant)] / np.abs(fit.constant)
+    return bool(
+        np.all(error[1] < MAX_HIDDEN_MODE_ERROR * fit.damping_ratio)
+        and np.all(np.any(sizes < MAX_HIDDEN_MODE_ERROR, axis=0))
+    )
+
+
+def _trial_modes(band: FittedBand, split: bool) -> Iterator[Floats]:
+    """Starts (2, m) for more modes than are fitted, from all high LSCF poles down; then two for the highest mode."""
+    fit, poles = band.fit, select_physical_poles(band.data.chart)
+    fitted = fit.poles
+    size = np.pi * poles.frequency * poles.largest / poles.damping_ratio
+    high = size > MIN_MODE_PEAK_SHARE * np.max(band.height)
+    starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
+    alone = [k for k in range(band.height.size) if not np.any(np.abs(starts[0] - fitted[0, k]) < np.prod(fitted[:, k]))]
+    starts, size = np.hstack([starts, fitted[:, alone]]), np.concatenate([size[high], fit.mobility_peak[alone]])
+    for n in range(size.size, band.height.size, -1):
+        yield starts[:, np.argsort(-size)[:n]]
+    if split:
+        yield split_pole(fitted, int(np.argmax(fit.mobility_peak)))
+
+
+def _add_residual_terms(band: FittedBand) -> FittedBand:
+    """The band with as many residual terms as lower the sum of squares for more than by chance."""
+    data = band.data
+    for terms in range(band.terms + 1, MAX_RESIDUAL_TERMS + 1):
+        least = RESIDUAL_TERM_F_RATIO * len(data.target) * band.fit.sum_of_squares / band.fit.degrees_of_freedom
+        if residual_term_gain(band.fit, data.frequency, data.weight, terms - 1) < least:
+            break
+        fit = fit_band(data.frequency, data.target, data.weight, band.fit.poles, terms)
+        if (
+            fit is None
+            or not passes_f_test(fit, band.fit, RESIDUAL_TERM_F_RATIO)
+            or not np.all(are_modes(fit, data.frequency, band.height))
+        ):
+            break
+        band = replace(band, fit=fit, terms=terms)
+    return band
+
+
+MIN_PAIR_GAIN = 9.0
+"""Gain of a pair, over what each of its unknowns takes off by chance, which a mode alone has once in 8000 (exp -9)."""
+PAIR_TRIAL_OFFSET = 0.35
+"""Half the distance at which two modes in place of one are tried (half-power half-widths)."""
+MAX_PAIR_SIZE_CHANGE = 2.0
+"""Standard errors that the size of a mode may change by where its stiffness is its own all the same."""
+MAX_PAIR_RESIDUAL_TO_NOISE = 2.0
+"""Times the noise (rms) that two modes in place of one leave at most."""
+MIN_PAIR_SHARE = 0.01
+"""Share (rms) of a mode below which what a pair adds to it means nothing: real peaks are no more linear than that."""
+
+
+def mark_close_modes(band: FittedBand) -> FittedBand:
+    """The band with the frequencies of two modes that may stand in place of one: its K is then that of both.
+
+    They are said where the curve of one mode is surely not all that there is, two leave nothing but noise, and neither
+    of them is as large as the one.
+    """
+    fit, data = band.fit, band.data
+    if band.close_frequencies or has_rounding_residual(band):
+        return band
+    i = _least_likely_single_mode(band)
+    if i is None:
+        return band
+    pair = fit_band(data.frequency, data.target, data.weight, split_pole(fit.poles, i), band.terms)
+    if pair is None or not (has_white_residual(pair) and has_lower_aic(pair, fit)):
+        return band
+    height = np.full(pair.frequency.size, np.max(band.height))
+    larger = np.max(np.abs(pair.constant[0, -2:])) / abs(fit.constant[0, i])
+    is_own = abs(larger - 1) < MAX_PAIR_SIZE_CHANGE * fit.size_error[0, i]
+    if is_own or not np.all(are_modes(pair, data.frequency, height, np.inf)):
+        return band
+    return replace(band, close_frequencies=tuple(sorted(pair.frequency[-2:].tolist())))
+
+
+def _least_likely_single_mode(band: FittedBand) -> int | None:
+    """The mode whose peak is least likely that of one mode alone; None where chance explains all of them, what a pair
+    adds is next to nothing, or it leaves far more than noise."""
+    fit, data = band.fit, band.data
+    gains = [mode_pair_gain(fit, data.frequency, data.weight, band.terms, i) for i in range(fit.frequency.size)]
+    i, unknowns = int(np.argmax(gains)), 2 * len(data.target)
+    chance = MIN_PAIR_GAIN * unknowns * fit.sum_of_squares / fit.degrees_of_freedom
+    next_to_nothing = (MIN_PAIR_SHARE * float(np.linalg.norm(data.weight * fit.of_mode(i, data.frequency)))) ** 2
+    noise = (MAX_PAIR_RESIDUAL_TO_NOISE * residual_noise(fit)) ** 2 * fit.complex_residual.size
+    return i if gains[i] > max(chance, next_to_nothing, fit.sum_of_squares - noise) else None
+
+
+def split_pole(poles: Floats, i: int) -> Floats:
+    """Poles with two in place of one, which come last, (2, m + 1)."""
+    frequency, damping_ratio = poles[:, i]
+    apart = PAIR_TRIAL_OFFSET * damping_ratio * frequency
+    pair = [[frequency - apart, frequency + apart], 2 * [damping_ratio]]
+    return np.hstack([np.delete(poles, i, axis=1), pair])

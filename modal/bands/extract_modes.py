@@ -1,0 +1,209 @@
+"""Extract all modes of one or several FRFs, band by band."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from itertools import chain
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from acquisition import Frf
+from modal.bands.dense_bands import mark_close_modes, refine_dense_band
+from modal.bands.extraction import Complexes, Extraction, FittedBand, Floats
+from modal.bands.find_resonances import Resonance, add_residual_resonances, find_resonances
+from modal.bands.fit_peaks import LocalBand, fit_peaks, group_into_bands, iterate_bands, refit_with_real_constants
+from modal.bands.frf_lines import line_weights, usable_lines
+from modal.bands.residual_analysis import has_rounding_residual
+
+
+@contextmanager
+def limit_to_one_thread() -> Iterator[None]:
+    """Keeps the numerical libraries of this process to one thread as long as it is entered."""
+    with _thread_controller().limit(limits=1):
+        yield
+
+
+@cache
+def _thread_controller() -> ThreadpoolController:
+    """Looked for once: that takes as long as a fit."""
+    return ThreadpoolController()
+
+
+MIN_NOISE_GROWTH_EVIDENCE = 4.0
+"""Twice the gain of log likelihood from which noise is taken to grow with the FRF; chance brings it once in 44."""
+MAX_SCORING_STEPS = 12
+"""Most steps of Fisher scoring; it settles in some five."""
+SCORING_TOLERANCE = 1e-6
+"""Relative change of its shares after which it has settled."""
+MIN_NOISE_FLOOR_SHARE = 1e-4
+"""Share that the floor has at least of the variance at the mean squared height."""
+
+
+def update_line_weights(state: Extraction, given: Floats) -> Floats:
+    """Weights (p, n) that what the fits of these bands leave asks for; given: those that nothing speaks against.
+
+    Noise proportional to the FRF (of the hammer, of the place that is hit, of leakage) is largest on the peaks, where
+    equal weights take it for that of the whole band: the errors of damping ratio and stiffness come out too small.
+    """
+    weight = given.copy()
+    for band in state.bands:
+        if not has_rounding_residual(band):
+            weight[:, band.lines] /= _noise_profile(state.residual(band), band, given[:, band.lines])
+    return weight
+
+
+def _noise_profile(left: Complexes, band: FittedBand, given: Floats) -> Floats:
+    """For each FRF of a band the rms of its weighted noise by line, over that of the whole band, (p, n).
+
+    left: what the fit leaves of the receptances (m/N); given: weights, all of shape (p, n).
+    """
+    height = np.abs((band.data.target - left) * given) ** 2
+    variance = _fit_noise_variance(np.abs(left * given) ** 2, height, given > 0)
+    return np.asarray(np.sqrt(np.maximum(variance / np.mean(variance), MIN_NOISE_FLOOR_SHARE**2)))
+
+
+def _fit_noise_variance(left: Floats, height: Floats, counts: NDArray[np.bool_]) -> Floats:
+    """Likeliest variance by line, floor + slope height, or equal where that is as likely; of each FRF, shape (p, n).
+
+    left, height: squares of the residual and of the model; counts: the lines that it is told from, all (p, n).
+    """
+    columns = np.stack([np.ones(left.shape), height / np.mean(height, axis=1, keepdims=True)], axis=1)
+    known, squares = columns * counts[:, np.newaxis], left * counts
+    mean = np.sum(squares, axis=1) / np.sum(counts, axis=1)
+    equal = share = np.stack([np.where(mean > 0, mean, 1.0), np.zeros(mean.size)], axis=1)[:, np.newaxis]
+    for _ in range(MAX_SCORING_STEPS):
+        before, variance = share, share @ columns
+        scaled = known / variance
+        share = np.maximum((squares[:, np.newaxis] / variance) @ scaled.mT @ np.linalg.pinv(scaled @ scaled.mT), 0.0)
+        share[..., 0] = np.maximum(share[..., 0], MIN_NOISE_FLOOR_SHARE * share[..., 1])
+        if np.all(np.abs(share - before) <= SCORING_TOLERANCE * before):
+            break
+    likely, even = (_log_likelihood(squares, (values @ columns)[:, 0], counts) for values in (share, equal))
+    share = np.where((2 * (likely - even) > MIN_NOISE_GROWTH_EVIDENCE)[:, np.newaxis, np.newaxis], share, equal)
+    return np.asarray(np.where(mean[:, np.newaxis] > 0, (share @ columns)[:, 0], 0.0))
+
+
+def _log_likelihood(left: Floats, variance: Floats, counts: NDArray[np.bool_]) -> Floats:
+    """Log likelihood of these variances by the squares of complex normal residuals, of each FRF, shape (p,)."""
+    return np.asarray(-np.sum((np.log(variance) + left / variance) * counts, axis=1))
+
+
+MAX_REWEIGHTING_ROUNDS = 4
+"""Most rounds in which weights follow what the fits leave."""
+MIN_WEIGHT_CHANGE = 0.2
+"""Relative change of weights that is not worth another fit."""
+STRAY_LINE_RATIO = 8.0
+"""A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
+STRAY_ROUNDING_SHARE = 1e-8
+"""Share of the largest value below which no residual means anything."""
+
+
+def extract_modes(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Extraction:
+    """Find and fit all modes of these FRFs between band[0] and band[1] (Hz), with poles that are common to all.
+
+    One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_common_modes`.
+
+    >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
+    >>> state = extract_modes([frf])
+    >>> [f"{band.fit.frequency[0]:.1f} Hz" for band in state.bands]
+    ['500.0 Hz', '900.0 Hz']
+    >>> float(abs(state.receptance - frf.receptance).max() / abs(frf.receptance).max()) < 1e-6
+    True
+    """
+    with limit_to_one_thread():
+        return _extract_bands(tuple(usable_lines(frf, band) for frf in _limit_to_common_band(frfs)))
+
+
+def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
+    empty = Extraction(lines, np.array([line_weights(frf) for frf in lines]), ())
+    peaks = _merge_resonances([find_resonances(frf) for frf in lines])
+    state = iterate_bands(_fit_bands(empty, peaks))
+    beside = _with_residual_resonances(state, peaks)
+    state = state if len(beside) == len(peaks) else iterate_bands(_fit_bands(state, beside))
+    closer = tuple(refine_dense_band(band) for band in state.bands)
+    if any(new is not old for new, old in zip(closer, state.bands, strict=True)):
+        state = iterate_bands(replace(state, bands=closer))
+    stray = _stray_lines(state)
+    if np.any(stray):
+        state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))
+    state = _reweight(state)
+    return replace(state, bands=tuple(refit_with_real_constants(mark_close_modes(band)) for band in state.bands))
+
+
+def _reweight(state: Extraction) -> Extraction:
+    """Bands fitted with the weights that what they leave asks for, until those stay about as they are."""
+    given = state.weight
+    for _ in range(MAX_REWEIGHTING_ROUNDS):
+        weight = update_line_weights(state, given)
+        for band in state.bands:
+            before = state.weight[:, band.lines]
+            if np.all(np.abs(weight[:, band.lines] - before) <= MIN_WEIGHT_CHANGE * before):
+                weight[:, band.lines] = before
+        if np.array_equal(weight, state.weight):
+            break
+        state = iterate_bands(replace(state, weight=weight))
+    return state
+
+
+def _limit_to_common_band(frfs: Sequence[Frf]) -> list[Frf]:
+    """All with the narrowest usable band."""
+    if not frfs:
+        raise ValueError("there is no FRF; give one or more, the driving point first")
+    if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
+        raise ValueError("the FRFs differ in their frequency lines; measure or export all with the same settings")
+    usable = [frf.usable_band for frf in frfs if frf.usable_band is not None]
+    common = (max(low for low, _ in usable), min(high for _, high in usable)) if usable else None
+    return [replace(frf, usable_band=common) for frf in frfs]
+
+
+def _merge_resonances(found: Sequence[list[Resonance]]) -> list[Resonance]:
+    """Resonances of all FRFs by rising frequency, of two nearer to each other than a half-width the higher."""
+    common: list[Resonance] = []
+    for new in sorted(chain.from_iterable(found), key=lambda r: -r.height):
+        if all(abs(new.frequency - old.frequency) >= max(new.half_width, old.half_width) for old in common):
+            common.append(new)
+    return sorted(common, key=lambda r: r.frequency)
+
+
+def _fit_bands(before: Extraction, resonances: list[Resonance]) -> Extraction:
+    """A first fit of every band around these, the highest first, each without the tails of those before.
+
+    A band that was there before as it is now keeps its fit.
+    """
+    wanted = sorted(group_into_bands(resonances, before.frf.frequency), key=lambda local: -local.height)
+    kept = [band for band in before.bands if any(_is_band_of(band, local) for local in wanted)]
+    state = replace(before, bands=tuple(kept))
+    for local in wanted:
+        if not any(_is_band_of(band, local) for band in kept):
+            band = fit_peaks(state.data(local.lines), local.resonances)
+            state = state if band is None else replace(state, bands=(*state.bands, band))
+    return replace(state, bands=tuple(sorted(state.bands, key=lambda band: band.lines.start)))
+
+
+def _is_band_of(band: FittedBand, local: LocalBand) -> bool:
+    """Whether a band was laid around these peaks on these lines."""
+    return (band.resonances, band.lines) == (local.resonances, local.lines)
+
+
+def _with_residual_resonances(state: Extraction, known: list[Resonance]) -> list[Resonance]:
+    """Known resonances with those that stand out of what the fit of these leaves in any of the FRFs."""
+    for frf, fitted in zip(state.frfs, state.receptance, strict=True):
+        known = add_residual_resonances(known, replace(frf, receptance=frf.receptance - fitted))
+    return known
+
+
+def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
+    """Lines that stand far out of the residual on both sides of them: hum, or a carrier; shape (p, n)."""
+    stray = np.zeros(state.weight.shape, bool)
+    for band in state.bands:
+        size = np.abs(band.data.target) * band.data.weight
+        for mask, left, own in zip(stray, np.abs(band.fit.complex_residual), size, strict=True):
+            far = left > STRAY_LINE_RATIO * np.maximum(scipy.ndimage.median_filter(left, size=11), np.median(left))
+            mask[band.lines] |= far & (left > STRAY_ROUNDING_SHARE * np.max(own))
+    return stray

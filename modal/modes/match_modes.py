@@ -1,0 +1,149 @@
+"""Match modes between measurements: MAC, followed mode, predominant mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from acquisition import Remark
+from modal.modes.mode import Mode
+
+
+def mac(a: ArrayLike, b: ArrayLike) -> float:
+    """Modal assurance criterion |a^H b|^2 / (a^H a b^H b) of two shapes (p,): 1 for the same shape, 0 for none of it.
+
+    Raises ValueError for shapes of different length, and of zeros. Source: Allemang & Brown (1982), IMAC 1.
+
+    >>> mac([1.0, 0.5, -0.2], [2.0, 1.0, -0.4])  # the same shape, another scale
+    1.0
+    >>> mac([1.0, 0.0], [0.0, 1.0])
+    0.0
+    """
+    x, y = np.asarray(a), np.asarray(b)
+    if x.shape != y.shape or x.ndim != 1:
+        raise ValueError(f"mode shapes have shapes {x.shape} and {y.shape}; give two over the same points")
+    size = float(np.vdot(x, x).real * np.vdot(y, y).real)
+    if not size > 0:
+        raise ValueError("a mode shape is zero or not finite at its points; leave it out")
+    return float(np.abs(np.vdot(x, y)) ** 2 / size)
+
+
+TYPICAL_MODE_CHANGE = (0.03, 0.5, 0.3)
+"""Relative change of frequency, damping ratio and stiffness from one measurement to the next that counts as one."""
+TYPICAL_MAC_LOSS = 0.1
+"""1 - MAC that counts as one."""
+MAX_MATCH_DISTANCE = 4.0
+"""Distance above which a mode is no longer the same."""
+DOUBTFUL_MATCH_DISTANCE = 2.5
+"""Distance above which it may be another one."""
+MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
+"""Relative change of the frequency up to which a mode is the same where nothing else may be another one's."""
+MIN_RIVAL_DISTANCE_RATIO = 2.0
+"""A second mode that is less than this many times as far may be the one, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedMode:
+    """The mode that continues an earlier one."""
+
+    mode: Mode | None
+    """Mode that continues it; None where no mode is near enough."""
+    remarks: tuple[Remark, ...]
+    """Reasons why it may be another mode, or why there is none; empty where it is clear."""
+
+
+def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
+    """Of modes (driving points) the one that is most like the last one followed, with a remark where that is not clear.
+
+    The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
+    in units of a likely change (of the stiffness where both know it), and of 1 - MAC where both modes have shapes over
+    the same points. A mode that is alike
+    but for its frequency is the same up to 15 %, the fall of a spindle that must be seen.
+
+    >>> last = Mode(700.0, 0.03, 2e7)
+    >>> now = [Mode(650.0, 0.03, 1.8e7), Mode(905.0, 0.02, 6e7)]
+    >>> follow_mode(last, now).mode.frequency  # Hz
+    650.0
+    >>> follow_mode(last, now[1:]).mode is None
+    True
+    """
+    near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
+    if not near or not _is_same_mode(last, near[0]):
+        nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
+        text = f"no mode to follow, none is like this one{nearest}"
+        return FollowedMode(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
+    first, about = _match_distance(last, near[0]), f"{near[0].frequency:.0f} Hz"
+    if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
+        text = f"followed mode in doubt: {near[1].frequency:.1f} Hz is nearly as like {_values_text(last)}"
+        return FollowedMode(near[0], (Remark("rival-mode", about, text),))
+    if first > DOUBTFUL_MATCH_DISTANCE:
+        text = f"followed mode in doubt: it was {_values_text(last)}, now {_values_text(near[0])}"
+        return FollowedMode(near[0], (Remark("large-change", about, text),))
+    return FollowedMode(near[0], ())
+
+
+def _is_same_mode(last: Mode, mode: Mode) -> bool:
+    if _match_distance(last, mode) <= MAX_MATCH_DISTANCE:
+        return True
+    moved = abs(mode.frequency / last.frequency - 1) <= MAX_FOLLOWED_FREQUENCY_CHANGE
+    return moved and _match_distance(replace(last, frequency=mode.frequency), mode) <= DOUBTFUL_MATCH_DISTANCE
+
+
+def _values_text(mode: Mode) -> str:
+    return f"{mode.frequency:.1f} Hz" + (f" with {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else "")
+
+
+def _match_distance(a: Mode, b: Mode) -> float:
+    ratios = (b.frequency / a.frequency, b.damping_ratio / a.damping_ratio, b.stiffness / a.stiffness)
+    known = 3 if a.has_stiffness and b.has_stiffness else 2
+    pairs = list(zip(ratios, TYPICAL_MODE_CHANGE, strict=True))[:known]
+    changes = [np.log(ratio) / likely if ratio > 0 else np.inf for ratio, likely in pairs]
+    if a.shape is not None and b.shape is not None and a.shape.shape == b.shape.shape:
+        changes.append((1 - mac(a.shape, b.shape)) / TYPICAL_MAC_LOSS)
+    return float(np.linalg.norm(changes))
+
+
+MATCHED_FREQUENCY_SHARE = 0.005
+"""Relative distance of two frequencies within which a mode is there again; as asked of repeated measurements."""
+
+
+def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list[Mode]:
+    """The modes, each with how many of the others have it within 0.5 %.
+
+    others: modes, of any trust, of other FRFs of the same structure: sensors of the same hits, points, the same point
+    measured again. `assess_trust` doubts less what is found again.
+
+    >>> once, twice = Mode(412.0, 0.01, 3e7), Mode(500.0, 0.02, 2e7)
+    >>> others = [[Mode(500.4, 0.021, 5e7)], [Mode(499.1, 0.018, -4e7)]]
+    >>> [mode.found_again for mode in match_modes([once, twice], others)]
+    [(0, 2), (2, 2)]
+    """
+    return [
+        replace(mode, match_count=(sum(_has_mode_near(other, mode.frequency) for other in others), len(others)))
+        for mode in modes
+    ]
+
+
+def _has_mode_near(modes: Sequence[Mode], frequency: float) -> bool:
+    return any(abs(mode.frequency / frequency - 1) < MATCHED_FREQUENCY_SHARE for mode in modes)
+
+
+def predominant_mode(modes: Sequence[Mode], band: tuple[float, float] | None = None) -> Mode | None:
+    """The driving-point mode inside band (Hz, ends included) with the largest peak of -Im of receptance, 1/(2 zeta K).
+
+    None where there is none. Source: Gaber & Hashemi (2015), "the most predominant mode".
+
+    >>> modes = [Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 1e7)]
+    >>> predominant_mode(modes).frequency  # Hz: 1 / (2 zeta K) is 1.25 um/N there, and 1.67 at 900 Hz
+    900.0
+    >>> predominant_mode(modes, band=(0.0, 800.0)).frequency
+    500.0
+    """
+    low, high = band or (0.0, float("inf"))
+    if not low < high:
+        raise ValueError(f"band {low:g}..{high:g} Hz is empty; give the lower frequency first")
+    able = [mode for mode in modes if mode.is_driving_point and low <= mode.frequency <= high]
+    return max(able, key=lambda mode: mode.peak, default=None)

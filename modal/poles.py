@@ -1,0 +1,271 @@
+"""Least-squares complex frequency domain (LSCF) poles and their stabilisation chart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class OrthogonalBasis:
+    """Polynomials p_0 .. p_n of x that are orthonormal with a weight over the lines, by the Arnoldi process.
+
+    x p_k(x) = sum of recurrence[j, k] p_j(x) over j <= k + 1. No power of x is ever formed, so that order 60 is as
+    exact as order 2. Source: Brubeck, Nakatsukasa & Trefethen (2021), Vandermonde with Arnoldi, SIAM Review 63, 405.
+    """
+
+    values: Complexes
+    """Weight times p_k on each line, shape (lines, n + 1)."""
+    recurrence: Complexes
+    """Shape (n + 1, n)."""
+
+    def roots(self, coefficients: Complexes) -> Complexes:
+        """Zeros of sum of coefficients[k] p_k, k = 0 .. m, by the eigenvalues of its comrade matrix, shape (m,)."""
+        m = coefficients.size - 1
+        comrade = self.recurrence[:m, :m].copy()
+        comrade[:, -1] -= self.recurrence[m, m - 1] * coefficients[:m] / coefficients[m]
+        return np.asarray(np.linalg.eigvals(comrade))
+
+
+def orthogonal_basis(x: NDArray[np.float64], weight: Complexes, order: int) -> OrthogonalBasis:
+    """Basis up to this order at x, shape (lines,), with these weights, shape (lines,)."""
+    rows = np.empty((order + 1, x.size), dtype=np.complex128)
+    recurrence = np.zeros((order + 1, order), dtype=np.complex128)
+    rows[0] = weight / np.linalg.norm(weight)
+    for k in range(order):
+        new = x * rows[k]
+        for _ in range(2):
+            part = (rows[: k + 1] @ new.conj()).conj()
+            new -= part @ rows[: k + 1]
+            recurrence[: k + 1, k] += part
+        recurrence[k + 1, k] = np.linalg.norm(new)
+        rows[k + 1] = new / recurrence[k + 1, k]
+    return OrthogonalBasis(rows.T, recurrence)
+
+
+Floats = NDArray[np.float64]
+_OrderPoles = tuple[Complexes, Complexes]
+
+EXTRA_POLYNOMIAL_DEGREE = 2
+"""Degree of the polynomial that stands for all poles outside the band, negative frequencies among them."""
+MAX_LSCF_LINES = 600
+"""Lines that poles are computed from; of more, every so many."""
+LSCF_RIDGE = 1e-12
+"""Added to the unit diagonal of the normal equations for the residues, so that coinciding poles can be solved for."""
+POLE_TOLERANCE = 0.25
+"""A pole is stable where one of the order below lies within this many half-power half-widths ..."""
+FLEXIBILITY_TOLERANCE = 0.35
+"""... with a modal flexibility that differs by less than this share of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class StabilisationChart:
+    """Poles of all orders, shape (k,), lower orders first; those that decay and lie inside the band."""
+
+    order: NDArray[np.int64]
+    """Order of the model: the number of poles it has, shape (k,)."""
+    frequency: Floats
+    """Undamped natural frequency (Hz), shape (k,)."""
+    damping_ratio: Floats
+    """Damping ratio (-), shape (k,)."""
+    flexibility: Complexes
+    """Modal flexibility 1/K, complex (m/N), in each of p FRFs, shape (k, p)."""
+    previous: NDArray[np.int64]
+    """Place of the same pole at the order below, -1 where there is none (the pole is not stable), shape (k,)."""
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether the order below has the same pole, shape (k,)."""
+        return self.previous >= 0
+
+
+def fit_lscf_poles(frequency: Floats, receptance: Complexes, weight: Floats, orders: int) -> StabilisationChart:
+    """Poles of the models of order 1 .. orders, fitted to H = B/A with complex polynomials of the frequency.
+
+    The weighted error w (A H - B) is linear in the coefficients; B, of a degree higher by two than A, is eliminated
+    first, and what is left gives A of every order from one matrix. frequency (Hz) has shape (n,), receptance (m/N)
+    and weight (p, n); several FRFs share their poles. Both bases are orthonormal over the lines, which may be
+    spaced unevenly and begin anywhere.
+
+    Source: Peeters et al. (2004), The PolyMAX frequency-domain method, Shock and Vibration 11, 395; Richardson &
+    Formenti (1982), Parameter estimation from FRF measurements using rational fraction polynomials, IMAC 1.
+
+    >>> line = np.linspace(400.0, 600.0, 201)  # Hz
+    >>> receptance = Mode(500.0, 0.02, 2e7).receptance(line)[np.newaxis]  # m/N, (1, 201)
+    >>> compute_lobe_chart = fit_lscf_poles(line, receptance, np.ones((1, 201)), orders=1)
+    >>> compute_lobe_chart.order.tolist(), compute_lobe_chart.frequency.round(2).tolist(), compute_lobe_chart.damping_ratio.round(4).tolist()  # -, Hz, -
+    ([1], [500.0], [0.02])
+    """
+    orders = min(orders, (2 * frequency.size - 2 * EXTRA_POLYNOMIAL_DEGREE) // 6)
+    thinned = slice(None, None, -(-frequency.size // MAX_LSCF_LINES))
+    model = _LscfModel(frequency[thinned], receptance[:, thinned], weight[:, thinned])
+    return _build_chart(list(_poles_by_order(model, orders)), receptance.shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _LscfModel:
+    frequency: Floats
+    receptance: Complexes
+    weight: Floats
+
+    @property
+    def x(self) -> Floats:
+        """Frequency on -1 .. 1."""
+        return (self.frequency - self.middle) / self.half
+
+    @property
+    def middle(self) -> float:
+        return float(self.frequency[0] + self.frequency[-1]) / 2
+
+    @property
+    def half(self) -> float:
+        return float(self.frequency[-1] - self.frequency[0]) / 2
+
+
+def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
+    """Poles (complex frequencies, Hz) inside the band and their flexibilities (k, p), order by order."""
+    p, n = model.receptance.shape
+    if orders < 1:
+        return
+    below = orthogonal_basis(np.tile(model.x, p), (model.weight * model.receptance).ravel(), orders)
+    above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
+    overlap = [
+        basis.values.conj().T @ part for basis, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)
+    ]
+    for order in range(1, orders + 1):
+        left = np.eye(order + 1) - sum(
+            part.conj().T @ part for part in (o[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for o in overlap)
+        )
+        poles = below.roots(np.linalg.eigh(left)[1][:, 0]) * model.half + model.middle
+        poles = poles[_is_inside_band(model, poles)]
+        yield poles, _flexibilities(model, above, poles)
+
+
+def _is_inside_band(model: _LscfModel, poles: Complexes) -> NDArray[np.bool_]:
+    """Which of the poles decay and lie in the band."""
+    size = np.abs(poles)
+    return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
+
+
+def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Complexes) -> Complexes:
+    """Complex 1/K of every pole by linear least squares, shape (k, p)."""
+    fractions = 1 / (model.frequency[:, None] - poles)
+    residues = np.empty((poles.size, len(above)), dtype=np.complex128)
+    for i, basis in enumerate(above):
+        columns = np.hstack([model.weight[i][:, None] * fractions, basis.values[:, : EXTRA_POLYNOMIAL_DEGREE + 1]])
+        columns /= np.linalg.norm(columns, axis=0)
+        gram = columns.conj().T @ columns + LSCF_RIDGE * np.eye(columns.shape[1])
+        fit = np.linalg.solve(gram, columns.conj().T @ (model.weight[i] * model.receptance[i]))[: poles.size]
+        residues[:, i] = fit / np.linalg.norm(model.weight[i][:, None] * fractions, axis=0)
+    return np.asarray(residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None])
+
+
+def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> NDArray[np.int64]:
+    """For each pole its place among the poles of the order below, -1 where it is not there."""
+    if not below[0].size:
+        return np.full(here[0].size, -1)
+    distance = np.abs(here[0][:, None] - below[0])
+    nearest = np.argmin(distance, axis=1)
+    change = np.linalg.norm(here[1] - below[1][nearest], axis=1)
+    same = (distance.min(axis=1) < POLE_TOLERANCE * here[0].imag) & (
+        change < FLEXIBILITY_TOLERANCE * np.linalg.norm(here[1], axis=1)
+    )
+    return np.where(same, nearest, -1)
+
+
+def _build_chart(orders: list[_OrderPoles], p: int) -> StabilisationChart:
+    sizes = np.array([poles.size for poles, _ in orders], dtype=np.int64)
+    starts = np.cumsum(sizes) - sizes
+    previous = [np.full(size, -1) for size in sizes[:1]]
+    for (below, here), start in zip(pairwise(orders), starts, strict=False):
+        same = _match_lower_order(below, here)
+        previous.append(np.where(same < 0, -1, same + start))
+    poles = np.concatenate([poles for poles, _ in orders] or [np.empty(0, complex)])
+    return StabilisationChart(
+        np.repeat(np.arange(1, sizes.size + 1), sizes),
+        np.abs(poles),
+        poles.imag / np.abs(poles),
+        np.concatenate([a for _, a in orders] or [np.empty((0, p), complex)]),
+        np.concatenate([*previous, np.empty(0, np.int64)]),
+    )
+
+
+MIN_STABLE_ORDERS = 4
+"""Orders in a row that a mode is stable in, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalPoles:
+    """Poles that stay where they are as the order grows, m of them, by rising frequency."""
+
+    frequency: NDArray[np.float64]
+    """Undamped natural frequencies (Hz), shape (m,)."""
+    damping_ratio: NDArray[np.float64]
+    """Damping ratios (-), shape (m,)."""
+    flexibility: NDArray[np.complex128]
+    """Modal flexibilities 1/K, complex (m/N), in each of p FRFs, shape (m, p)."""
+    n_orders: NDArray[np.int64]
+    """Orders that each is stable in, shape (m,)."""
+
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """Size of each flexibility in the FRF where it is largest (m/N), shape (m,)."""
+        return np.asarray(np.abs(self.flexibility).max(axis=1))
+
+
+def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
+    """Chains of poles, each the same as that of the order below (by frequency, damping and flexibility).
+
+    Of chains that share a pole the longest counts; a chain of fewer than five poles is none. A mode is the median of
+    the upper half of its chain, part by part.
+
+    >>> line = np.linspace(400.0, 600.0, 201)  # Hz
+    >>> noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, 201))  # m/N, beside a peak of 1.25e-6
+    >>> measured = Mode(500.0, 0.02, 2e7).receptance(line) + noise[0] + 1j * noise[1]
+    >>> compute_lobe_chart = fit_lscf_poles(line, measured[np.newaxis], np.ones((1, 201)), orders=10)
+    >>> poles = select_physical_poles(compute_lobe_chart)  # of all 55 those that stay where they are
+    >>> poles.frequency.round(1).tolist(), poles.damping_ratio.round(3).tolist()  # Hz, -
+    ([500.0], [0.02])
+    """
+    taken = np.zeros(chart.order.size, bool)
+    rows = []
+    lengths = _chain_lengths(chart)
+    for end in np.argsort(-lengths, kind="stable"):
+        if lengths[end] < MIN_STABLE_ORDERS:
+            break
+        chain = _trace_chain(chart, int(end))
+        if not taken[chain].any():
+            rows.append(_median_flexibility(chart, chain))
+        taken[chain] = True
+    rows.sort(key=lambda row: float(row[0].real))
+    table = np.array(rows).reshape(len(rows), 3 + chart.flexibility.shape[1])
+    return PhysicalPoles(table[:, 0].real, table[:, 1].real, table[:, 3:], table[:, 2].real.astype(np.int64))
+
+
+def _chain_lengths(chart: StabilisationChart) -> NDArray[np.int64]:
+    """Stable poles in the chain that ends at each pole."""
+    lengths = np.zeros(chart.order.size, dtype=np.int64)
+    for i in np.flatnonzero(chart.stable):
+        lengths[i] = lengths[chart.previous[i]] + 1
+    return lengths
+
+
+def _trace_chain(chart: StabilisationChart, end: int) -> NDArray[np.int64]:
+    """Places of the poles of the chain that ends here, the last one first."""
+    chain = [end]
+    while chart.previous[chain[-1]] >= 0:
+        chain.append(int(chart.previous[chain[-1]]))
+    return np.array(chain)
+
+
+def _median_flexibility(chart: StabilisationChart, chain: NDArray[np.int64]) -> NDArray[np.complex128]:
+    upper = chain[: (chain.size + 1) // 2]
+    a = chart.flexibility[upper]
+    poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), chain.size - 1]
+    return np.concatenate([poles, np.median(a.real, axis=0) + 1j * np.median(a.imag, axis=0)])

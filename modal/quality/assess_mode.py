@@ -1,0 +1,240 @@
+"""Add quality figures and remarks to a fitted mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf, Remark, is_smoothed
+from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
+from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
+from modal.bands.residual_analysis import residual_near_mode
+from modal.fitting import MIN_RESIDUAL_TERMS
+from modal.modes.measurement_effects import common_delay
+from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
+from modal.quality.trust import MAX_MISFIT_RATIO, MAX_REMAINING_DECAY, MIN_MISFIT_SHARE, relative_error, trust_rules
+
+
+def with_truncation_error(mode: Mode) -> Mode:
+    """The mode with what is left of its decay when the record ends in its errors.
+
+    On the lines of the record (multiples of one over its length T) all of the mode is 1 - exp(lambda T) of itself, with
+    a size of exp(-zeta w T) = left_ringing and a phase that is not known: K and the phase of the modal constant are off
+    by up to that share, by 1/sqrt(2) of it in the mean of squares. f and zeta are so only where the hit came late in
+    the record or zeros were appended to it, by less; they get the same share of zeta f and of zeta. Where more than 5 %
+    is left the errors stay: that is doubtful, and lines that come from no record, but were computed, have none of it.
+
+    Source: integral of exp((lambda - iw) t) from 0 to T.
+
+    >>> mode = Mode(500.0, 0.01, 2e7, np.diag([0.01, 1e-4, 1e5]) ** 2, left_ringing=0.04)
+    >>> [f"{error:.2g}" for error in with_truncation_error(mode).standard_error]  # Hz, -, N/m
+    ['0.14', '0.0003', '5.7e+05']
+    """
+    if not mode.remaining_decay or mode.remaining_decay > MAX_REMAINING_DECAY:
+        return mode
+    share = mode.remaining_decay / np.sqrt(2)
+    off = share * np.array([mode.damping_ratio * mode.frequency, mode.damping_ratio, mode.stiffness])
+    widened = replace(
+        mode, covariance=_widen_covariance(mode.covariance, off), jackknife=_widen_covariance(mode.jackknife, off)
+    )
+    of_phase = min(float(np.hypot(mode.phase_deg_std, np.degrees(share))), UNKNOWN_PHASE_STD_DEG)
+    if mode.phase_correlation is None or mode.best_covariance is None:
+        return replace(widened, phase_deg_std=of_phase)
+    kept = ratio_or_zero(mode.standard_error * mode.phase_deg_std, widened.standard_error * of_phase)
+    return replace(widened, phase_deg_std=of_phase, phase_correlation=mode.phase_correlation * kept)
+
+
+def _widen_covariance(covariance: NDArray[np.float64] | None, off: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """With further independent errors of what has one: a value that a person holds has none."""
+    return None if covariance is None else covariance + np.diag(np.where(np.diag(covariance) > 0, off, 0.0) ** 2)
+
+
+MIN_GOOD_COHERENCE = 0.9
+"""Mean coherence between the half-power points; below it the averaged hits disagree."""
+MAX_CONSTANT_PHASE_DEG = 20.0
+"""Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
+DOMINANT_NEIGHBOUR_RATIO = 20.0
+"""Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
+MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY = 0.005, 0.02
+"""Share of a mode's decay left when the record ends that is said: from the second on, and from the first on where it
+makes most of the error of K."""
+REPORTED_MODE_ERROR = 0.2
+"""Relative standard error of damping ratio or stiffness from which it is said."""
+MIN_SMOOTHED_HALF_WIDTH_LINES = 12.0
+"""Half-power half-width in lines from which smoothing over five of them bends a mode by less than 2 %."""
+MAX_HIT_SCATTER_RATIO = 3.0
+"""Standard error over hits over that of the fit."""
+MAX_HALF_POWER_DIFFERENCE, MIN_HALF_POWER_LINES = 0.25, 4
+"""Share that the damping ratio from the half-power width may differ by, where so many lines lie between its points."""
+
+
+def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
+    """Mode i of a band with its figures of quality and the remarks that follow from them."""
+    share, misfit = residual_near_mode(band, i)
+    figures = replace(
+        mode,
+        coherence=_mode_coherence(state, mode),
+        misfit=misfit,
+        misfit_share=share,
+        edge_distance=_edge_distance(state, mode),
+        remaining_decay=_remaining_decay(state.record_length, mode.damping_ratio * mode.frequency),
+        half_power_damping=_half_power_damping(band, mode),
+    )
+    judged = with_truncation_error(figures)
+    remarks = chain(
+        _edit_remarks(band, i, judged),
+        _position_remarks(state, band, i, judged),
+        _value_remarks(band, i, judged, share),
+        _error_remarks(judged),
+    )
+    return replace(judged, remarks=tuple(remarks))
+
+
+def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
+    word = band.edits[i] if band.edits else ""
+    if word:
+        text = "f_n and zeta held by hand, known without error" if word == FIXED_MODE else f"{word} by hand"
+        yield Remark("by-hand", _frequency_text(mode), text)
+
+
+def _mode_coherence(state: Extraction, mode: Mode) -> float | None:
+    frf = state.frf
+    if frf.coherence is None or not frf.has_random_error:
+        return None
+    distance = np.abs(frf.frequency - mode.frequency)
+    near = distance <= max(mode.damping_ratio * mode.frequency, distance.min())
+    return float(np.mean(frf.coherence[near]))
+
+
+def _edge_distance(state: Extraction, mode: Mode) -> float:
+    """Of a mode from the nearer end of the lines, in its half-power half-widths."""
+    f = state.frf.frequency
+    return float(min(mode.frequency - f[0], f[-1] - mode.frequency) / (mode.damping_ratio * mode.frequency))
+
+
+def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
+    reach = mode.damping_ratio * mode.frequency
+    near = [r for r in band.resonances if abs(r.frequency - mode.frequency) < max(reach, r.half_width)]
+    widths = [r.half_width / r.frequency for r in near]
+    return min(widths, key=lambda width: abs(width - mode.damping_ratio), default=None)
+
+
+def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
+    f, half_width, at = state.frf.frequency, mode.damping_ratio * mode.frequency, _frequency_text(mode)
+    if mode.edge_distance is not None and mode.edge_distance < 1:
+        text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
+        yield Remark("cut-by-edge", at, text, "widen the band")
+    if mode.remaining_decay is not None and mode.remaining_decay > np.clip(
+        _stiffness_error(mode), MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY
+    ):
+        text = f"{100 * mode.remaining_decay:.0f} % of it still rings when the record ends"
+        yield Remark("still-ringing", at, text, "record longer")
+    for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
+        if abs(other - mode.frequency) < 2 * half_width:
+            yield Remark("overlaps", at, f"overlaps with the mode at {other:.1f} Hz")
+    if _has_unfitted_neighbour(state, band, i):
+        text = "a far stronger mode beside it bends the fit: zeta and K may be off by more than their errors"
+        yield Remark("bent-by-neighbour", at, text)
+    if any(abs(suspect - mode.frequency) < half_width for suspect in band.close_frequencies):
+        where = " and ".join(f"{suspect:.0f}" for suspect in band.close_frequencies)
+        text = f"may be several modes, near {where} Hz, too noisy to tell: its K is about that of all of them together"
+        yield Remark("several-modes", at, text, "average more hits")
+
+
+def _stiffness_error(mode: Mode) -> float:
+    """Relative standard error of K (-); 0 where not estimated."""
+    return 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
+
+
+def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool:
+    """Whether what bends mode i is not fitted: a mode beyond the lines, or that by which a strong one is not linear."""
+    at_edge = band.lines.start == 0 or band.lines.stop >= state.frf.frequency.size
+    if at_edge and band.terms > MIN_RESIDUAL_TERMS:
+        return True
+    own, frequency = band.fit.mobility_peak[i], band.fit.frequency[i]
+    fits = [other.fit for other in state.bands]
+    peak = np.concatenate([fit.mobility_peak for fit in fits])
+    distance = np.abs(np.concatenate([fit.frequency for fit in fits]) - frequency)
+    reach = np.concatenate([np.prod(fit.poles, axis=0) for fit in fits])
+    return bool(np.any((peak > DOMINANT_NEIGHBOUR_RATIO * own) & (peak * reach > own * distance)))
+
+
+def _frequency_text(mode: Mode) -> str:
+    return f"{mode.frequency:.0f} Hz"
+
+
+def _remaining_decay(record: float | None, half_width: float) -> float | None:
+    """Share of the decay after the record (s); None where its length is not known."""
+    return None if record is None else float(np.exp(-2 * np.pi * half_width * record))
+
+
+def _value_remarks(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:
+    at, width = _frequency_text(mode), mode.half_power_damping
+    if not mode.is_driving_point:
+        cure = "put the sensor where the hammer hits; if it is there, swap the sign of one of them"
+        yield Remark("not-driving-point", at, "K is negative: sensor and hammer move against each other", cure)
+    error = band.fit.size_error[0, i]
+    if error > MAX_PEAK_FIT_ERROR:
+        text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
+        yield Remark("near-node", at, text, "take a driving point where it moves")
+    elif relative_error(mode) > REPORTED_MODE_ERROR or "uncertain" in dict(trust_rules(mode)):
+        text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
+        yield Remark("uncertain", at, text, "average more hits")
+    if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
+        yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
+    is_wide = (
+        np.sum(np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency)
+        >= MIN_HALF_POWER_LINES
+    )
+    differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
+    if width is not None and differs and is_wide and band.height.size == 1:
+        yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")
+
+
+def _error_remarks(mode: Mode) -> Iterator[Remark]:
+    at = _frequency_text(mode)
+    rules = dict(trust_rules(mode))
+    if "heavy-damping" in rules:
+        text = f"zeta of {100 * mode.damping_ratio:.0f} % without a clear peak: rather the sum of several modes"
+        yield Remark("heavy-damping", at, text)
+    if mode.coherence is not None and mode.coherence < MIN_GOOD_COHERENCE:
+        text = f"coherence {mode.coherence:.2f} at its peak, below {MIN_GOOD_COHERENCE:g}: the hits disagree"
+        yield Remark("low-coherence", at, text, "hit one point in one direction")
+    scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
+    if scatter > MAX_HIT_SCATTER_RATIO:
+        text = f"scatters {scatter:.1f} times more from hit to hit than in the fit"
+        yield Remark("scatter", at, text, "hit one point in one direction, equally hard")
+
+
+def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
+    """All modes of an FRF, those whose modal constants are far off real with a remark."""
+    delay = common_delay(modes)
+    return [_add_phase_remark(mode, 0.0 if delay is None else delay.phase_deg(mode.frequency)) for mode in modes]
+
+
+def _add_phase_remark(mode: Mode, expected: float) -> Mode:
+    if abs(mode.phase_deg - expected) <= max(MAX_CONSTANT_PHASE_DEG, 3 * mode.phase_deg_std):
+        return mode
+    text = f"modal constant {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}° off real"
+    cure = "look for loose clamping, for another mode close to it, and for a delay between the channels"
+    return replace(mode, remarks=(*mode.remarks, Remark("complex-mode", _frequency_text(mode), text, cure)))
+
+
+def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
+    """All modes of an FRF, with a remark on the narrow ones where its lines were smoothed."""
+    step = float(np.mean(np.diff(frf.frequency)))
+    narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
+    if not any(narrow) or not is_smoothed(frf):
+        return [*modes]
+    text = f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: zeta too large, K too small by percents"
+    cure = "export the lines without smoothing or window"
+    return [
+        replace(mode, remarks=(*mode.remarks, Remark("smoothed-lines", _frequency_text(mode), text, cure)))
+        if is_narrow
+        else mode
+        for mode, is_narrow in zip(modes, narrow, strict=True)
+    ]

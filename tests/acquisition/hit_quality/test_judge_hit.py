@@ -1,0 +1,206 @@
+"""The reasons of a verdict: what was found with its figures, the cure, and the limits on either side."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition import (
+    Channel,
+    DataError,
+    Frf,
+    HammeredStructure,
+    Hit,
+    HitFlags,
+    HitVerdict,
+    SimulatedSource,
+    Trigger,
+    average_good_hits,
+    capture_hits,
+    check_hit,
+    compute_cross_spectra,
+    estimate_frf,
+    evaluate_hit,
+)
+
+RATE = 25600.0
+NOTHING = 1e-32
+"""Share of the largest power below which a line has none but for rounding."""
+TIME = np.arange(6400) / RATE - 0.02
+
+
+def hit(*blows: tuple[float, float, float], noise: float = 0.05) -> Hit:
+    """Blows of peak (N), start (s) and foot width (s) on something that rings."""
+    random = np.random.default_rng(3).normal(size=(2, TIME.size))
+    force = noise * random[0]
+    for peak, start, width in blows:
+        inside = (start <= TIME) & (start + width >= TIME)
+        force += np.where(inside, peak * np.sin(np.pi * (TIME - start) / width) ** 4, 0.0)
+    ringing = np.exp(-300 * TIME) * np.sin(2 * np.pi * 1722 * TIME) * (TIME > 0) * 1000
+    return Hit(force, ringing + 0.1 * random[1], RATE, 512)
+
+
+def coded(one: Hit, force_range: float, response_range: float = 2000.0) -> Hit:
+    channels = (Channel("force", 1e-3, 1e-3 * force_range), Channel("acceleration", 1e-3, 1e-3 * response_range))
+    codes = [c.encode(s) for c, s in zip(channels, (one.force, one.acceleration), strict=True)]
+    return Hit.from_codes(np.stack(codes), channels, RATE, 512)
+
+
+@pytest.fixture
+def hits(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Channel]) -> list[Hit]:
+    return list(capture_hits(SimulatedSource(tapper(), channels, RATE, 80_000), Trigger(20.0, 6400, 512)))
+
+
+def test_a_good_hit_has_no_reason() -> None:
+    assert evaluate_hit(hit((200, 0, 0.6e-3))) == HitVerdict(HitFlags.OK, ())
+    assert evaluate_hit(hit((200, 0, 0.6e-3))).text == ""
+
+
+@pytest.mark.parametrize(("start", "when"), [(12e-3, "12 ms after"), (-8e-3, "8 ms before")])
+def test_a_second_touch_is_told_with_its_time_and_size(start: float, when: str) -> None:
+    verdict = evaluate_hit(hit((200, 0, 0.6e-3), (36, start, 0.6e-3)))
+    assert verdict.flags == HitFlags.DOUBLE_HIT
+    told = re.fullmatch(
+        rf"Second peak {when} the main one \((\d+) %\): let the hammer bounce back after the first touch\.",
+        verdict.text,
+    )
+    assert told is not None
+    assert int(told[1]) == pytest.approx(18, abs=1)
+
+
+@pytest.mark.parametrize("width", [1e-3, 2e-3, 4e-3])
+@pytest.mark.parametrize("noise", [0.05, 5.0])
+def test_one_soft_pulse_is_one(width: float, noise: float) -> None:
+    assert evaluate_hit(hit((200, 0, width), noise=noise)).flags == HitFlags.OK
+
+
+def test_drift_and_hum_are_no_second_touch_and_hide_none() -> None:
+    for second in (0.0, 40.0):
+        one = hit((200, 0, 0.6e-3), (second, 15e-3, 0.6e-3))
+        wandering = 5 * np.sin(2 * np.pi * 50 * TIME + 1) + 80 * TIME
+        expected = HitFlags.DOUBLE_HIT if second else HitFlags.OK
+        assert check_hit(replace(one, force=one.force + wandering)) == expected
+
+
+def test_noise_alone_is_no_second_touch_however_long_the_record() -> None:
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        force = 5 * random.normal(size=65536)
+        force[2000:2020] += 200 * np.sin(np.pi * np.arange(20) / 20) ** 2
+        assert HitFlags.DOUBLE_HIT not in check_hit(Hit(force, random.normal(size=65536), RATE, 1990))
+
+
+def test_strength_is_judged_against_the_range() -> None:
+    assert evaluate_hit(coded(hit((200, 0, 0.6e-3)), 230)).flags == HitFlags.OK
+    hard = evaluate_hit(coded(hit((200, 0, 0.6e-3)), 205))
+    assert hard.flags == HitFlags.TOO_HARD
+    assert "97% of the range of 205 N: hit softer or choose a larger force range." in hard.text
+    soft = evaluate_hit(coded(hit((200, 0, 0.6e-3)), 12_000))
+    assert soft.text == "Peak of 198.1 N is below 2% of the range of 12000 N: hit harder."
+    noisy = evaluate_hit(hit((60, 0, 0.6e-3), noise=5.0))
+    assert noisy.flags == HitFlags.TOO_SOFT
+    assert "below 20 times the noise" in noisy.text
+
+
+@pytest.mark.parametrize(("bits", "range_over_peak"), [(12, 10), (14, 5)])
+def test_300_hits_of_few_codes_are_good_though_their_force_has_no_power_at_some_lines(
+    tapper: Callable[..., HammeredStructure], bits: int, range_over_peak: float
+) -> None:
+    force = Channel("force", 2.25e-3, 2.25e-3 * 200 * range_over_peak, bits)
+    pair = (force, Channel("acceleration", 1.02e-3, 5.0, bits))
+    tapping = tapper(force_range=(200.0, 200.0), force_noise=0.0)
+    few_codes = list(capture_hits(SimulatedSource(tapping, pair, RATE, 3_500_000), Trigger(20.0, 6400, 512)))[:300]
+    powers = [compute_cross_spectra([one])[0] for one in few_codes]
+    assert sum(power.min() < NOTHING * power.max() for power in powers) > 50
+    mean = estimate_frf(few_codes[:3])
+    flags = [evaluate_hit(one, mean, (500.0, 2000.0)).flags for one in few_codes]
+    assert flags == [HitFlags.OK] * 300
+
+
+def test_a_force_that_begins_20_db_below_its_largest_value_reaches_no_line(hits: list[Hit]) -> None:
+    """The second derivative of a bell, as behind a high pass: its spectrum is f^2 at low frequencies."""
+    x = (TIME - 0.4e-3) / 0.2e-3
+    swinging = replace(hit((200, 0, 0.6e-3)), force=200 * (1 - x**2) * np.exp(-(x**2) / 2))
+    assert check_hit(swinging) == HitFlags.OK
+    for verdict in (evaluate_hit(swinging, estimate_frf(hits[:3])), evaluate_hit(swinging, band=(500.0, 2000.0))):
+        assert verdict.flags == HitFlags.TOO_SOFT
+        assert verdict.text == "The force at 4 Hz is 20 dB below its largest value: no line can be used: hit harder."
+
+
+def test_clipped_is_not_too_hard_as_well() -> None:
+    assert evaluate_hit(coded(hit((200, 0, 0.6e-3)), 120)).flags == HitFlags.OVERLOAD_FORCE
+
+
+def test_overload_is_certain_by_codes_and_inferred_by_shape() -> None:
+    loud = hit((200, 0, 2e-3))
+    certain = evaluate_hit(coded(loud, 120))
+    assert "inferred" not in certain.text
+    assert "Force cut off at 120 N" in certain.text
+    noise = 0.1 * np.random.default_rng(7).normal(size=TIME.size)
+    saturated = evaluate_hit(replace(loud, force=np.minimum(loud.force, 120) + noise))
+    assert saturated.flags == HitFlags.OVERLOAD_FORCE
+    assert "(inferred from its flat top): hit softer" in saturated.text
+    with pytest.raises(DataError, match=r"hit 1: overload \(force\)\. Force cut off at .* N .*inferred"):
+        average_good_hits([replace(loud, force=np.minimum(loud.force, 120))])
+
+
+def test_lost_scans_are_counted_in_the_reason() -> None:
+    verdict = evaluate_hit(replace(hit((200, 0, 0.6e-3)), lost_scans=7))
+    assert verdict.text.startswith("7 scans are missing in this record: hit again;")
+
+
+def test_a_band_that_the_force_does_not_reach_is_narrow() -> None:
+    """sin^4 of foot width T has |F(f)| ~ 1/(x (1 - x^2) (4 - x^2)) sin(pi x), x = f T: a tenth of F(0) at x = 2.01."""
+    one = hit((200, 0, 2e-3), noise=0.001)
+    reach = 2.01 / 2e-3
+    x = np.array([2.01])
+    assert 4 * np.sin(np.pi * x) / (np.pi * x * (1 - x**2) * (4 - x**2)) == pytest.approx(0.163, abs=0.01)
+    assert evaluate_hit(one).flags == HitFlags.OK
+    assert evaluate_hit(one, band=(100, reach)).flags == HitFlags.OK
+    narrow = evaluate_hit(one, band=(100, 1.3 * reach))
+    assert narrow.flags == HitFlags.NARROW_BAND
+    assert narrow.text.endswith("(-20 dB) of the 1306.5 Hz wanted: use a harder hammer tip.")
+
+
+@pytest.mark.parametrize("gain", [-1.0, 0.6, 1.6])
+def test_another_spot_or_side_is_inconsistent_with_the_mean(hits: list[Hit], gain: float) -> None:
+    mean = estimate_frf(hits[:3])
+    assert evaluate_hit(hits[3], mean).flags == HitFlags.OK
+    other = replace(hits[3], acceleration=gain * hits[3].acceleration, codes=None, channels=None)
+    assert check_hit(other) == HitFlags.OK
+    verdict = evaluate_hit(other, mean)
+    assert verdict.flags == HitFlags.INCONSISTENT
+    assert "away from the mean of 3 hits (limit 30%): hit the same spot" in verdict.text
+
+
+def test_a_hand_that_is_ten_percent_off_is_consistent(hits: list[Hit]) -> None:
+    mean = estimate_frf(hits[:3])
+    other = replace(hits[3], acceleration=1.1 * hits[3].acceleration, codes=None, channels=None)
+    assert evaluate_hit(other, mean).flags == HitFlags.OK
+
+
+def test_two_hits_are_no_mean_to_compare_with(hits: list[Hit]) -> None:
+    other = replace(hits[3], acceleration=-hits[3].acceleration, codes=None, channels=None)
+    assert evaluate_hit(other, estimate_frf(hits[:2])).flags == HitFlags.OK
+
+
+def test_a_hit_with_another_fault_is_not_called_inconsistent_too(hits: list[Hit]) -> None:
+    other = replace(hits[3], acceleration=-hits[3].acceleration, lost_scans=1, codes=None, channels=None)
+    assert evaluate_hit(other, estimate_frf(hits[:3])).flags == HitFlags.LOST_SCANS
+
+
+def test_a_mean_of_another_set_up_is_refused(hits: list[Hit]) -> None:
+    mean = estimate_frf(hits[:3])
+    shorter = Frf(mean.frequency[:-1], mean.receptance[:-1], np.ones(mean.frequency.size - 1), 3)
+    with pytest.raises(ValueError, match="compare hits of one set-up only"):
+        evaluate_hit(hits[3], shorter)
+
+
+def test_new_words_are_read_back() -> None:
+    flags = HitFlags.TOO_HARD | HitFlags.NARROW_BAND | HitFlags.INCONSISTENT
+    assert flags.words == "too hard, narrow band, inconsistent"
+    assert HitFlags.from_words(flags.words) == flags

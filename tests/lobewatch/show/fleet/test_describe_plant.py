@@ -1,0 +1,38 @@
+"""All machines as text: when each is due, and how far it has fallen."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+
+from lobewatch.fleet.fleet import Fleet
+from lobewatch.show.fleet.fleet_status import fleet_rows, fleet_text
+from lobewatch.show.report.report import render_fleet
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+@pytest.mark.parametrize(
+    ("days", "due"),
+    [(28.0, "due in 2 d"), (29.5, "due in 0 d"), (30.5, "1 d overdue"), (33.0, "3 d overdue")],
+)
+def test_days_until_the_next_tap_test_are_whole_and_never_too_many(shop: Shop, days: float, due: str) -> None:
+    shop.tap(0, 1713.0)
+    shop.tap(0, 1690.0, "y")
+    rows = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start + timedelta(days=days)))
+    assert f"2026-01-15, {due}\n" in fleet_text(rows)
+
+
+@pytest.mark.parametrize(
+    ("fall", "std", "shown"), [(10.0642, 0.0803, "10.064 ± 0.080"), (0.0012, 0.00081, "0.00120 ± 0.00081")]
+)
+def test_a_change_has_the_digits_that_its_error_leaves(shop: Shop, fall: float, std: float, shown: str) -> None:
+    shop.tap(0, 1713.0)
+    (row,) = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start))
+    rows = [{**row, "fall": fall, "fall_std": std}]
+    assert f" {shown} " in fleet_text(rows)
+    page = render_fleet(rows, "plant", shop.start)
+    assert f"-{shown} %" in page.replace("\u00a0", " ").replace("\u2060", "")

@@ -2,7 +2,4 @@
 
 from .history import History, HistoryRow
 
-__all__ = [
-    "History",
-    "HistoryRow",
-]
+__all__ = ["History", "HistoryRow"]

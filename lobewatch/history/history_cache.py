@@ -16,6 +16,7 @@ from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
+from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
@@ -117,7 +118,7 @@ class HistoryCache:
             self._size, self._length = stored.sound_bytes if is_current else 0, stored.file_bytes
 
     def _store(self, history: History) -> None:
-        path, hashes = self._folder.history_path, self._hashes or self._folder.machine.program_hashes
+        path, hashes = self._folder.history_path, self._hashes or hash_programs(self._folder.machine)
         if self._stamp_now != self._stamp and self._stamp_now is not None:
             self._read(_cache_header(history))  # another program has written
         same = [*map(is_, history.rows, self._rows), False].index(False)
@@ -152,7 +153,7 @@ def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]
         program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
         for program in machine.program
     }
-    return {name: text + taught[name] for name, text in machine.program_hashes.items()}
+    return {name: text + taught[name] for name, text in hash_programs(machine).items()}
 
 
 def _cache_header(history: History) -> bytes:

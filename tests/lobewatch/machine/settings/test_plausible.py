@@ -175,7 +175,7 @@ def test_what_the_template_holds_is_nobodys() -> None:
     tables["spindle"]["bearing_stiffness_n_per_um"] = 500.0
     tables["program"][0] |= {"tangential_n_per_mm2": 700, "radial_n_per_mm2": 250}
     machine = parse_machine_file(text_of(tables))
-    assert [doubted.code for doubted in find_all_questions(machine)] == ["setting-guessed"]
+    assert [doubted.fault for doubted in find_all_questions(machine)] == ["setting-guessed"]
     guessed = find_template_bearings(machine)
     assert guessed is not None
     assert guessed.key == "bearing_stiffness_n_per_um"

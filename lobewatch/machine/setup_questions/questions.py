@@ -63,11 +63,11 @@ DRIVE_QUESTION = SetupQuestion(
 
 
 DEFAULT_PROGRAM_NAME = "first cut"
-"""Name of the program, where nobody gives it one."""
+"""Name of the first program if the answer has none."""
 SETUP_COEFFICIENT_KEYS = ("tangential_n_per_mm2", "radial_n_per_mm2")
-"""Keys that stand for a material ..."""
+"""Keys of the coefficients that replace a material."""
 SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
-"""... and their values in a new machine.toml, which are nobody's."""
+"""Values of these keys in a new machine.toml."""
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
@@ -100,7 +100,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
-    """Numbers of a tool, and what it is made of where that stands behind them."""
+    """Split an answer into numbers and the tool material."""
     for material in sorted(TOOL_MATERIALS, key=len, reverse=True):
         if answer.strip().casefold().endswith(f" {material.casefold()}"):
             return answer.strip()[: -len(material)], material
@@ -108,7 +108,7 @@ def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
 
 
 def _tool_number(draft: MachineDraft) -> int:
-    """Number of the [[tool]] that is tapped, or of a new one."""
+    """Return the index of the [[tool]] of the tapped tool, or of a new one."""
     number = 0
     while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
         number += 1
@@ -141,7 +141,7 @@ def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 def _set_in_all_cuts(draft: MachineDraft, values: dict[str, TomlValue]) -> MachineDraft:
-    """Reference cut and first program, where there is one."""
+    """Set values of the reference cut and of the first program."""
     draft = draft.set("reference_cut", **values)
     return draft.set("program", 0, **values) if draft.table("program", 0) else draft
 
@@ -205,10 +205,11 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     MATERIAL_QUESTION,
     PROGRAM_QUESTION,
 )
+"""All questions, in their order."""
 
 
 def find_setup_question(name: str) -> SetupQuestion:
-    """SetUpQuestion of a name; ValueError with all of them for one that there is not."""
+    """Return the question of a name; ValueError that lists all names."""
     for question in SETUP_QUESTIONS:
         if question.name == name:
             return question

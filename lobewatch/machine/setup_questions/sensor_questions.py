@@ -20,9 +20,9 @@ from lobewatch.machine.setup_questions.draft import (
 )
 
 SENSITIVITY_KEYS = {"force": "sensitivity_mv_per_n", "acceleration": "sensitivity_mv_per_g"}
-"""Key of the sensitivity of a sensor, by its quantity."""
+"""Key of the sensitivity of a sensor by quantity."""
 NO_HAMMER_ANSWER = "none"
-"""Answer of whoever has no force sensor."""
+"""Answer without a force sensor."""
 
 
 def _current_port(draft: MachineDraft) -> str:
@@ -35,7 +35,7 @@ def _current_port(draft: MachineDraft) -> str:
 
 
 def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
-    """Port, with driver and rate behind it where nobody answers there, or the number of one that was listed."""
+    """Set a port, with driver and rate after it for a silent device, or the number of a listed one."""
     if is_open_answer(answer):
         return draft.set("daq", port=None, driver=None)
     answering = [look.port for look in draft.detected_daqs.values() if look.text]
@@ -59,7 +59,7 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 def _channel_number(quantity: str, draft: MachineDraft) -> int:
-    """Number of a sensor in [[daq.channel]], that of the next one where it is not there yet."""
+    """Return the index of a sensor in [[daq.channel]], or of a new one."""
     quantities = [channel.get("quantity") for channel in draft.table("daq").get("channel", ())]
     return quantities.index(quantity) if quantity in quantities else len(quantities)
 
@@ -99,7 +99,6 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
 
 
 def _set_hammer(draft: MachineDraft, answer: str) -> MachineDraft:
-    """A hammer with its sensor, or none."""
     if answer.strip().casefold() == NO_HAMMER_ANSWER:
         return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
     return _set_sensor("force", draft.set("tap", hammer=None), answer)

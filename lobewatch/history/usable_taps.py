@@ -129,7 +129,7 @@ class UsableTaps:
         damaged = [str(remark) for remark in self.remarks]
         if damaged:
             raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} that can be used: {'; '.join(damaged)}")
-        cure = "take one with lobewatch tap, or replay a recorded file"
+        cure = "take one with session.TapSession, or replay a recorded file"
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
         if self.excluded:
             since += f", but {len(self.excluded)} excluded"

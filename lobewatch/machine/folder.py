@@ -58,7 +58,7 @@ class MachineFolder:
             )
         if not self.toml.exists():
             raise DataError(
-                f"{self.path}: no machine.toml in it; make a machine folder with: lobewatch init {self.path}"
+                f"{self.path}: no machine.toml in it; make a machine folder with: folder_files.make_machine_folder {self.path}"
             )
 
     @property

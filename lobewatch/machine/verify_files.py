@@ -169,7 +169,8 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
     try:
         _ = folder.machine
     except (ValueError, OSError) as error:
-        cure = "correct it; without a way to, move it away: rebuild_files.rebuild_files then takes the copy in the newest tap test"
+        mend = "rebuild_files.rebuild_files then takes the copy in the newest tap test"
+        cure = f"correct it; without a way to, move it away: {mend}"
         yield _damaged_file_remark("machine.toml", format_error(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)

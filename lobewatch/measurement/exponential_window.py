@@ -51,7 +51,7 @@ class Window:
     def __post_init__(self) -> None:
         """Refuse what is no window."""
         if not np.isnan(self.time_constant) and not (np.isfinite(self.time_constant) and self.time_constant > 0):
-            raise ValueError(f"--window: time_constant={self.time_constant} s is not a finite number > 0")
+            raise ValueError(f"Window.time_constant: time_constant={self.time_constant} s is not a finite number > 0")
 
     @classmethod
     def from_options(cls, time_constant: float | None, start: float, hit_at: float | None) -> Self | None:
@@ -64,14 +64,14 @@ class Window:
         """Time from its start to the hit (s); ValueError where the hit is not known or comes before it."""
         if self.hit_at is None and not hits:
             raise ValueError(
-                f"--window {self.time_constant:g}: an FRF does not say when the hit came, and K is too high by "
-                "exp((hit - start)/window); add --hit-at with the seconds from the record's start (the pre-trigger), "
-                "0 where the window begins at the hit"
+                f"Window.time_constant {self.time_constant:g}: an FRF does not say when the hit came, and K is too high by "
+                "exp((hit - start)/window); add Window.hit_at with the seconds from the record's start (the "
+                "pre-trigger), 0 where the window begins at the hit"
             )
         hit_at = float(np.mean([find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
         if not hit_at >= self.start:
             raise ValueError(
-                f"--window-start {self.start:g}: the window begins after the hit at {hit_at:.4g} s; "
+                f"Window.start {self.start:g}: the window begins after the hit at {hit_at:.4g} s; "
                 "both count from the record's start"
             )
         return hit_at - self.start
@@ -83,7 +83,8 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     ValueError where neither says it, or both do and differ.
     """
     if named is None and given is not None and np.isnan(given.time_constant):
-        raise ValueError("--hit-at, --window-start: the file names no window; add --window with its time constant (s)")
+        cure = "add Window.time_constant with its time constant (s)"
+        raise ValueError(f"Window.hit_at, Window.start: the file names no window; {cure}")
     if named is None:
         return given
     window = Window(named) if given is None else given
@@ -92,10 +93,12 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     if np.isnan(window.time_constant):
         raise ValueError(
             "the response lies under a window, and the file does not say how that falls; give the time constant of an "
-            "exponential one with --window, export the file anew where it is another"
+            "exponential one with Window.time_constant, export the file anew where it is another"
         )
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
-        raise ValueError(f"--window {window.time_constant:g}: the file says {named:.4g} s; leave the option out")
+        raise ValueError(
+            f"Window.time_constant {window.time_constant:g}: the file says {named:.4g} s; leave the option out"
+        )
     return window
 
 
@@ -103,8 +106,9 @@ def missing_window_text(named: float | None, given: Window | None) -> str:
     """What is going to be asked of the window over a file that lacks other things, too; empty where nothing is."""
     if (named is None and given is None) or (given is not None and given.hit_at is not None):
         return ""
-    form = "--window with its time constant and " if given is None and named is not None and np.isnan(named) else ""
-    return f"; its response lies under a window: an FRF needs {form}--hit-at, too, with the s from the record's start"
+    is_unknown = given is None and named is not None and np.isnan(named)
+    needed = f"{'Window.time_constant with its time constant and ' if is_unknown else ''}Window.hit_at, too"
+    return f"; its response lies under a window: an FRF needs {needed}, with the s from the record's start"
 
 
 def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], float]:
@@ -150,7 +154,9 @@ def remove_recorded_window(
 
 def _slow_decay_remark(mode: Mode, time_constant: float) -> Remark:
     text = f"decays no faster than the window of {time_constant:.3g} s: no mode behind it, left out"
-    return Remark("slower-than-window", f"{mode.frequency:.0f} Hz", text, "a wrong --window does that to all modes")
+    return Remark(
+        "slower-than-window", f"{mode.frequency:.0f} Hz", text, "a wrong Window.time_constant does that to all modes"
+    )
 
 
 def refit_ringing_modes(

@@ -54,11 +54,8 @@ def read_file_frf(
 
     window, conjugate: as they are said, so that what is missing of them is asked for with all else.
     """
-    accepted, averages, description = (
-        _parse_accepted_flags(accept),
-        description.averages,
-        replace(description, averages=None),
-    )
+    accepted, averages = _parse_accepted_flags(accept), description.averages
+    description = replace(description, averages=None)
     recording = inspect_file(path, description)
     if recording.problems:
         phase = "" if conjugate else _check_phase(path, description)
@@ -67,7 +64,7 @@ def read_file_frf(
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:
-        raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+        raise ValueError(f"Description.averages {averages}: {path.name} holds hits, and they are counted; leave it out")
     frf = _average_hits(path, recording.hits, accepted, description)
     return replace(frf, facts=recording.facts, recorded_window=recording.window)
 
@@ -110,14 +107,18 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            raise ValueError(f"--accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}")
+            raise ValueError(
+                f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}"
+            )
         accepted |= flags[code]
     return accepted
 
 
 def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
     frf, windowed, tau = window_ringing_hits(hits)
-    remark = own_window_remark("", tau, "a longer record needs none; --accept not-decayed takes the hits as they are")
+    remark = own_window_remark(
+        "", tau, "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
+    )
     return FileFrf(frf, windowed, tau, (remark,))
 
 
@@ -125,13 +126,15 @@ def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
     """An FRF of a file with the number of hits behind its coherence: as asked, else as the file says, else inferred."""
     if averages is not None:
         if averages < 1:
-            raise ValueError(f"--averages {averages}: give the number of hits averaged, 1 or more")
+            raise ValueError(f"Description.averages {averages}: give the number of hits averaged, 1 or more")
         if frf.coherence is None:
-            raise ValueError(f"--averages {averages}: {path.name} has no coherence to use it with; leave it out")
+            raise ValueError(
+                f"Description.averages {averages}: {path.name} has no coherence to use it with; leave it out"
+            )
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = infer_averages(frf), "give it with --averages"
+    inferred, cure = infer_averages(frf), "give it with Description.averages"
     if inferred is None:
         text = "the coherence is not used: the number of averages is not known and cannot be inferred"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))

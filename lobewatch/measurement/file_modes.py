@@ -106,7 +106,9 @@ def fit_file_modes(
     file_frf = read_file_frf(path, accept, description or Description(), window, conjugate=conjugate)
     if file_frf.frf is None:
         if window is not None or conjugate:
-            raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")
+            raise ValueError(
+                "Window.time_constant, Window.hit_at and fit_file_modes.conjugate are of hits with their force; leave them out"
+            )
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
     frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
     hits = () if conjugate else file_frf.hits
@@ -203,7 +205,9 @@ def _check_delay(modes: Sequence[Mode]) -> Iterator[Remark]:
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
         text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
-        cure = "measure it with lobewatch sensors --skew, or add that to skew_us of the accelerometer in machine.toml"
+        cure = (
+            "measure it with sensor_checks.check_skew, or add that to skew_us of the accelerometer in machine.toml"
+        )
         yield Remark("channel-delay", "", text, cure)
 
 
@@ -224,7 +228,9 @@ def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], other
     """
     for place, (text, other) in enumerate(zip(beside, others, strict=True)):
         if any(_is_same_measurement(other, one) for one in (file_modes, *others[:place])):
-            raise ValueError(f"--beside {text}: the same numbers are looked at already; name another measurement")
+            raise ValueError(
+                f"list_comparison_files.beside {text}: the same numbers are looked at already; name another measurement"
+            )
     found = [other.fitted for other in others]
     as_recorded, fitted = (tuple(match_modes(modes, found)) for modes in (file_modes.as_recorded, file_modes.fitted))
     return replace(file_modes, as_recorded=as_recorded, fitted=fitted)

@@ -21,6 +21,22 @@ from typing import Any, NamedTuple, TypeVar, cast
 from acquisition import DataError, Remark
 from lobewatch.measurement.software import CURRENT_SOFTWARE, SoftwareVersions
 
+_log = logging.getLogger(__name__)
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class WorkerPool(NamedTuple):
+    """The workers as they are reached."""
+
+    executor: Executor
+    """Executor that gives them their tasks."""
+    worker_count: int
+    """Number of workers."""
+    wait_for_result: Callable[[Future[Any]], Any]
+    """Function that waits for a result."""
+
+
 ENCRYPTED_SCHEMES = ("tls", "wss")
 """Schemes of addresses under which Dask encrypts."""
 SCHEDULER_TIMEOUT = 10.0
@@ -39,7 +55,7 @@ def scheduler_remarks(address: str) -> list[Remark]:
     if scheme in ENCRYPTED_SCHEMES or _is_local_host(host):
         return []
     text = "unencrypted, and whoever can reach it can run programs on all its computers and on this one"
-    return [Remark("scheduler-open", f"--scheduler {address}", text, "use tls:// (docs/performance-replay.md)")]
+    return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "use tls:// (docs/performance-replay.md)")]
 
 
 def _parse_scheduler_address(address: str) -> tuple[str, str]:
@@ -47,12 +63,14 @@ def _parse_scheduler_address(address: str) -> tuple[str, str]:
     try:
         from distributed.comm import get_address_host_port, parse_address
     except ImportError as error:
-        raise DataError(f'--scheduler {address}: needs Dask; install it: pip install "lobewatch[fleet]"') from error
+        raise DataError(
+            f'Workers.scheduler {address}: needs Dask; install it: pip install "lobewatch[fleet]"'
+        ) from error
     try:
         return parse_address(address)[0], get_address_host_port(address)[0]
     except ValueError as error:
         allowed = "give tls://HOST:PORT, or tcp://HOST:PORT"
-        raise DataError(f"--scheduler {address}: is no address of a scheduler ({error}); {allowed}") from error
+        raise DataError(f"Workers.scheduler {address}: is no address of a scheduler ({error}); {allowed}") from error
 
 
 def _is_local_host(host: str) -> bool:
@@ -73,11 +91,12 @@ async def _probe_scheduler(address: str) -> None:
 
 
 @contextmanager
-def connect_cluster(address: str) -> Iterator[tuple[Executor, int, Callable[[Future[Any]], Any]]]:
-    """The executor of the scheduler at an address, how many its workers are, and what waits for a result.
+def connect_cluster(address: str) -> Iterator[WorkerPool]:
+    """Connect to the workers of the scheduler at an address.
 
-    DataError where none answers, it has no workers for a minute, or it is lost.
+    Raises DataError if none answers, it has no workers for a minute, or it is lost.
     """
+    option = f"Workers.scheduler {address}"
     _parse_scheduler_address(address)
     from distributed import Client, KilledWorker
 
@@ -87,20 +106,21 @@ def connect_cluster(address: str) -> Iterator[tuple[Executor, int, Callable[[Fut
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as error:
         cure = "start one with: dask scheduler (tls:// and certificates: docs/performance-replay.md)"
-        raise DataError(f"--scheduler {address}: no Dask scheduler answers there ({error}); {cure}") from error
+        raise DataError(f"{option}: no Dask scheduler answers there ({error}); {cure}") from error
     with client:
         _wait_for_workers(client, address)
         try:
             with client.get_executor(pure=False) as executor:
-                yield executor, len(client.nthreads()), lambda future: _wait_for_result(client, address, future)
+                count = len(client.nthreads())
+                yield WorkerPool(executor, count, lambda future: _wait_for_result(client, address, future))
         except KilledWorker as error:
-            raise DataError(f"--scheduler {address}: a task has ended several workers ({error})") from error
+            raise DataError(f"{option}: a task has ended several workers ({error})") from error
         except ModuleNotFoundError as error:
-            raise DataError(f"--scheduler {address}: {error} on a worker; install lobewatch there, too") from error
+            raise DataError(f"{option}: {error} on a worker; install lobewatch there, too") from error
         except (CancelledError, OSError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise
-            raise DataError(f"--scheduler {address}: the scheduler was lost; nothing is stored") from error
+            raise DataError(f"{option}: the scheduler was lost; nothing is stored") from error
 
 
 def _wait_for_workers(client: Any, address: str) -> None:
@@ -110,7 +130,7 @@ def _wait_for_workers(client: Any, address: str) -> None:
         if client.status != "running":
             raise CancelledError
         if time.monotonic() - begin > WORKER_TIMEOUT:
-            raise DataError(f"--scheduler {address}: it has no workers; start some with: dask worker {address}")
+            raise DataError(f"Workers.scheduler {address}: it has no workers; start some with: dask worker {address}")
         time.sleep(WORKER_START_POLL_INTERVAL)
 
 
@@ -124,23 +144,12 @@ def _wait_for_result(client: Any, address: str, future: Future[Any]) -> Any:
             _wait_for_workers(client, address)
 
 
-_log = logging.getLogger(__name__)
-Task = TypeVar("Task")
-Result = TypeVar("Result")
 TASKS_PER_WORKER = 3
 """Tasks that each worker has been given at most: those behind them and their results are in no memory; chosen."""
 
 TASK_ERRORS = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    EOFError,
-    LookupError,
-    MemoryError,
-    PickleError,
-    RuntimeError,
-    TypeError,
-    ValueError,
+    *(ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError),
+    *(PickleError, RuntimeError, TypeError, ValueError),
 )
 """Errors of the work itself; those of the way to it are others."""
 
@@ -157,7 +166,7 @@ class Workers:
     def __post_init__(self) -> None:
         """Refuse both at once."""
         if self.jobs > 1 and self.scheduler:
-            raise ValueError(f"--jobs {self.jobs} and --scheduler {self.scheduler}: give one of them")
+            raise ValueError(f"Workers.jobs {self.jobs} and Workers.scheduler {self.scheduler}: give one of them")
 
     @property
     def use_other_processes(self) -> bool:
@@ -170,27 +179,11 @@ class Workers:
         return scheduler_remarks(self.scheduler) if self.scheduler else []
 
 
-class WorkerPool(NamedTuple):
-    """The workers as they are reached."""
-
-    executor: Executor
-    """Executor that gives them their tasks."""
-    worker_count: int
-    """Number of workers."""
-    wait_for_result: Callable[[Future[Any]], Any]
-    """Function that waits for a result."""
-
-
-def accept_any(_task: object, _result: object) -> bool:
-    """Take every result."""
-    return True
-
-
 def share_work(
     work: Callable[[Task], Result],
     tasks: Iterable[Task],
     workers: Workers,
-    is_result: Callable[[Task, Any], bool] = accept_any,
+    is_result: Callable[[Task, Any], bool] = lambda _task, _result: True,
 ) -> Iterator[Result]:
     """Results of `work`, a function of a module that depends on its argument alone, for each task, in order.
 
@@ -226,15 +219,15 @@ def share_work(
 @contextmanager
 def _open_pool(workers: Workers) -> Iterator[WorkerPool]:
     if workers.scheduler:
-        with connect_cluster(workers.scheduler) as (executor, n, result):
-            yield WorkerPool(executor, n, result)
+        with connect_cluster(workers.scheduler) as pool:
+            yield pool
         return
     try:
         with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as pool:
             yield WorkerPool(pool, workers.jobs, lambda future: future.result())
     except BrokenProcessPool as error:
         text = f"one of the {workers.jobs} processes was ended from outside; nothing is stored"
-        raise DataError(f"{text}; try again with fewer --jobs") from error
+        raise DataError(f"{text}; try again with fewer Workers.jobs") from error
 
 
 _task_lock = threading.Lock()

@@ -96,7 +96,9 @@ def _compute_cut_lobes(
     if method is LobeMethod.ZERO_ORDER:
         return mean
     if isinstance(x, Frf) or isinstance(y, Frf):
-        raise ValueError("--method semi-discretisation works from the modes; leave --source frf out")
+        raise ValueError(
+            "compute_lobe_chart.method semi-discretisation works from the modes; leave LobeChart.source frf out"
+        )
     speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MAX_CHART_SPEEDS, speed_rpm.size))
     lowest = mean.minimum.depth
     return stability_boundary(x, y, cut, speeds, MAX_CHART_DEPTH_RATIO * lowest if np.isfinite(lowest) else 0.1)

@@ -53,8 +53,9 @@ class Broker(NamedTuple):
         """Reason why the password of the environment is not used; empty otherwise."""
         if not self.user or self.password or not os.environ.get(PASSWORD_VARIABLE):
             return ""
-        named = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
-        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {named}; set it to {self.host_port} if this broker may have it"
+        host = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
+        cure = f"set it to {self.host_port} if this broker may have it"
+        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {host}; {cure}"
 
 
 class NotifyTable(TomlTable, frozen=True):

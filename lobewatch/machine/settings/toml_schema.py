@@ -48,7 +48,8 @@ def explain_validation_error(message: str, tables: Mapping[str, Any], root: type
     where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
     unknown, choice = re.search(r"unknown field `(\w+)`", text), re.search(r"Invalid enum value (.+)", text)
     if unknown:
-        text = f"unknown key {unknown[1]!r}{_suggest_spelling(unknown[1], _find_table_type(place, root).__struct_encode_fields__)}"
+        keys = _find_table_type(place, root).__struct_encode_fields__
+        text = f"unknown key {unknown[1]!r}{_suggest_spelling(unknown[1], keys)}"
     elif choice:
         allowed = _list_choices(place, root)
         text = f"{choice[1]} is none of {', '.join(map(repr, allowed))}{_suggest_spelling(choice[1], allowed)}"

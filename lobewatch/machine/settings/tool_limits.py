@@ -22,7 +22,8 @@ from lobewatch.machine.settings.machine_file import USER_SOURCE, Machine
 
 PROGRAM_KEYS_BY_TOOL_FIELD: Mapping[str, str] = {
     **{name: name for name in ("teeth", "helix_deg", "flute_length_mm", "pitch_deg")},
-    **{"diameter_mm": "tool_diameter_mm", "feed_mm": "feed_per_tooth_mm"},
+    "diameter_mm": "tool_diameter_mm",
+    "feed_mm": "feed_per_tooth_mm",
 }
 """Fields of a tool that its programs have too, with the key in a [[program]]."""
 

@@ -128,10 +128,6 @@ class MachineDraft:
         return self
 
 
-def _always_ask(_: MachineDraft) -> str:
-    return ""
-
-
 @dataclass(frozen=True)
 class SetupQuestion:
     """Question about a setting that only a person knows."""
@@ -146,30 +142,14 @@ class SetupQuestion:
     """Function that returns the present answer, "-" if left open, "" without one."""
     apply_answer: Callable[[MachineDraft, str], MachineDraft]
     """Function that applies an answer; ValueError for an invalid one."""
-    skip_reason: Callable[[MachineDraft], str] = _always_ask
+    skip_reason: Callable[[MachineDraft], str] = lambda _: ""
     """Function that returns the reason to skip the question, else an empty text."""
 
 
 OPEN_ANSWER = "-"
 """Answer that leaves a question open."""
-ANSWER_UNITS = (
-    "rpm",
-    "1/min",
-    "mm",
-    "mm/tooth",
-    "deg",
-    "°",
-    "kw",
-    "nm",
-    "n·m",
-    "mv/n",
-    "mv/g",
-    "g",
-    "v",
-    "teeth",
-    "flutes",
-    "x",
-)
+ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
+ANSWER_UNITS |= {"teeth", "flutes"}
 """Units that may stand between numbers."""
 ANSWER_NUMBER_PATTERN = re.compile(r"\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
 

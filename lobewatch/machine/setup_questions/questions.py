@@ -14,12 +14,7 @@ from lobewatch.machine.setup_questions.draft import (
     is_open_answer,
     parse_numbers,
 )
-from lobewatch.machine.setup_questions.sensor_questions import (
-    ACCELEROMETER_QUESTION,
-    DAQ_QUESTION,
-    HAMMER_QUESTION,
-    MOUNTING_QUESTION,
-)
+from lobewatch.machine.setup_questions.sensor_questions import SENSOR_QUESTIONS
 
 
 def _current_name(draft: MachineDraft) -> str:
@@ -162,24 +157,23 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     speed, depth, radial, *feed = parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
-    own: dict[str, TomlValue] = {
-        "name": name.strip() if colon else DEFAULT_PROGRAM_NAME,
-        "tool": draft.table("tap")["tool"],
-    }
-    setting = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
-    return draft.set("program", 0, **own, **shared, **setting, feed_per_tooth_mm=feed[0] if feed else None)
+    name = name.strip() if colon else DEFAULT_PROGRAM_NAME
+    setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
+    setting["feed_per_tooth_mm"] = feed[0] if feed else None
+    return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
 TOOL_QUESTION = SetupQuestion(
     "tool",
-    f"The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of {_TOOL_MATERIALS_TEXT}?",
+    "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of "
+    f"{_TOOL_MATERIALS_TEXT}?",
     "4 20 30 80 coated carbide",
     _current_tool,
     _set_tool,
 )
 MATERIAL_QUESTION = SetupQuestion(
     "material",
-    "What does it cut? A material (lobewatch materials lists them), or Kt and Kr (N/mm2)",
+    "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)",
     "42CrMo4, 1.7225, AA 6061, 700 250",
     _current_material,
     _set_material,
@@ -197,10 +191,7 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     NAME_QUESTION,
     SPEEDS_QUESTION,
     DRIVE_QUESTION,
-    DAQ_QUESTION,
-    HAMMER_QUESTION,
-    ACCELEROMETER_QUESTION,
-    MOUNTING_QUESTION,
+    *SENSOR_QUESTIONS,
     TOOL_QUESTION,
     MATERIAL_QUESTION,
     PROGRAM_QUESTION,
@@ -213,6 +204,5 @@ def find_setup_question(name: str) -> SetupQuestion:
     for question in SETUP_QUESTIONS:
         if question.name == name:
             return question
-    raise ValueError(
-        f"--edit {name}: no such question; there are {', '.join(question.name for question in SETUP_QUESTIONS)}"
-    )
+    names = ", ".join(question.name for question in SETUP_QUESTIONS)
+    raise ValueError(f"find_setup_question.name {name}: no such question; there are {names}")

@@ -1,4 +1,4 @@
-"""history.rows: what it still holds, and its place on the disk."""
+"""Cache of the history in history.rows."""
 
 from __future__ import annotations
 
@@ -20,16 +20,15 @@ from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
-"""Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
+"""Size of obsolete rows, besides that of the valid ones, above which the file is rewritten."""
 UNPLACED_ROW_NUMBER = -1
-"""Number of rows that are kept beside the history."""
+"""Number of rows outside of the history."""
 
 
 class HistoryCache:
-    """The file of one machine; it knows what is on the disk, and adds to it."""
+    """Cache file of one machine, read and appended to."""
 
     def __init__(self, folder: MachineFolder) -> None:
-        """Nothing is read yet."""
         self._folder = folder
         self._rows: list[HistoryRow] = []
         self._contents: list[bytes] = []
@@ -46,13 +45,13 @@ class HistoryCache:
 
     @property
     def other_rows(self) -> Mapping[str, HistoryRow]:
-        """Rows that were read beside those of these settings and this version, by tap test."""
+        """Rows of other settings or versions by tap test."""
         return self._others
 
     def read(self, files: UsableTaps) -> History:
-        """The rows of the oldest taps on, as far as they were made with these settings and this version.
+        """Read the oldest rows that are valid for these settings and this version.
 
-        Rows of tap tests whose files cannot be used are kept aside.
+        Rows of tap tests with unusable files are kept aside.
         """
         empty, lost_ids = make_empty_history(self._folder.machine), {entry.id for entry in files.lost}
         hashes = _hash_programs(self._folder.machine, files.cuts)
@@ -67,7 +66,7 @@ class HistoryCache:
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def _count_fitting(self, places: Sequence[TapPlace]) -> int:
-        """Rows that are those of these tap tests; places: those that were compared before are not looked at again."""
+        """Count the rows that belong to these places; those compared before are not compared again."""
         compared, count = self._fitting
         count = min(count, len(self._rows)) if compared is places else 0
         for row, place in zip(self._rows[count:], places[count:], strict=False):
@@ -78,7 +77,7 @@ class HistoryCache:
         return count
 
     def store(self, history: History) -> None:
-        """Write what is new of it, under the lock where that can be had at once; else a remark says so."""
+        """Write new rows if the lock is free at once, else add a remark."""
         try:
             with self._folder.locked(patience=0):
                 self._store(history)
@@ -89,7 +88,7 @@ class HistoryCache:
 
     @property
     def _stamp_now(self) -> tuple[int, ...] | None:
-        """Another one where somebody else has written the file; None where there is none."""
+        """Stamp of the file, which another program changes; None without a file."""
         try:
             status = self._folder.history_path.stat()
         except OSError:
@@ -148,7 +147,7 @@ class HistoryCache:
 
 
 def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
-    """Hash of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
+    """Return the hash of all that decides the verdict on each program, test cuts of its tool included."""
     taught = {
         program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
         for program in machine.program

@@ -61,7 +61,6 @@ def make_machine_folder(folder: Path, template: str) -> Path:
 
     Examples
     --------
-
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as parent:

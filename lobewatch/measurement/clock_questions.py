@@ -1,6 +1,6 @@
 """Check the date of a tap test against the clock.
 
-Imported with every look at a plant, so without numpy and tap files.
+The fleet overview imports this module, so it needs neither numpy nor tap files.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ CLOCK_QUESTIONS = {
 
 
 def is_in_future(time: datetime, now: datetime) -> bool:
-    """Whether a time lies in the future, whatever its zone."""
+    """Tell whether a time is in the future, whatever its time zone."""
     return time - now > MAX_TIME_AHEAD
 
 
 def clock_question(code: str, time: str) -> Remark:
-    """The question of a code; time: of the test (ISO 8601)."""
+    """Return the question of a code about the time of a test (ISO 8601); KeyError for an unknown code."""
     when = f"{datetime.fromisoformat(time).astimezone(UTC):%Y-%m-%d %H:%M} UTC"
     cure = "put the clock of the computer right and tap again; exclude the test with the wrong time"
     return Remark(
@@ -40,7 +40,7 @@ def clock_question(code: str, time: str) -> Remark:
 
 
 def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | str) -> Iterator[Remark]:
-    """Remark on a newest test of the future: the clock was wrong then, or is now. path: of the folder."""
+    """Yield a remark on a newest test with a date in the future; path: machine folder."""
     if is_in_future(time, now):
         out = f"{shlex.join(['lobewatch', 'exclude', str(path), tap_id])} exclude_entry.reason 'clock was wrong'"
         cure = f"Put the clock right; if it was wrong at that test, take it out and tap again: {out}"

@@ -26,33 +26,33 @@ from modal import ConjugateError, pick_peaks
 ACCEPTABLE_FLAGS = (
     HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 )
-"""Verdicts that can be accepted: a hit with others has no single pulse, or not all of its scans."""
+"""Faults of hits that can be accepted; hits with others have no single pulse, or lost scans."""
 
 
 @dataclass(frozen=True, eq=False)
 class FileFrf:
-    """An FRF with the hits behind it."""
+    """FRF of a recorded file with its hits."""
 
     frf: Frf | None
-    """FRF as it was read, or the average of the hits; None where no force was measured."""
+    """FRF of the file, or the average of its hits; None without force."""
     hits: tuple[Hit, ...] = ()
-    """Hits that it was averaged from; none where the file holds only an FRF."""
+    """Averaged hits; empty if the file contains only an FRF."""
     time_constant: float | None = None
-    """Time constant of the window that was laid over all hits here (s); None where none was."""
+    """Time constant of our own window over all hits (s); None without one."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what was done to the hits."""
     facts: tuple[Fact, ...] = ()
-    """Facts known of the file, and where each is from."""
+    """Facts of the file with their origins."""
     recorded_window: float | None = None
-    """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
+    """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
 
 
 def read_file_frf(
     path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
 ) -> FileFrf:
-    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `fit_file_modes`.
+    """Read the FRF of a file with its hits; see `fit_file_modes`.
 
-    window, conjugate: as they are said, so that what is missing of them is asked for with all else.
+    window, conjugate: as given, so that missing window data is requested together with all other missing data.
     """
     accepted, averages = _parse_accepted_flags(accept), description.averages
     description = replace(description, averages=None)
@@ -70,7 +70,7 @@ def read_file_frf(
 
 
 def _check_phase(path: Path, description: Description) -> str:
-    """What is wrong with the phase of an FRF that only its unit or its number is missing of; empty where nothing is."""
+    """Return the fault of the phase of an FRF whose unit or response number is missing, else an empty text."""
     unit, response = description.unit or "m/N", description.response or 1
     frf = inspect_file(path, replace(description, unit=unit, response=response)).frf
     try:
@@ -123,7 +123,7 @@ def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
 
 
 def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
-    """An FRF of a file with the number of hits behind its coherence: as asked, else as the file says, else inferred."""
+    """Set the number of averages behind the coherence: as given, else as in the file, else inferred."""
     if averages is not None:
         if averages < 1:
             raise ValueError(f"Description.averages {averages}: give the number of hits averaged, 1 or more")

@@ -187,7 +187,6 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
 
     Examples
     --------
-
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as parent:

@@ -18,7 +18,7 @@ from lobewatch import Logbook
 from lobewatch.logbook.rebuild_history import rebuild_history
 from lobewatch.logbook.replay_preview import preview_replay
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.measurement.share_work import WorkerPool, Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit
 
 SAID = Description(date_pattern="%Y-%m-%d")
@@ -36,9 +36,9 @@ def spoiled(monkeypatch: pytest.MonkeyPatch) -> Callable[[Spoil], None]:
             return spoil(answer) if whole else (software, spoil(answer))
 
         @contextmanager
-        def cluster(_address: str) -> Iterator[Any]:
+        def cluster(_address: str) -> Iterator[WorkerPool]:
             with ThreadPoolExecutor(2) as pool:
-                yield pool, 2, result
+                yield WorkerPool(pool, 2, result)
 
         monkeypatch.setattr("lobewatch.measurement.share_work.connect_cluster", cluster)
 

@@ -208,17 +208,8 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
 def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
     kept = [entry for entry in read_stored_devices(folder) if not _is_same_device(entry, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    new = StoredDevice(
-        device.identity.model,
-        device.identity.serial,
-        device.sample_rate,
-        measured.rate,
-        measured.std,
-        measured.n_scans,
-        measured.seconds,
-        now,
-    )
-    content = msgspec.json.format(
-        msgspec.json.encode([*kept, msgspec.structs.replace(new, crc=new.computed_crc)]), indent=2
-    )
+    identity, numbers = device.identity, (measured.rate, measured.std, measured.n_scans, measured.seconds)
+    new = StoredDevice(identity.model, identity.serial, device.sample_rate, *numbers, now)
+    new = msgspec.structs.replace(new, crc=new.computed_crc)
+    content = msgspec.json.format(msgspec.json.encode([*kept, new]), indent=2)
     atomic_write(folder.path / "daq.json", content + b"\n")

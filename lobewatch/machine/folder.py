@@ -14,15 +14,7 @@ import msgspec
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from acquisition.file_io import make_folder, sync_folder
-from lobewatch.machine.folder_contents import (
-    FolderContents,
-    find_file_fault,
-    list_tap_files,
-    missing_journal_remark,
-    read_committed_taps,
-    read_folder_contents,
-    tap_damage_remark,
-)
+from lobewatch.machine import folder_contents
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
@@ -51,15 +43,12 @@ class MachineFolder:
         """Path of the folder."""
         if format_path(path) != str(path):
             raise DataError(f"{format_path(path)}: the name of the folder is no UTF-8; rename it")
-        if not self.toml.exists() and list_tap_files(self.path):
-            raise DataError(
-                f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, "
-                f"{format_command('rebuild', self.path)} takes the copy in the newest of them"
-            )
+        if not self.toml.exists() and folder_contents.list_tap_files(self.path):
+            mend = f"{format_command('rebuild', self.path)} takes the copy in the newest of them"
+            raise DataError(f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, {mend}")
         if not self.toml.exists():
-            raise DataError(
-                f"{self.path}: no machine.toml in it; make a machine folder with: folder_files.make_machine_folder {self.path}"
-            )
+            cure = f"make a machine folder with: folder_files.make_machine_folder {self.path}"
+            raise DataError(f"{self.path}: no machine.toml in it; {cure}")
 
     @property
     def toml(self) -> Path:
@@ -117,9 +106,9 @@ class MachineFolder:
         """
         return self._lock.hold(patience)
 
-    def contents(self) -> FolderContents:
+    def contents(self) -> folder_contents.FolderContents:
         """Read the committed tap tests and the state of their files."""
-        return read_folder_contents(self.path, self.journal.read())
+        return folder_contents.read_folder_contents(self.path, self.journal.read())
 
     def taps(self) -> list[TapEntry]:
         """Return the usable tap tests, oldest first."""
@@ -128,7 +117,7 @@ class MachineFolder:
     @property
     def committed_ids(self) -> set[str]:
         """Identities of all tap tests in the journal."""
-        return set(read_committed_taps(self.journal.read()))
+        return set(folder_contents.read_committed_taps(self.journal.read()))
 
     def refuse_damage(self) -> JournalReading:
         """Read the journal; DataError if it must be repaired before writing."""
@@ -136,7 +125,14 @@ class MachineFolder:
         self.journal.refuse_damage(reading)
         if not reading.lines and any(remark.code == "journal-damaged" for remark in self.contents().remarks):
             self.journal.refuse_damage(
-                replace(reading, damage=(missing_journal_remark(self.path, len(list_tap_files(self.path))),))
+                replace(
+                    reading,
+                    damage=(
+                        folder_contents.missing_journal_remark(
+                            self.path, len(folder_contents.list_tap_files(self.path))
+                        ),
+                    ),
+                )
             )
         return reading
 
@@ -153,9 +149,9 @@ class MachineFolder:
         DamagedTapError
             If the file is not the committed one.
         """
-        fault = find_file_fault(self.path, entry)
+        fault = folder_contents.find_file_fault(self.path, entry)
         if fault:
-            raise DamagedTapError(tap_damage_remark(self.path, entry, fault), entry, self.path)
+            raise DamagedTapError(folder_contents.tap_damage_remark(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
             return read_tap(path)

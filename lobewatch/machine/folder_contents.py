@@ -12,17 +12,8 @@ from pathlib import Path
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
+from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
-from lobewatch.machine.journal.entries import (
-    Acknowledgement,
-    FleetScatter,
-    MaintenanceEvent,
-    read_acknowledgements,
-    read_events,
-    read_exclusion_reasons,
-    read_fleet_scatters,
-    read_mode_edits,
-)
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
 from lobewatch.machine.journal.tap_entry import NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
@@ -43,15 +34,15 @@ class FolderContents:
     """Committed tap tests with damaged files, oldest first."""
     remarks: tuple[Remark, ...]
     """Remarks on damage."""
-    events: tuple[MaintenanceEvent, ...] = ()
+    events: tuple[journal_entries.MaintenanceEvent, ...] = ()
     """Maintenance of the machine, oldest first."""
     line_count: int = 0
     """Number of lines of the journal."""
     cuts: tuple[CutEntry, ...] = ()
     """Test cuts, oldest first, excluded ones included."""
-    acknowledgements: tuple[Acknowledgement, ...] = ()
+    acknowledgements: tuple[journal_entries.Acknowledgement, ...] = ()
     """Acknowledgements of alarms, oldest first."""
-    fleet_scatters: tuple[FleetScatter, ...] = ()
+    fleet_scatters: tuple[journal_entries.FleetScatter, ...] = ()
     """Scatter of the other machines of the fleet, oldest first."""
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
@@ -70,7 +61,7 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     """Read the contents that the journal and taps/ prove together."""
     committed = read_committed_taps(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
-    events = read_events(reading.other_entries)
+    events = journal_entries.read_events(reading.other_entries)
     sizes, given_up, proved = _list_tap_sizes(folder), read_given_up_ids(reading), 0
     for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
         proved += entry.size
@@ -97,13 +88,16 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = read_committed_cuts(reading)
-    words = read_acknowledgements(reading.other_entries), read_fleet_scatters(reading.other_entries)
+    words = (
+        journal_entries.read_acknowledgements(reading.other_entries),
+        journal_entries.read_fleet_scatters(reading.other_entries),
+    )
     return FolderContents(tuple(taps), _sort_by_time(lost), tuple(remarks), events, len(reading.lines), cuts, *words)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
     """Read the test cuts of the journal, oldest first."""
-    return read_cuts(reading.other_entries, read_exclusion_reasons(reading.other_entries))
+    return read_cuts(reading.other_entries, journal_entries.read_exclusion_reasons(reading.other_entries))
 
 
 def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
@@ -112,7 +106,10 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
     for line in reading.other_entries:
         if line["kind"] == "accept":
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
-    excluded, by_hand = read_exclusion_reasons(reading.other_entries), read_mode_edits(reading.other_entries)
+    excluded, by_hand = (
+        journal_entries.read_exclusion_reasons(reading.other_entries),
+        journal_entries.read_mode_edits(reading.other_entries),
+    )
     entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
     for line in reading.other_entries:
         if line["kind"] == "tap":

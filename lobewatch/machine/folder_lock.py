@@ -71,7 +71,7 @@ class FolderLock:
     """Lock of one folder; a thread may hold it several times over."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._thread = folder, _ThreadState()
+        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, _ThreadState()
 
     @contextlib.contextmanager
     def hold(self, patience: float) -> Iterator[None]:
@@ -113,10 +113,6 @@ class FolderLock:
                 holder = self._read_holder() or "another lobewatch"
                 raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
             time.sleep(LOCK_POLL_INTERVAL)
-
-    @property
-    def _holder(self) -> Path:
-        return self._folder / LOCK_HOLDER_NAME
 
     def _read_holder(self) -> LockHolder | None:
         """Return the program that holds the lock; None until it has written its name."""

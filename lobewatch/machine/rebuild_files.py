@@ -12,22 +12,14 @@ from typing import Any
 from acquisition import DataError, Remark, read_tap
 from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
 from acquisition.files.cut_file import read_cut_signal
+from lobewatch.machine import folder_contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_contents import (
-    find_file_fault,
-    hash_file,
-    list_tap_files,
-    read_committed_cuts,
-    read_committed_taps,
-    read_given_up_ids,
-)
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, parse_cut_line
 from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
-
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
@@ -40,9 +32,13 @@ LOST_ENTRIES_HINT = (
 
 def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Remark]:
     """Yield remarks on recordings that are altered, missing or unlisted."""
-    cuts, given_up, mend = read_committed_cuts(reading), read_given_up_ids(reading), format_command("rebuild", folder)
+    cuts, given_up, mend = (
+        folder_contents.read_committed_cuts(reading),
+        folder_contents.read_given_up_ids(reading),
+        format_command("rebuild", folder),
+    )
     for cut in cuts:
-        fault = "" if cut.recording is None else find_file_fault(folder, cut.recording)
+        fault = "" if cut.recording is None else folder_contents.find_file_fault(folder, cut.recording)
         if not fault or cut.recording is None:
             continue
         text = f"{fault}; what was heard in it counts"
@@ -60,9 +56,9 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
 
     The result of a lost recording is in its journal line and stays valid.
     """
-    for path in _list_unlisted_cuts(folder, read_committed_cuts(journal.read())):
+    for path in _list_unlisted_cuts(folder, folder_contents.read_committed_cuts(journal.read())):
         cut = _read_unlisted_cut(path)
-        if cut is None or cut.id in {entered.id for entered in read_committed_cuts(journal.read())}:
+        if cut is None or cut.id in {entered.id for entered in folder_contents.read_committed_cuts(journal.read())}:
             yield f"cuts/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}"
             continue
         content = read_regular_file(path)
@@ -70,11 +66,11 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
         journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
         yield f"cuts/{path.name}: entered in the journal"
     reading = journal.read()
-    recordings = [cut.recording for cut in read_committed_cuts(reading) if cut.recording is not None]
-    for lost in [recording for recording in recordings if find_file_fault(folder, recording)]:
+    recordings = [cut.recording for cut in folder_contents.read_committed_cuts(reading) if cut.recording is not None]
+    for lost in [recording for recording in recordings if folder_contents.find_file_fault(folder, recording)]:
         if (folder / lost.file).exists():
             _move_to_damaged(folder, folder / lost.file)
-        if lost.id not in read_given_up_ids(reading):
+        if lost.id not in folder_contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": lost.id, "time": datetime.now(UTC).isoformat()})
             yield f"{lost.file}: lost; what was heard in it goes on to count"
 
@@ -102,12 +98,12 @@ def rebuild_files(path: Path) -> list[str]:
     Damaged files are moved away, never deleted. Raises DataError if this is no machine folder, BusyError if another
     program writes.
     """
-    if not (path / "machine.toml").is_file() and not list_tap_files(path):
+    if not (path / "machine.toml").is_file() and not folder_contents.list_tap_files(path):
         MachineFolder(path)
     with FolderLock(path).hold(LOCK_TIMEOUT):
         journal = Journal(path)
         reading = journal.read()
-        committed = read_committed_taps(reading)
+        committed = folder_contents.read_committed_taps(reading)
         report = [*_restore_misplaced(path, committed)]
         fresh = _enter_unlisted_taps(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
@@ -140,13 +136,13 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
     """Rename swapped tap files back where the right file is damaged, else set them aside."""
     by_content = {entry.sha256: entry for entry in committed.values()}
     misplaced: dict[Path, TapEntry] = {}
-    for path in list_tap_files(folder).values():
-        entry = by_content.get(hash_file(path))
+    for path in folder_contents.list_tap_files(folder).values():
+        entry = by_content.get(folder_contents.hash_file(path))
         if entry is not None and path != folder / entry.file:
             misplaced[path] = entry
     asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced.items()}
     for aside, entry in asides.items():
-        if find_file_fault(folder, entry):
+        if folder_contents.find_file_fault(folder, entry):
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
@@ -159,7 +155,7 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
     """Return the entries of sound tap files without a line, renamed if necessary; set all others aside."""
     entries = []
-    for name, path in list_tap_files(folder).items():
+    for name, path in folder_contents.list_tap_files(folder).items():
         if name in committed:
             continue
         entry = read_unverified_tap(path)
@@ -176,12 +172,12 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
 def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
     """Write to the journal which tap tests are lost."""
     reading = journal.read()
-    for name, entry in read_committed_taps(reading).items():
-        if not find_file_fault(folder, entry):
+    for name, entry in folder_contents.read_committed_taps(reading).items():
+        if not folder_contents.find_file_fault(folder, entry):
             continue
         if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
             _move_to_damaged(folder, folder / entry.file)
-        if name not in read_given_up_ids(reading):
+        if name not in folder_contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
@@ -203,7 +199,9 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     if toml.exists():
         return
     entries = [
-        entry for entry in read_committed_taps(Journal(folder).read()).values() if not find_file_fault(folder, entry)
+        entry
+        for entry in folder_contents.read_committed_taps(Journal(folder).read()).values()
+        if not folder_contents.find_file_fault(folder, entry)
     ]
     for entry in sorted(entries, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml

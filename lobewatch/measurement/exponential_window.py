@@ -85,11 +85,10 @@ class Window:
             If the time of the hit is unknown or before the start.
         """
         if self.hit_at is None and not hits:
-            raise ValueError(
-                f"Window.time_constant {self.time_constant:g}: an FRF does not say when the hit came, and K is too high by "
-                "exp((hit - start)/window); add Window.hit_at with the seconds from the record's start (the "
-                "pre-trigger), 0 where the window begins at the hit"
-            )
+            problem = "an FRF does not say when the hit came, and K is too high by exp((hit - start)/window)"
+            seconds = "the seconds from the record's start (the pre-trigger), 0 where the window begins at the hit"
+            cure = f"add Window.hit_at with {seconds}"
+            raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
         hit_at = float(np.mean([find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
         if not hit_at >= self.start:
             raise ValueError(

@@ -12,14 +12,7 @@ from acquisition import DataError, Description, Fact, Frf, Remark, correct_windo
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
-from lobewatch.measurement.exponential_window import (
-    Window,
-    hidden_window_remarks,
-    refit_ringing_modes,
-    remove_own_window,
-    remove_recorded_window,
-    resolve_window,
-)
+from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remark
@@ -72,7 +65,7 @@ def fit_file_modes(
     path: Path,
     band: tuple[float, float] | None = None,
     *,
-    window: Window | None = None,
+    window: windows.Window | None = None,
     conjugate: bool = False,
     accept: Collection[str] = (),
     description: Description | None = None,
@@ -132,13 +125,12 @@ def fit_file_modes(
     file_frf = read_file_frf(path, accept, description or Description(), window, conjugate=conjugate)
     if file_frf.frf is None:
         if window is not None or conjugate:
-            raise ValueError(
-                "Window.time_constant, Window.hit_at and fit_file_modes.conjugate are of hits with their force; leave them out"
-            )
+            fields = "Window.time_constant, Window.hit_at and fit_file_modes.conjugate"
+            raise ValueError(f"{fields} are of hits with their force; leave them out")
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
     frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
     hits = () if conjugate else file_frf.hits
-    window = resolve_window(file_frf.recorded_window, window)
+    window = windows.resolve_window(file_frf.recorded_window, window)
     delay = None if window is None else window.delay(file_frf.hits)
     frf = frf if window is None else correct_windowed_receptance(frf, window.time_constant)
     tau = file_frf.time_constant if window is None else window.time_constant
@@ -154,13 +146,13 @@ def fit_file_modes(
     mass, fitted = extraction.frf.mass_removed, modes
     frf = remove_sensor_mass(frf, mass)
     if window is not None and delay is not None:
-        fitted, windowed = remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
+        fitted, windowed = windows.remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
     elif file_frf.time_constant is not None:
-        fitted, windowed = tuple(remove_own_window(modes, file_frf.time_constant)), ()
+        fitted, windowed = tuple(windows.remove_own_window(modes, file_frf.time_constant)), ()
     else:
-        windowed = tuple(hidden_window_remarks(hits, modes))
+        windowed = tuple(windows.hidden_window_remarks(hits, modes))
         if not accept:
-            fitted, ringing = refit_ringing_modes(modes, hits, band, mass)
+            fitted, ringing = windows.refit_ringing_modes(modes, hits, band, mass)
             windowed += ringing
     return FileModes(
         path=path,

@@ -42,8 +42,8 @@ class RecordingQuestion:
 FREQUENCY_JUMP = RecordingQuestion(
     "frequency-jump",
     0.15,
-    "frequency {now:.1f} Hz is {percent:+.0f} % off the newest test of the series ({last:.1f} Hz): is this the machine, "
-    "the tool and the direction it is said to be?",
+    "frequency {now:.1f} Hz is {percent:+.0f} % off the newest test of the series ({last:.1f} Hz): is this the "
+    "machine, the tool and the direction it is said to be?",
 )
 """Limit: relative change of the frequency since the newest test of the series, either way; chosen."""
 NO_MODE_IN_BAND = RecordingQuestion(
@@ -59,8 +59,8 @@ NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
 STIFFNESS_JUMP = RecordingQuestion(
     "stiffness-jump",
     1.5,
-    "stiffness {now} N/um is {ratio:.2g} times that of the newest test of the series ({last} N/um), the frequency moved "
-    "by {percent:g} %: has a gain, a range or a sensitivity changed, or the place that is tapped?",
+    "stiffness {now} N/um is {ratio:.2g} times that of the newest test of the series ({last} N/um), the frequency "
+    "moved by {percent:g} %: has a gain, a range or a sensitivity changed, or the place that is tapped?",
 )
 """Limit: ratio of K, and of K / f_n^2, to the newest test of the series, or the inverse; chosen.
 

@@ -17,14 +17,8 @@ from threadpoolctl import ThreadpoolController
 from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
+from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.exponential_window import hidden_window_remarks
-from lobewatch.measurement.recording_questions import (
-    check_band_coverage,
-    check_frequency_jump,
-    check_model_stiffness,
-    check_stiffness_jump,
-    no_mode_remark,
-)
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from modal import (
     CredibleModes,
@@ -131,7 +125,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
-    about, band = tap.circumstances, None if tap.frf is None else check_band_coverage(tap.frf, machine)
+    about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
@@ -144,7 +138,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
-            return TapFit(*named, (), (*remarks, failure, no_mode_remark((), machine)), failed=True)
+            return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
 
 
 def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
@@ -220,7 +214,7 @@ def _follow_mode(
     """Return the credible mode that continues the last one, or the predominant one."""
     mode = predominant_mode(trusted.modes)
     if mode is None:
-        remarks.append(no_mode_remark(modes, machine))
+        remarks.append(questions.no_mode_remark(modes, machine))
     elif last is not None:
         mode = _continue_mode(last, mode, trusted.modes, remarks)
     return mode
@@ -229,11 +223,11 @@ def _follow_mode(
 def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
     """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
     next_mode = follow_mode(last, candidates)
-    jump = check_frequency_jump(last, now) if next_mode.mode is None else None
+    jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)
         return now
-    remarks += [] if next_mode.mode is None else filter(None, [check_stiffness_jump(last, next_mode.mode)])
+    remarks += [] if next_mode.mode is None else filter(None, [questions.check_stiffness_jump(last, next_mode.mode)])
     cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode
@@ -255,7 +249,7 @@ def _calibrate(
     remarks += [] if doubt is None else [doubt]
     if doubt is None and last is None and followed.has_stiffness:
         of_model = modal_stiffness(calibration.spindle, calibration.mode, machine.tap.position_mm / 1e3)
-        remarks += filter(None, [check_model_stiffness(followed, of_model)])
+        remarks += filter(None, [questions.check_model_stiffness(followed, of_model)])
     return calibration if doubt is None else None
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle_lobes, lower_envelope, stability_boundary, zero_order_lobes
 from lobes.tip_response import TipData
-from lobewatch.machine import REFERENCE_CUT, CutTable, Machine
+from lobewatch.machine import CutTable, Machine
 from lobewatch.tool.assembly import Assembly
 
 MAX_CHART_SPEEDS = 400
@@ -65,12 +65,7 @@ class LobeChart:
 
 def find_cut_table(machine: Machine, name: str) -> CutTable:
     """Return the reference cut or a program by name; KeyError for another name."""
-    for table in machine.program:
-        if table.name == name:
-            return table
-    if name != REFERENCE_CUT or machine.reference_cut is None:
-        raise KeyError(name)
-    return machine.reference_cut
+    return machine.cut_tables[name]
 
 
 def compute_lobe_chart(

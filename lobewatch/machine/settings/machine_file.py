@@ -15,6 +15,7 @@ import msgspec
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
+from lobewatch.machine.settings import toml_schema
 from lobewatch.machine.settings.cut_tables import (
     FEED_ANGLES,
     CutTable,
@@ -27,12 +28,6 @@ from lobewatch.machine.settings.cut_tables import (
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_schema import (
-    TomlTable,
-    check_control_characters,
-    explain_validation_error,
-    suggest_decimal_point,
-)
 from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
 
 REFERENCE_CUT = "reference cut"
@@ -41,7 +36,7 @@ USER_SOURCE = "machine.toml"
 """Source of cutting coefficients that a person has entered."""
 
 
-class Machine(TomlTable, frozen=True):
+class Machine(toml_schema.TomlTable, frozen=True):
     """All tables of machine.toml.
 
     >>> from pathlib import Path
@@ -316,8 +311,11 @@ class Machine(TomlTable, frozen=True):
         tool
             Name of the tool.
         """
-        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
-        tables |= {program.name: program for program in self.program if program.tool == tool}
+        tables = {
+            name: table
+            for name, table in self.cut_tables.items()
+            if not isinstance(table, ProgramTable) or table.tool == tool
+        }
         return {
             name: tuple(
                 replace(cut, feed_angle=FEED_ANGLES[axis])
@@ -330,7 +328,13 @@ class Machine(TomlTable, frozen=True):
     @property
     def cut_names(self) -> list[str]:
         """Names of the reference cut and of all programs."""
-        return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
+        return list(self.cut_tables)
+
+    @property
+    def cut_tables(self) -> dict[str, CutTable]:
+        """Reference cut and all programs by name."""
+        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
+        return tables | {program.name: program for program in self.program}
 
     @property
     def settings_hash(self) -> str:
@@ -351,11 +355,11 @@ def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
     tables: dict[str, Any] = {}
     try:
         tables = parse_toml_tables(text)
-        check_control_characters(tables)
+        toml_schema.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{suggest_decimal_point(text)}") from error
+        raise DataError(f"{name}: {error}{toml_schema.suggest_decimal_point(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {explain_validation_error(str(error), tables, Machine)}") from error
+        raise DataError(f"{name}: {toml_schema.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error

@@ -78,7 +78,7 @@ def find_cut_setting(
 
     power_kw is the power shown in the cut less that in air. Raises ValueError for an unknown name or an invalid value.
     """
-    table = _find_cut_table(machine, program)
+    table = find_by_name(machine.cut_tables, program)
     for name, key, value, unit in (
         ("speed", "speed_rpm", speed_rpm, "rpm"),
         ("depth", "depth_mm", depth_mm, "mm"),
@@ -129,11 +129,6 @@ def _missing_setting_field(speed: float | None) -> str:
 
 def _is_positive(value: float) -> bool:
     return math.isfinite(value) and value > 0
-
-
-def _find_cut_table(machine: Machine, name: str) -> CutTable:
-    tables: dict[str, CutTable] = {REFERENCE_CUT: machine.reference_cut} if machine.reference_cut else {}
-    return find_by_name(tables | {table.name: table for table in machine.program}, name)
 
 
 def find_by_name(tables: Mapping[str, NamedTable], name: str) -> NamedTable:

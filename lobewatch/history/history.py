@@ -24,13 +24,8 @@ from modal import Mode
 
 MAX_STORED_MODES = 12
 """Largest number of stored modes of one tap test."""
-ESTIMATE_UNITS = {
-    "frequency": "Hz",
-    "damping_ratio": "",
-    "stiffness": "N/m",
-    "phase_deg": "deg",
-    "bearing_stiffness": "N/m",
-}
+ESTIMATE_UNITS = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg"}
+ESTIMATE_UNITS |= {"bearing_stiffness": "N/m"}
 """Units of the values with a standard error, by name of field and column."""
 WATCHED_VALUES = ("frequency", "damping_ratio", "stiffness", "bearing_stiffness")
 """Values whose series are monitored."""
@@ -224,14 +219,9 @@ def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
 def _mode_estimates(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate, Estimate]:
     if mode is None:
         return UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE
-    f_std, zeta_std, k_std = mode.standard_error.tolist()
-    phase = Estimate(mode.phase_deg, mode.phase_deg_std)
-    return (
-        Estimate(mode.frequency, f_std),
-        Estimate(mode.damping_ratio, zeta_std),
-        Estimate(mode.stiffness, k_std),
-        phase,
-    )
+    values = mode.frequency, mode.damping_ratio, mode.stiffness
+    frequency, damping_ratio, stiffness = map(Estimate, values, mode.standard_error.tolist())
+    return frequency, damping_ratio, stiffness, Estimate(mode.phase_deg, mode.phase_deg_std)
 
 
 def _bearing_estimate(calibration: Calibration | None) -> Estimate:

@@ -142,11 +142,8 @@ class UsableTaps:
             return ()
         newest_usable = {_series_key(place.entry): _entry_time(place.entry) for place in self.places}
         lost = [entry for entry in self.lost if _entry_time(entry) >= (self.baseline or EARLIEST_TIME)]
-        newer = [
-            entry
-            for entry in lost
-            if tool in ("", entry.tool) and _entry_time(entry) > newest_usable.get(_series_key(entry), EARLIEST_TIME)
-        ]
+        lost = [entry for entry in lost if tool in ("", entry.tool)]
+        newer = [entry for entry in lost if _entry_time(entry) > newest_usable.get(_series_key(entry), EARLIEST_TIME)]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
 

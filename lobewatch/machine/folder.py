@@ -124,16 +124,8 @@ class MachineFolder:
         reading = self.journal.read()
         self.journal.refuse_damage(reading)
         if not reading.lines and any(remark.code == "journal-damaged" for remark in self.contents().remarks):
-            self.journal.refuse_damage(
-                replace(
-                    reading,
-                    damage=(
-                        folder_contents.missing_journal_remark(
-                            self.path, len(folder_contents.list_tap_files(self.path))
-                        ),
-                    ),
-                )
-            )
+            missing = folder_contents.missing_journal_remark(self.path, len(folder_contents.list_tap_files(self.path)))
+            self.journal.refuse_damage(replace(reading, damage=(missing,)))
         return reading
 
     def read(self, entry: TapEntry) -> TapTest:

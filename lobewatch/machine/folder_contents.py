@@ -88,11 +88,10 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = read_committed_cuts(reading)
-    words = (
-        journal_entries.read_acknowledgements(reading.other_entries),
-        journal_entries.read_fleet_scatters(reading.other_entries),
-    )
-    return FolderContents(tuple(taps), _sort_by_time(lost), tuple(remarks), events, len(reading.lines), cuts, *words)
+    acknowledged = journal_entries.read_acknowledgements(reading.other_entries)
+    scatters = journal_entries.read_fleet_scatters(reading.other_entries)
+    usable, unusable, damage, count = tuple(taps), _sort_by_time(lost), tuple(remarks), len(reading.lines)
+    return FolderContents(usable, unusable, damage, events, count, cuts, acknowledged, scatters)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
@@ -106,10 +105,8 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
     for line in reading.other_entries:
         if line["kind"] == "accept":
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
-    excluded, by_hand = (
-        journal_entries.read_exclusion_reasons(reading.other_entries),
-        journal_entries.read_mode_edits(reading.other_entries),
-    )
+    excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
+    by_hand = journal_entries.read_mode_edits(reading.other_entries)
     entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
     for line in reading.other_entries:
         if line["kind"] == "tap":

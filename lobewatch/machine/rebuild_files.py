@@ -12,7 +12,7 @@ from typing import Any
 from acquisition import DataError, Remark, read_tap
 from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
 from acquisition.files.cut_file import read_cut_signal
-from lobewatch.machine import folder_contents
+from lobewatch.machine import folder_contents as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
@@ -32,13 +32,10 @@ LOST_ENTRIES_HINT = (
 
 def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Remark]:
     """Yield remarks on recordings that are altered, missing or unlisted."""
-    cuts, given_up, mend = (
-        folder_contents.read_committed_cuts(reading),
-        folder_contents.read_given_up_ids(reading),
-        format_command("rebuild", folder),
-    )
+    cuts, given_up = contents.read_committed_cuts(reading), contents.read_given_up_ids(reading)
+    mend = format_command("rebuild", folder)
     for cut in cuts:
-        fault = "" if cut.recording is None else folder_contents.find_file_fault(folder, cut.recording)
+        fault = "" if cut.recording is None else contents.find_file_fault(folder, cut.recording)
         if not fault or cut.recording is None:
             continue
         text = f"{fault}; what was heard in it counts"
@@ -56,9 +53,9 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
 
     The result of a lost recording is in its journal line and stays valid.
     """
-    for path in _list_unlisted_cuts(folder, folder_contents.read_committed_cuts(journal.read())):
+    for path in _list_unlisted_cuts(folder, contents.read_committed_cuts(journal.read())):
         cut = _read_unlisted_cut(path)
-        if cut is None or cut.id in {entered.id for entered in folder_contents.read_committed_cuts(journal.read())}:
+        if cut is None or cut.id in {entered.id for entered in contents.read_committed_cuts(journal.read())}:
             yield f"cuts/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}"
             continue
         content = read_regular_file(path)
@@ -66,11 +63,11 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
         journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
         yield f"cuts/{path.name}: entered in the journal"
     reading = journal.read()
-    recordings = [cut.recording for cut in folder_contents.read_committed_cuts(reading) if cut.recording is not None]
-    for lost in [recording for recording in recordings if folder_contents.find_file_fault(folder, recording)]:
+    recordings = [cut.recording for cut in contents.read_committed_cuts(reading) if cut.recording is not None]
+    for lost in [recording for recording in recordings if contents.find_file_fault(folder, recording)]:
         if (folder / lost.file).exists():
             _move_to_damaged(folder, folder / lost.file)
-        if lost.id not in folder_contents.read_given_up_ids(reading):
+        if lost.id not in contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": lost.id, "time": datetime.now(UTC).isoformat()})
             yield f"{lost.file}: lost; what was heard in it goes on to count"
 
@@ -98,12 +95,12 @@ def rebuild_files(path: Path) -> list[str]:
     Damaged files are moved away, never deleted. Raises DataError if this is no machine folder, BusyError if another
     program writes.
     """
-    if not (path / "machine.toml").is_file() and not folder_contents.list_tap_files(path):
+    if not (path / "machine.toml").is_file() and not contents.list_tap_files(path):
         MachineFolder(path)
     with FolderLock(path).hold(LOCK_TIMEOUT):
         journal = Journal(path)
         reading = journal.read()
-        committed = folder_contents.read_committed_taps(reading)
+        committed = contents.read_committed_taps(reading)
         report = [*_restore_misplaced(path, committed)]
         fresh = _enter_unlisted_taps(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
@@ -136,13 +133,13 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
     """Rename swapped tap files back where the right file is damaged, else set them aside."""
     by_content = {entry.sha256: entry for entry in committed.values()}
     misplaced: dict[Path, TapEntry] = {}
-    for path in folder_contents.list_tap_files(folder).values():
-        entry = by_content.get(folder_contents.hash_file(path))
+    for path in contents.list_tap_files(folder).values():
+        entry = by_content.get(contents.hash_file(path))
         if entry is not None and path != folder / entry.file:
             misplaced[path] = entry
     asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced.items()}
     for aside, entry in asides.items():
-        if folder_contents.find_file_fault(folder, entry):
+        if contents.find_file_fault(folder, entry):
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
@@ -155,7 +152,7 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
     """Return the entries of sound tap files without a line, renamed if necessary; set all others aside."""
     entries = []
-    for name, path in folder_contents.list_tap_files(folder).items():
+    for name, path in contents.list_tap_files(folder).items():
         if name in committed:
             continue
         entry = read_unverified_tap(path)
@@ -172,12 +169,12 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
 def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
     """Write to the journal which tap tests are lost."""
     reading = journal.read()
-    for name, entry in folder_contents.read_committed_taps(reading).items():
-        if not folder_contents.find_file_fault(folder, entry):
+    for name, entry in contents.read_committed_taps(reading).items():
+        if not contents.find_file_fault(folder, entry):
             continue
         if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
             _move_to_damaged(folder, folder / entry.file)
-        if name not in folder_contents.read_given_up_ids(reading):
+        if name not in contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
@@ -198,12 +195,9 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     toml = folder / "machine.toml"
     if toml.exists():
         return
-    entries = [
-        entry
-        for entry in folder_contents.read_committed_taps(Journal(folder).read()).values()
-        if not folder_contents.find_file_fault(folder, entry)
-    ]
-    for entry in sorted(entries, key=lambda entry: entry.time, reverse=True):
+    committed = contents.read_committed_taps(Journal(folder).read()).values()
+    sound = [entry for entry in committed if not contents.find_file_fault(folder, entry)]
+    for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
             atomic_write(toml, text.encode())

@@ -14,7 +14,7 @@ from acquisition import DataError, Remark, Trigger
 from acquisition.errors import format_error
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from acquisition.files.hdf5_file import has_valid_checksum
-from lobewatch.machine import folder_contents
+from lobewatch.machine import folder_contents as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
@@ -73,7 +73,7 @@ def verify(path: Path) -> Verification:
     DataError
         If this is no machine folder.
     """
-    if not (path / "machine.toml").is_file() and folder_contents.list_tap_files(path):
+    if not (path / "machine.toml").is_file() and contents.list_tap_files(path):
         mend = format_command("rebuild", path)
         cure = f"put it back from a backup; without one, {mend} takes the copy in the newest tap test"
         missing = _damaged_file_remark("machine.toml", "is missing beside tap tests", cure)
@@ -81,10 +81,8 @@ def verify(path: Path) -> Verification:
     folder = MachineFolder(path)
     entered = enter_orphaned_taps(folder)
     reading = folder.journal.read()
-    committed = folder_contents.read_committed_taps(reading)
-    faults = {
-        name: fault for name, entry in committed.items() if (fault := folder_contents.find_file_fault(path, entry))
-    }
+    committed = contents.read_committed_taps(reading)
+    faults = {name: fault for name, entry in committed.items() if (fault := contents.find_file_fault(path, entry))}
     remarks = [
         *reading.damage,
         *_verify_taps(path, reading, committed, faults),
@@ -106,10 +104,10 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
     journal, entered = folder.journal, list[str]()
     try:
         with folder.locked(patience=0):
-            committed = set(folder_contents.read_committed_taps(journal.read()))
-            for name, path in folder_contents.list_tap_files(folder.path).items():
+            committed = set(contents.read_committed_taps(journal.read()))
+            for name, path in contents.list_tap_files(folder.path).items():
                 entry = read_unverified_tap(path) if name not in committed else None
-                if entry is not None and entry.id == name and folder_contents.has_known_origin(folder.path, entry):
+                if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
                     journal.append(entry.line)
                     entered.append(entry.file)
     except (DataError, OSError):
@@ -120,22 +118,19 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
 def _verify_taps(
     folder: Path, reading: JournalReading, committed: dict[str, TapEntry], faults: dict[str, str]
 ) -> Iterator[Remark]:
-    by_content, given_up = (
-        {entry.sha256: entry for entry in committed.values()},
-        folder_contents.read_given_up_ids(reading),
-    )
-    files = folder_contents.list_tap_files(folder)
-    late = folder_contents.read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
+    by_content, given_up = {entry.sha256: entry for entry in committed.values()}, contents.read_given_up_ids(reading)
+    files = contents.list_tap_files(folder)
+    late = contents.read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
     extra = [path for name, path in files.items() if name not in committed and name not in late]
     if not reading.lines and not reading.damage and extra:
-        yield folder_contents.missing_journal_remark(folder, len(extra))
+        yield contents.missing_journal_remark(folder, len(extra))
     for name, fault in faults.items():
         entry, path = committed[name], folder / committed[name].file
-        namesake = by_content.get(folder_contents.hash_file(path))
+        namesake = by_content.get(contents.hash_file(path))
         text = f"it is {namesake.file} under another name" if namesake else fault
-        yield folder_contents.tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
+        yield contents.tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
-        original = by_content.get(folder_contents.hash_file(path))
+        original = by_content.get(contents.hash_file(path))
         yield _unlisted_tap_remark(folder, path, original, original is not None and original.id in faults)
 
 
@@ -143,28 +138,26 @@ def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is
     """Return the remark on a tap file without a line; original: committed tap test with the same content."""
     mend = format_command("rebuild", folder)
     if original is not None and is_needed:
-        return folder_contents.unlisted_file_remark(
+        return contents.unlisted_file_remark(
             path, f"it is {original.file} under another name", f"{mend} gives it its name back"
         )
     if original is not None:
-        return folder_contents.unlisted_file_remark(
-            path, f"a copy of {original.file}", f"{mend} puts it out of the way"
-        )
+        return contents.unlisted_file_remark(path, f"a copy of {original.file}", f"{mend} puts it out of the way")
     entry = read_unverified_tap(path)
     if entry is None:
-        return folder_contents.unlisted_file_remark(
+        return contents.unlisted_file_remark(
             path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way"
         )
     if entry.id != path.stem:
-        return folder_contents.unlisted_file_remark(
+        return contents.unlisted_file_remark(
             path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in"
         )
-    if folder_contents.has_known_origin(folder, entry):
+    if contents.has_known_origin(folder, entry):
         cure = f"{format_command('verify', folder)} enters it where nobody else writes"
         text = "not entered in the journal by the program that wrote it"
         return Remark("not-entered", f"taps/{path.name}", text, cure)
     cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
-    return folder_contents.unlisted_file_remark(path, "a whole tap file that is not in the journal", cure)
+    return contents.unlisted_file_remark(path, "a whole tap file that is not in the journal", cure)
 
 
 def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
@@ -221,7 +214,7 @@ def _verify_names(folder: Path) -> Iterator[Remark]:
             )
         elif path.name not in LOBEWATCH_FILES | LOBEWATCH_FOLDERS:
             yield _not_verified_remark(path.name, "no file of lobewatch")
-    taps, files = folder / "taps", {*folder_contents.list_tap_files(folder).values()}
+    taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
             yield _not_verified_remark(f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")

@@ -207,11 +207,8 @@ def question_remarks(
     for question, tap_ids in same.items():
         answer = _answer_command(path, tap_ids, question.code, all_of_them=len(tap_ids) == counts[question.code])
         if len(tap_ids) == 1:
-            about, rest, test = (
-                f"tap test {tap_ids[0]}",
-                "it sets no reference until you say that it is",
-                "this test is",
-            )
+            about = f"tap test {tap_ids[0]}"
+            rest, test = "it sets no reference until you say that it is", "this test is"
         else:
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
             rest, test = "they set no reference until you say that they are", "these tests are"

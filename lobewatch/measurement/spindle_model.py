@@ -207,16 +207,9 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
     """
     frequency, stiffness = modes_at(state.spindle, count)
     shares = energy_shares(state.spindle, count)
-    modes = tuple(
-        ModelMode(
-            frequency=float(frequency[n]),
-            tip_stiffness=float(stiffness[n]),
-            bearing_share=float(np.sum(shares.bearings[n] + shares.housings[n])),
-            segment_share=float(np.sum(shares.segments[n])),
-            joint_share=float(np.sum(shares.joints[n])),
-        )
-        for n in range(count)
-    )
+    in_bearings = np.sum(shares.bearings + shares.housings, axis=1)
+    columns = frequency, stiffness, in_bearings, np.sum(shares.segments, axis=1), np.sum(shares.joints, axis=1)
+    modes = tuple(ModelMode(*row) for row in np.column_stack(columns)[:count].tolist())
     return ModelSummary(
         state,
         modes,

@@ -67,10 +67,8 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
-    return (
-        abs(other.frequency / mode.frequency - 1) < MAX_CROSS_FREQUENCY_DISTANCE
-        and abs(other.stiffness / mode.stiffness - 1) < SAME_STIFFNESS_TOLERANCE
-    )
+    frequency, stiffness = abs(other.frequency / mode.frequency - 1), abs(other.stiffness / mode.stiffness - 1)
+    return frequency < MAX_CROSS_FREQUENCY_DISTANCE and stiffness < SAME_STIFFNESS_TOLERANCE
 
 
 DIRECTION_CODES = ("one-direction", "older-direction")

@@ -61,14 +61,10 @@ def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[l
     if machine.mode.band_hz is not None:
         low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
         shown &= (frequency >= low) & (frequency <= high)
-    modes = [
-        Mode(
-            float(frequency[i]),
-            followed.damping_ratio,
-            float(stiffness[i]),
-            method=f"model, bearings of {tap.tap_id}",
-            phase_deg=followed.phase_deg if i == softest else 0.0,
-        )
-        for i in np.flatnonzero(shown).tolist()
-    ]
+    origin = f"model, bearings of {tap.tap_id}"
+    modes = list[Mode]()
+    for i in np.flatnonzero(shown).tolist():
+        phase = followed.phase_deg if i == softest else 0.0
+        values = float(frequency[i]), followed.damping_ratio, float(stiffness[i])
+        modes.append(Mode(*values, method=origin, phase_deg=phase))
     return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

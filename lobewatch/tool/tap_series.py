@@ -84,12 +84,8 @@ def _is_same_mounting(first: Conditions, second: Conditions) -> bool:
 
 
 def _differing_conditions(first: Conditions, second: Conditions) -> list[str]:
-    stated, also_stated = first.specified, second.specified
-    return [
-        name
-        for name in SERIES_CONDITIONS
-        if name in stated and name in also_stated and stated[name] != also_stated[name]
-    ]
+    values, others = first.specified, second.specified
+    return [name for name in SERIES_CONDITIONS if name in values and name in others and values[name] != others[name]]
 
 
 def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: ToolMounting | None) -> Remark:

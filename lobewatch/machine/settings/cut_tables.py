@@ -209,14 +209,10 @@ class MaterialTable(TomlTable, frozen=True):
     iso_group: IsoMaterialGroup | None = None
 
     def __post_init__(self) -> None:
-        pairs = (
-            (self.tangential_n_per_mm2, self.radial_n_per_mm2),
-            (self.specific_force_n_per_mm2, self.force_angle_deg),
-        )
-        if sorted(sum(value is not None for value in pair) for pair in pairs) != [0, 2]:
-            raise ValueError(
-                "give either tangential_n_per_mm2 and radial_n_per_mm2, or specific_force_n_per_mm2 and force_angle_deg"
-            )
+        first, second = ("tangential_n_per_mm2", "radial_n_per_mm2"), ("specific_force_n_per_mm2", "force_angle_deg")
+        counts = [sum(getattr(self, key) is not None for key in pair) for pair in (first, second)]
+        if sorted(counts) != [0, 2]:
+            raise ValueError(f"give either {' and '.join(first)}, or {' and '.join(second)}")
 
     def build(self) -> CuttingCoefficients:
         """Build the coefficients in SI units."""
@@ -225,15 +221,10 @@ class MaterialTable(TomlTable, frozen=True):
             tangential, radial = tangential_and_radial(
                 self.specific_force_n_per_mm2, math.radians(self.force_angle_deg)
             )
-        return CuttingCoefficients(
-            self.name,
-            (tangential or 0.0) * 1e6,
-            (radial or 0.0) * 1e6,
-            self.tangential_edge_n_per_mm * 1e3,
-            self.radial_edge_n_per_mm * 1e3,
-            source=self.source,
-            iso_group=self.iso_group or "",
-        )
+        pressures = (tangential or 0.0) * 1e6, (radial or 0.0) * 1e6
+        edges = self.tangential_edge_n_per_mm * 1e3, self.radial_edge_n_per_mm * 1e3
+        iso_group = self.iso_group or ""
+        return CuttingCoefficients(self.name, *pressures, *edges, source=self.source, iso_group=iso_group)
 
 
 class DriveTable(TomlTable, frozen=True):

@@ -18,7 +18,7 @@ FIRST = "speed_rpm = 12600"
 
 
 def with_first(*lines: str, radial: str = "20", more: str = "") -> str:
-    """The example with lines more in its first program, another radial depth there, and more at its end."""
+    """Return the example with more lines and another radial depth in its first program, and more at its end."""
     text = EXAMPLE.replace(FIRST, "\n".join((FIRST, *lines)), 1)
     head, _, tail = text.partition("[[program]]")
     return head + "[[program]]" + tail.replace("radial_depth_mm = 20", f"radial_depth_mm = {radial}", 1) + more

@@ -68,10 +68,10 @@ def test_a_clock_at_1970_makes_no_new_baseline_until_it_is_accepted(shop: Shop) 
     standing = logbook.status(shop.start + timedelta(days=1))
     assert standing.status == "warn"
     assert "lobewatch replay" in standing.next_step
-    assert standing.series_of("reference", "x").first == shop.start
+    assert standing.series_of("reference", "x").first_time == shop.start
     assert logbook.accept([tap_id], ["clock-behind", "clock-before-release"]) == []
     standing = shop.logbook.status(shop.start + timedelta(days=1))
-    assert (standing.status, standing.series_of("reference", "x").first) == ("good", began)
+    assert (standing.status, standing.series_of("reference", "x").first_time) == ("good", began)
 
 
 def test_the_question_stands_in_the_journal_and_outlives_the_history(shop: Shop) -> None:

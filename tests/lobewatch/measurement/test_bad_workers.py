@@ -46,7 +46,7 @@ def spoiled(monkeypatch: pytest.MonkeyPatch) -> Callable[[Spoil], None]:
 
 
 def forged(record: Any, **changes: Any) -> Any:
-    """A record as it comes from elsewhere: nothing looks at its values."""
+    """Return a record with unchecked values, as from another process."""
     new = object.__new__(type(record))
     new.__dict__.update(vars(record) | changes)
     return new

@@ -133,7 +133,7 @@ def test_the_page_lists_the_ranges_that_a_slip_of_1000_may_stay_in() -> None:
 
 
 def machine_of(**changes: Any) -> Machine:
-    """The full machine with changes to its first program."""
+    """Return the full machine with changes to its first program."""
     tables = copy.deepcopy(TABLES)
     tables["program"][0] |= changes
     return parse_machine_file(text_of(tables))

@@ -39,7 +39,7 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> Analysed:
 
 @pytest.fixture
 def tapped(shop: Shop) -> Shop:
-    """x and y ten days apart in turn, so that the one is moved with the other."""
+    """Alternate x and y every ten days, so that one is shifted with the other."""
     shop.put("")
     for number, frequency in enumerate(FREQUENCIES):
         shop.tap(20 * number + 10, frequency)

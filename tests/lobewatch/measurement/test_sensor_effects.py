@@ -70,7 +70,7 @@ def test_nobody_named_it_asks_where_ten_grams_matter() -> None:
 def test_what_ten_grams_would_do_is_said_however_light_the_structure_is(
     stiffness: float, fall: float, also: str
 ) -> None:
-    """f / sqrt(1 + m / M) of M = K / w^2 = 0.338 kg and 0.45 g."""
+    """Expect f / sqrt(1 + m / M) for M = K / w^2 = 0.338 kg and m = 0.45 g."""
     tap = fit(measured(0.0, modes=[Mode(1500.0, 0.03, stiffness)]), 'mounting = "glue"')
     (asked,) = tap.remarks
     assert f"would change the frequency by {fall} %{also}, more than its interval" in asked.text

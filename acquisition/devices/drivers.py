@@ -16,26 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DeviceSettings:
-    """What is asked of a device: [daq] of machine.toml, in SI units."""
+    """Settings of a device: [daq] of machine.toml in SI units."""
 
     sample_rate: float | None = None
-    """Scans a second (Hz); None leaves it to the driver."""
+    """Sample rate (Hz), None for the default of the driver."""
     inputs: tuple[SensorInput, ...] = ()
-    """The sensors of a device that does not describe them itself."""
+    """Sensors of a device that does not describe them itself."""
     loss_detection: bool = True
-    """Whether lost scans are to be found."""
+    """Whether to detect lost scans."""
     digital_clock: bool = False
     """Whether a square wave on digital input 0 shows the loss of whole scans."""
     printing: OutputFormat | None = None
-    """What a board prints; None for volts in lines."""
+    """Output format of a board, None for volts in lines."""
 
 
 @dataclass(frozen=True)
 class SensorDataLocation:
-    """Where a device keeps the data of its sensors, in the words by which a person finds them there."""
+    """Location of the sensor data in a device, in the words by which a person finds them there."""
 
     place: str
-    """The place, e.g. "the device's own channel data (INFO)"."""
+    """Location, e.g. "the device's own channel data (INFO)"."""
     sensitivity: str
     """Name of a sensitivity there."""
     skew: str
@@ -43,53 +43,69 @@ class SensorDataLocation:
 
 
 def accept_any_settings(settings: DeviceSettings) -> None:
-    """Take all settings."""
+    """Accept all settings."""
 
 
 def skip_serial_probe(_link: SerialLink) -> DeviceIdentity | None:
-    """Answer of a device that is on no serial port: nobody."""
+    """Probe no serial port: for a driver whose devices are on none.
+
+    Parameters
+    ----------
+    _link
+        Open serial link, not used.
+
+    Returns
+    -------
+    None
+        No device of this kind is on a serial port.
+    """
     return None
 
 
 @dataclass(frozen=True)
 class Driver:
-    """One kind of device. Its functions import what they need when they are called: a list of drivers costs nothing."""
+    """One kind of device. Its functions import what they need when called, so that a list of drivers costs nothing."""
 
     name: str
-    """Name, as in [daq] driver of machine.toml and in `lobewatch emulate MODAL_SHOP_NAME_PATTERN`."""
+    """Name, as in [daq] driver of machine.toml."""
     title: str
-    """Words for a device of this kind, e.g. "a TAPS/1 device"."""
+    """Noun phrase for a device of this kind, e.g. "a TAPS/1 device"."""
     open: Callable[[str, DeviceSettings], Device]
-    """Function that connects to a device on a port; DeviceError where none is there, ValueError for settings that it
-    does not have."""
+    """Function that connects to a device on a port. DeviceError if there is none, ValueError for settings it does
+    not support.
+    """
     probe: Callable[[SerialLink], DeviceIdentity | None]
-    """Function that asks once who answers on an open link; None where no device of this kind does. `skip_serial_probe`
-    for devices that are on none."""
+    """Function that asks once who answers on an open link, None if no device of this kind does.
+    `skip_serial_probe` for devices on no serial port.
+    """
     check: Callable[[DeviceSettings], None] = accept_any_settings
-    """Function that raises ValueError for settings that no device of this kind has; its sensors are checked already."""
+    """Function that raises ValueError for settings that no device of this kind supports. Its sensors are checked
+    already.
+    """
     sensor_data: SensorDataLocation | None = None
-    """Place of the data of its sensors in the device; None: it has none, [[daq.channel]] must name them."""
+    """Location of the sensor data in the device, None if [[daq.channel]] must name the sensors."""
     usb_vendors: frozenset[int] = frozenset()
-    """USB vendors of such devices, to which no other question is put; none where they may be of any vendor, or of one
-    whose boards others build on too."""
+    """USB vendor ids that only such devices have. Only this driver probes them. Empty if any vendor is
+    possible, or the vendor also makes boards for others.
+    """
     emulate: Callable[[EmulationSetup], EmulatorThread] | None = None
-    """Function that makes a device of this kind of software."""
+    """Function that emulates a device of this kind."""
     emulates_fast: bool = False
     """Whether the emulated device can tell the host that its scans do not follow the clock."""
     search: Callable[[], Sequence[DeviceAddress]] | None = None
-    """Function that lists devices of this kind that are on no serial port; none where its library is not installed."""
+    """Function that lists devices of this kind that are on no serial port, none if its library is not installed."""
     prints_samples: bool = False
     """Whether such a device prints its samples, as [daq.printing] says."""
     is_hardware_tested: bool = True
-    """Whether somebody has reported that it works on hardware."""
+    """Whether a user has reported that it works on hardware."""
     extra: str = ""
-    """Name of the extra of lobewatch that brings the library it needs; empty where it needs none."""
+    """Name of the lobewatch extra that installs its library, empty if it needs none."""
 
 
 EMULATED_BOARD_RATE = 10_000.0
-"""Of an emulated board that prints lines (Hz)."""
+"""Sample rate of an emulated board that prints lines (Hz)."""
 EMULATED_CLOCK_FREQUENCY = 1000.0
-"""Of an emulated generator (Hz)."""
+"""Frequency of an emulated clock generator (Hz)."""
 
 
 def _open_taps(port: str, settings: DeviceSettings) -> Device:
@@ -142,7 +158,7 @@ def _check_dataq(settings: DeviceSettings) -> None:
 
 
 def _emulate_dataq(bench: EmulationSetup) -> EmulatorThread:
-    """Where a skew is given for an input, the device converts its inputs one after the other."""
+    """Emulate a DATAQ device. If an input has a skew, the device converts its inputs one after the other."""
     from acquisition.dataq import DataqEmulator, DataqTraits
 
     skewed = any(sensor.channel.skew for sensor in bench.inputs)
@@ -180,7 +196,7 @@ def _emulate_text_board(bench: EmulationSetup) -> EmulatorThread:
 
 
 def _make_library_driver(name: str, title: str, extra: str) -> Driver:
-    """A kind of device that a library of its maker reads."""
+    """Make the driver of a device that a vendor library reads."""
 
     def open_device(port: str, settings: DeviceSettings) -> Device:
         from acquisition import vendor_drivers as makers
@@ -233,4 +249,4 @@ BUILT_IN_DRIVERS = (
     _make_library_driver("uldaq", "a Measurement Computing USB device", "uldaq"),
     _make_library_driver("ljm", "a LabJack T7 or T8", "ljm"),
 )
-"""In the order in which they are asked for."""
+"""Built-in drivers, in the order in which they probe."""

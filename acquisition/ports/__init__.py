@@ -1,4 +1,4 @@
-"""Serial ports: finding them, opening them, and saying why one cannot be opened."""
+"""Serial ports: list, find and open them, and explain why one cannot be opened."""
 
 from acquisition.ports.serial_ports import (
     PortInfo,

@@ -1,4 +1,7 @@
-"""LabJack T7 and T8 devices through LJM."""
+"""LabJack T7 and T8 devices through LJM.
+
+They do not power IEPE sensors, and sample their inputs one after the other.
+"""
 
 from __future__ import annotations
 
@@ -23,19 +26,25 @@ from acquisition.vendor_drivers.library_device import (
 
 LJM_EXTRA = "ljm"
 T7_DEFAULT_RATE = 40000.0
-"""Sample rate where none is asked for (Hz): two inputs of a T7, which samples 100 000 values a second."""
+"""Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
 T7_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 SKIPPED_SAMPLE_VALUE = -9999.0
-"""Value that LJM puts in place of a sample that the device had no room for."""
+"""Value that LJM inserts for a sample that the device had no room for."""
 T7_INPUT_COUNT = 14
-"""Of a T7, AIN0 to AIN13."""
+"""Number of analog inputs of a T7, AIN0 to AIN13."""
 T7_RANGES = (10.0, 1.0, 0.1, 0.01)
-"""Of a T7 (V)."""
+"""Ranges of a T7 (V)."""
 
 
 def search_ljm() -> Sequence[DeviceAddress]:
-    """T7 and T8 on USB and in the network."""
+    """List the T7 and T8 devices on USB and in the network.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_ljm` takes, empty if the library is not installed.
+    """
     library = find_library("labjack.ljm", LJM_EXTRA)
     if library is None:
         return []
@@ -47,7 +56,29 @@ def search_ljm() -> Sequence[DeviceAddress]:
 
 
 def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The device "ljm:SERIAL NUMBER" (or its IP address or name); the rate is the nearest that it has."""
+    """Open a LabJack T7 or T8.
+
+    Parameters
+    ----------
+    port
+        "ljm:SERIAL NUMBER", or with its IP address or name.
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz), None for 40 kHz. The nearest one of the device is used.
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the device is missing, or the device cannot be opened.
+    ValueError
+        The device does not have an input or range.
+    """
     library = load_library("labjack.ljm", LJM_EXTRA)
     numbers = [sensor.number for sensor in inputs]
     check_input_numbers(numbers, T7_INPUT_COUNT, "a LabJack T7")
@@ -73,32 +104,31 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
 
 
 class LjmReader:
-    """Reads a stream."""
+    """Reader of an LJM stream."""
 
     def __init__(self, library: Any, handle: int, numbers: Sequence[int], rate: float) -> None:
-        """The opened device; its rate is found by starting it once (Hz)."""
+        """Take the opened device. Starting it once tells its true rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.LJMError,)
         self._library, self._handle = library, handle
         self._inputs = library.namesToAddresses(len(numbers), [f"AIN{number}" for number in numbers])[0]
         self.rate = rate
-        """Sample rate that the device has (Hz), known once it was started."""
+        """Sample rate of the device (Hz), known after the first start."""
         self.start()
         self.stop()
 
     def start(self) -> None:
-        """See Reader."""
         self._lost, self._pieces = 0, deque[VoltageBlock]()
         size = round(self.rate * T7_BLOCK_TIME)
         self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
 
     def read(self, _timeout: float) -> VoltageBlock | None:
-        """See Reader; LJM waits by itself, and tells by its error where nothing comes."""
+        """Return the next block. LJM waits by itself, and raises its error if nothing arrives."""
         if not self._pieces:
             self._pieces.extend(self._runs(np.array(self._library.eStreamRead(self._handle)[0])))
         return self._pieces.popleft() if self._pieces else None
 
     def _runs(self, values: NDArray[np.float64]) -> Iterator[VoltageBlock]:
-        """The runs of scans without a skipped sample."""
+        """Yield the runs of scans without a skipped sample."""
         volts = values.reshape(-1, len(self._inputs)).T
         whole = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)
         for run in np.split(np.arange(whole.size), np.flatnonzero(np.diff(whole)) + 1):
@@ -109,13 +139,11 @@ class LjmReader:
                 self._lost += run.size
 
     def stop(self) -> None:
-        """See Reader."""
         self._library.eStreamStop(self._handle)
 
     def close(self) -> None:
-        """See Reader."""
         self._library.close(self._handle)
 
     def fault(self) -> str:
-        """Nothing: the device does not tell."""
+        """Return an empty text: the device does not report faults."""
         return ""

@@ -126,7 +126,7 @@ def test_scans_arrive_unchanged_and_complete(
 def test_what_a_slow_device_sends_after_its_stop_is_not_taken_for_the_next_stream(
     emulated: Make, signal_at: SignalAt
 ) -> None:
-    traits = {"echoes_stop": True, "stop_takes": 0.4}
+    traits = {"echoes_stop": True, "stop_delay": 0.4}
     with emulated(**traits) as device, DataqSource(device.port, INPUTS, RATE, digital_word=False) as source:
         for _ in range(2):
             source.start()
@@ -244,7 +244,7 @@ def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytes
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.5)
     monkeypatch.setattr("acquisition.dataq.protocol.MAX_DRAIN_TIME", 0.2)
     with (
-        emulated(streaming_at_connect=True, deaf=True) as device,
+        emulated(streaming_at_connect=True, ignores_commands=True) as device,
         pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),
     ):
         DataqSource(device.port, INPUTS, RATE)

@@ -56,9 +56,9 @@ def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPa
     ("target", "message"),
     [
         ("no_such_module:DRIVER", "cannot be loaded (ModuleNotFoundError: No module named 'no_such_module')"),
-        ("acquisition.devices.built_in:NOTHING", "cannot be loaded (AttributeError: "),
-        ("acquisition.devices.registry:GROUP", "of the package bad is no acquisition.Driver"),
-        ("acquisition.devices.built_in:BUILT_IN.__class__", "of the package bad is no acquisition.Driver"),
+        ("acquisition.devices.drivers:NOTHING", "cannot be loaded (AttributeError: "),
+        ("acquisition.devices.registry:DRIVER_ENTRY_POINTS", "of the package bad is no acquisition.Driver"),
+        ("acquisition.devices.drivers:BUILT_IN_DRIVERS.__class__", "of the package bad is no acquisition.Driver"),
     ],
 )
 def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Install, target: str, message: str) -> None:

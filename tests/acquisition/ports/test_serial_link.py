@@ -21,7 +21,7 @@ pty = pytest.importorskip("pty", reason="pseudo-terminals are needed")
 
 HOLDER = """
 import sys
-from acquisition.ports.serial_link import SerialLink
+from acquisition.ports import SerialLink
 link = SerialLink(sys.argv[1])
 print("open", flush=True)
 input()

@@ -233,7 +233,13 @@ class DataqCommandLink:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
 
     def send_command(self, command: str) -> str:
-        """Send a command, wait for its echo, and return what the device adds to it."""
+        """Send a command, wait for its echo, and return what the device adds to it.
+
+        Parameters
+        ----------
+        command
+            Command without its CR.
+        """
         last_line = ""
         for _ in range(self._tries):
             self._link.write(encode_command(command))

@@ -6,8 +6,6 @@ import enum
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from types import TracebackType
-from typing import Self
 
 from acquisition.channel import Block, SensorInput
 from acquisition.dataq.protocol import (
@@ -26,7 +24,7 @@ from acquisition.dataq.protocol import (
 from acquisition.dataq.stream import CodeBlock, ScanDecoder
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
-from acquisition.source import Event
+from acquisition.source import ClosedOnExit, Event
 
 DATAQ_SILENCE_TIMEOUT = 3.0
 """Time without scans after which a scanning device has failed (s)."""
@@ -43,7 +41,7 @@ class DataqStatus(enum.StrEnum):
     """Its buffer overflowed and it stopped by itself. Scanning was restarted, no scan has arrived yet."""
 
 
-class DataqSource:
+class DataqSource(ClosedOnExit):
     """Connection to a DATAQ device as a source of scans. A context manager.
 
     Parameters
@@ -108,14 +106,6 @@ class DataqSource:
         except BaseException:
             self._link.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def start(self) -> None:
         """Start an endless stream."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from acquisition.channel import SensorInput
@@ -114,12 +115,6 @@ def _open_taps(port: str, settings: DeviceSettings) -> Device:
     return TapsSource(port, settings.sample_rate)
 
 
-def _probe_taps(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.taps import probe_taps
-
-    return probe_taps(link)
-
-
 def _check_taps(settings: DeviceSettings) -> None:
     if not settings.loss_detection:
         raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
@@ -127,12 +122,12 @@ def _check_taps(settings: DeviceSettings) -> None:
         raise ValueError("digital_clock=true: a TAPS/1 device numbers its scans and needs no clock; leave the key out")
 
 
-def _emulate_taps(bench: EmulationSetup) -> EmulatorThread:
+def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.taps import TapsEmulator
 
-    channels = tuple(sensor.channel for sensor in bench.inputs)
-    signal = bench.signal_at(bench.sample_rate)
-    return TapsEmulator(signal, channels, bench.sample_rate, realtime=bench.realtime, tcp=bench.tcp)
+    channels = tuple(sensor.channel for sensor in setup.inputs)
+    signal = setup.signal_at(setup.sample_rate)
+    return TapsEmulator(signal, channels, setup.sample_rate, realtime=setup.realtime, tcp=setup.tcp)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
@@ -143,12 +138,6 @@ def _open_dataq(port: str, settings: DeviceSettings) -> Device:
     )
 
 
-def _probe_dataq(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.dataq import probe_dataq
-
-    return probe_dataq(link)
-
-
 def _check_dataq(settings: DeviceSettings) -> None:
     from acquisition.dataq import check_inputs
 
@@ -157,13 +146,13 @@ def _check_dataq(settings: DeviceSettings) -> None:
         raise ValueError("digital_clock=true: the clock stands in the digital word; leave out loss_detection=false")
 
 
-def _emulate_dataq(bench: EmulationSetup) -> EmulatorThread:
+def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
     """Emulate a DATAQ device. If an input has a skew, the device converts its inputs one after the other."""
     from acquisition.dataq import DataqEmulator, DataqTraits
 
-    skewed = any(sensor.channel.skew for sensor in bench.inputs)
-    traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if bench.digital_clock else None)
-    return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
+    skewed = any(sensor.channel.skew for sensor in setup.inputs)
+    traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if setup.digital_clock else None)
+    return DataqEmulator(setup.signal_at, setup.inputs, realtime=setup.realtime, tcp=setup.tcp, traits=traits)
 
 
 def _open_text_board(port: str, settings: DeviceSettings) -> Device:
@@ -172,45 +161,38 @@ def _open_text_board(port: str, settings: DeviceSettings) -> Device:
     return TextBoardSource(port, settings.inputs, settings.sample_rate, settings.printing)
 
 
-def _probe_text_board(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.text_boards import probe_text_board
-
-    return probe_text_board(link)
-
-
 def _check_text_board(settings: DeviceSettings) -> None:
     from acquisition.text_boards import check_text_board
 
     check_text_board(settings.inputs, settings.sample_rate)
 
 
-def _emulate_text_board(bench: EmulationSetup) -> EmulatorThread:
+def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.text_boards import TextBoardEmulator
 
-    channels = [sensor.channel for sensor in bench.inputs]
+    channels = [sensor.channel for sensor in setup.inputs]
     sensitivities = tuple(channel.sensitivity for channel in channels)
-    rate, full_scale = min(bench.sample_rate, EMULATED_BOARD_RATE), channels[0].full_scale
+    rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), channels[0].full_scale
     return TextBoardEmulator(
-        bench.signal_at(rate), sensitivities, full_scale, rate, realtime=bench.realtime, tcp=bench.tcp
+        setup.signal_at(rate), sensitivities, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp
     )
 
 
-def _make_library_driver(name: str, title: str, extra: str) -> Driver:
-    """Make the driver of a device that a vendor library reads."""
+def _import_when_called(module: str, function: str) -> Callable[..., Any]:
+    """Return a function that imports the named function when it is called."""
+    return lambda *arguments: getattr(import_module(module), function)(*arguments)
+
+
+def _make_library_driver(name: str, title: str) -> Driver:
+    """Make the driver of a device that a vendor library reads. The extra that installs it has the driver's name."""
 
     def open_device(port: str, settings: DeviceSettings) -> Device:
-        from acquisition import vendor_drivers as makers
-
-        opened: Device = getattr(makers, f"open_{name}")(port, settings.inputs, settings.sample_rate)
+        opened: Device = open_with_library(port, settings.inputs, settings.sample_rate)
         return opened
 
-    def search() -> Sequence[DeviceAddress]:
-        from acquisition import vendor_drivers as makers
-
-        listed: Sequence[DeviceAddress] = getattr(makers, f"search_{name}")()
-        return listed
-
-    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=extra)
+    open_with_library = _import_when_called("acquisition.vendor_drivers", f"open_{name}")
+    search = _import_when_called("acquisition.vendor_drivers", f"search_{name}")
+    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=name)
 
 
 BUILT_IN_DRIVERS = (
@@ -218,7 +200,7 @@ BUILT_IN_DRIVERS = (
         "taps",
         "a TAPS/1 device",
         _open_taps,
-        _probe_taps,
+        _import_when_called("acquisition.taps", "probe_taps"),
         _check_taps,
         SensorDataLocation("the device's own channel data (INFO)", "sens_V_per_EU", "skew_s"),
         emulate=_emulate_taps,
@@ -228,7 +210,7 @@ BUILT_IN_DRIVERS = (
         "dataq",
         "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B",
         _open_dataq,
-        _probe_dataq,
+        _import_when_called("acquisition.dataq", "probe_dataq"),
         _check_dataq,
         usb_vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
@@ -237,16 +219,16 @@ BUILT_IN_DRIVERS = (
         "lines",
         "a board that prints lines of numbers",
         _open_text_board,
-        _probe_text_board,
+        _import_when_called("acquisition.text_boards", "probe_text_board"),
         _check_text_board,
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,
     ),
-    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39", "audio"),
-    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230", "nidaqmx"),
-    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi", "mcc172"),
-    _make_library_driver("uldaq", "a Measurement Computing USB device", "uldaq"),
-    _make_library_driver("ljm", "a LabJack T7 or T8", "ljm"),
+    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39"),
+    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230"),
+    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi"),
+    _make_library_driver("uldaq", "a Measurement Computing USB device"),
+    _make_library_driver("ljm", "a LabJack T7 or T8"),
 )
 """Built-in drivers, in the order in which they probe."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DataError
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 SignalFunction = Callable[[int, int], NDArray[np.float64]]
 """Function (first_scan, n_scans) that returns values in N and m/s^2, shape (n_channels, n_scans)."""
@@ -44,7 +44,7 @@ def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDAr
     return np.stack([channel.encode(values) for channel, values in zip(channels, signal, strict=True)])
 
 
-class SimulatedSource:
+class SimulatedSource(ClosedOnExit):
     """Source of the scans of a signal function, as fast as they are read. For unit tests.
 
     Parameters
@@ -90,14 +90,6 @@ class SimulatedSource:
         self.events: deque[Event] = deque()
         """Events, to be added by the test."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def fault(self) -> str:

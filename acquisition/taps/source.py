@@ -8,13 +8,12 @@ import struct
 import time
 from collections import deque
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.taps.protocol import (
     FRAME_OVERHEAD,
     LOST_BEFORE_FLAG,
@@ -118,7 +117,7 @@ TARGET_FRAME_TIME = 0.01
 """Duration of a frame requested at higher sample rates (s)."""
 
 
-class TapsSource:
+class TapsSource(ClosedOnExit):
     """Connection to a TAPS/1 device as a source of scans. A context manager.
 
     Parameters
@@ -159,14 +158,6 @@ class TapsSource:
         except BaseException:
             self._link.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def events(self) -> deque[Event]:

@@ -6,8 +6,6 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink, find_usb_identity
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.text_boards.decoders import LineDecoder, OutputFormat, ScanCounter, SimpleFrameDecoder
 
 BOARD_LISTEN_TIME = 1.0
@@ -57,7 +55,7 @@ BOARD_SILENCE_TIMEOUT = 3.0
 """Time without samples after which a board has failed (s). A board that resets when opened needs two."""
 
 
-class TextBoardSource:
+class TextBoardSource(ClosedOnExit):
     """Board that prints its samples, as a source of scans. A context manager.
 
     The board prints by itself and is never written to. Values come in the order of the inputs, with a counter before
@@ -108,14 +106,6 @@ class TextBoardSource:
         self._link = SerialLink(port, self._printing.baud_rate)
         usb = find_usb_identity(port)
         self.identity = DeviceIdentity("lines", usb[1] if usb else port)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def start(self) -> None:
         """Count scans from the next whole line on."""

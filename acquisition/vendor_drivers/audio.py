@@ -20,6 +20,7 @@ from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
     find_library,
@@ -93,7 +94,7 @@ def search_audio() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_audio` takes, empty if the library is not installed.
     """
-    library = find_library("sounddevice", "audio")
+    library = find_library("sounddevice")
     return (
         [_make_address(entry) for entry in library.query_devices() if entry["max_input_channels"] >= 2]
         if library
@@ -125,7 +126,7 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     ValueError
         The device does not have an input, range or rate.
     """
-    library = load_library("sounddevice", "audio")
+    library = load_library("sounddevice")
     entry = _find_sound_device(library.query_devices(), port.removeprefix("audio:"))
     numbers = tuple(sensor.number for sensor in inputs)
     check_input_numbers(numbers, entry["max_input_channels"], entry["name"])
@@ -142,7 +143,7 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
 
 
-class AudioReader:
+class AudioReader(LibraryReader):
     """Reader of the blocks that PortAudio delivers in a thread of its own."""
 
     def __init__(
@@ -178,10 +179,6 @@ class AudioReader:
 
     def close(self) -> None:
         self._stream.close()
-
-    def fault(self) -> str:
-        """Return an empty text: a sound device does not report faults."""
-        return ""
 
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -14,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import SensorInput
-from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-LJM_EXTRA = "ljm"
 T7_DEFAULT_RATE = 40000.0
 """Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
 T7_BLOCK_TIME = 0.02
@@ -45,7 +46,7 @@ def search_ljm() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_ljm` takes, empty if the library is not installed.
     """
-    library = find_library("labjack.ljm", LJM_EXTRA)
+    library = find_library("labjack.ljm")
     if library is None:
         return []
     constants = library.constants
@@ -79,31 +80,28 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
     ValueError
         The device does not have an input or range.
     """
-    library = load_library("labjack.ljm", LJM_EXTRA)
+    library = load_library("labjack.ljm")
     numbers = [sensor.number for sensor in inputs]
     check_input_numbers(numbers, T7_INPUT_COUNT, "a LabJack T7")
     for sensor in inputs:
         if sensor.channel.full_scale not in T7_RANGES:
             listed = ", ".join(f"{scale:g}" for scale in T7_RANGES)
             raise ValueError(f"range_v={sensor.channel.full_scale:g} is none of {listed}, the ranges of a LabJack T7")
-    handle = None
-    try:
+    with convert_open_errors(port, library.LJMError), ExitStack() as cleanup:
         handle = library.openS("ANY", "ANY", port.removeprefix("ljm:"))
+        cleanup.callback(library.close, handle)
         for sensor in inputs:
             library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
         reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
         serial = library.getHandleInfo(handle)[2]
         firmware = library.eReadName(handle, "FIRMWARE_VERSION")
-    except library.LJMError as error:
-        if handle is not None:
-            library.close(handle)
-        raise DeviceError(f"{port} cannot be opened ({error})", "`lobewatch ports` lists what there is") from error
+        cleanup.pop_all()
     identity = DeviceIdentity("LabJack", str(serial), f"{firmware:.4f}")
     channels = tuple(replace(sensor.channel, adc_bits=16) for sensor in inputs)
     return LibraryDevice(port, reader, identity, channels, reader.rate, "skipped samples")
 
 
-class LjmReader:
+class LjmReader(LibraryReader):
     """Reader of an LJM stream."""
 
     def __init__(self, library: Any, handle: int, numbers: Sequence[int], rate: float) -> None:
@@ -143,7 +141,3 @@ class LjmReader:
 
     def close(self) -> None:
         self._library.close(self._handle)
-
-    def fault(self) -> str:
-        """Return an empty text: the device does not report faults."""
-        return ""

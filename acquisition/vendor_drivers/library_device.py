@@ -8,50 +8,61 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
+
+EXTRAS = {"daqhats": "mcc172", "labjack": "ljm", "nidaqmx": "nidaqmx", "sounddevice": "audio", "uldaq": "uldaq"}
+"""Extra of lobewatch that installs each vendor library."""
+OPEN_REMEDY = "`acquisition.scan_ports` lists what there is"
+"""Remedy for a device that cannot be opened."""
+LIBRARY_SILENCE_TIMEOUT = 3.0
+"""Time without scans after which a started device has failed (s)."""
+LIBRARY_READ_TIMEOUT = 0.2
+"""Time that a reader may wait for scans (s)."""
 
 
-def load_library(module: str, extra: str) -> Any:  # a module without types
+def load_library(module: str) -> Any:  # a module without types
     """Import a module of a vendor library. DeviceError with the install command if that fails.
 
     Libraries raise OSError if their own C library is missing.
     """
+    package = module.partition(".")[0]
     try:
         return import_module(module)
     except (ImportError, OSError) as error:
-        package = module.partition(".")[0]
         raise DeviceError(
             f"the library {package} cannot be used ({' '.join(str(error).split())})",
-            f"pip install 'lobewatch[{extra}]', and what its maker says it needs (docs/devices.md)",
+            f"pip install 'lobewatch[{EXTRAS[package]}]', and what its maker says it needs (docs/devices.md)",
         ) from error
 
 
-def find_library(module: str, extra: str) -> Any | None:  # as above
+def find_library(module: str) -> Any | None:  # as above
     """Import a module of a vendor library for a search. None if that fails."""
     try:
-        return load_library(module, extra)
+        return load_library(module)
     except DeviceError:
         return None
+
+
+@contextmanager
+def convert_open_errors(port: str, errors: type[Exception], remedy: str = OPEN_REMEDY) -> Iterator[None]:
+    """Convert errors of a vendor library on opening a device to DeviceError with its port."""
+    try:
+        yield
+    except errors as error:
+        raise DeviceError(f"{port} cannot be opened ({' '.join(str(error).split())})", remedy) from error
 
 
 def check_input_numbers(numbers: Sequence[int], count: int, device: str) -> None:
     for number in numbers:
         if number >= count:
             raise ValueError(f"input={number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]")
-
-
-LIBRARY_SILENCE_TIMEOUT = 3.0
-"""Time without scans after which a started device has failed (s)."""
-LIBRARY_READ_TIMEOUT = 0.2
-"""Time that a reader may wait for scans (s)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +75,8 @@ class VoltageBlock:
     """Number of scans lost before this block, 1 if the library reports a loss without a number."""
 
 
-class LibraryReader(Protocol):
-    """Interface to a vendor library."""
+class LibraryReader:
+    """Interface to a vendor library, implemented once per library."""
 
     errors: tuple[type[Exception], ...]
     """Exceptions that the library raises."""
@@ -81,6 +92,7 @@ class LibraryReader(Protocol):
         timeout
             Longest time to wait (s).
         """
+        raise NotImplementedError
 
     def stop(self) -> None:
         """End sampling. Harmless if it has ended."""
@@ -90,10 +102,11 @@ class LibraryReader(Protocol):
 
     def fault(self) -> str:
         """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""
+        return ""
 
 
 @dataclass
-class LibraryDevice:
+class LibraryDevice(ClosedOnExit):
     """Device read through a vendor library. Codes are the voltages in steps of each channel's converter."""
 
     address: str
@@ -119,14 +132,6 @@ class LibraryDevice:
         """Sentence on a sensor fault while it lasts."""
         with self._named():
             return self.reader.fault()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def start(self) -> None:
         with self._named():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -18,14 +19,16 @@ from acquisition.channel import SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
+    OPEN_REMEDY,
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-MCC172_EXTRA = "mcc172"
 MCC172_MAX_RATE = 51200.0
 """Highest sample rate (Hz). The others are this rate divided by 2 to 256."""
 MCC172_FULL_SCALE = 5.0
@@ -44,7 +47,7 @@ def search_mcc172() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_mcc172` takes, empty if the library is not installed.
     """
-    library = find_library("daqhats", MCC172_EXTRA)
+    library = find_library("daqhats")
     if library is None:
         return []
     boards = library.hat_list(filter_by_id=library.HatIDs.MCC_172)
@@ -78,7 +81,7 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     ValueError
         The address, an input or a range does not exist.
     """
-    library = load_library("daqhats", MCC172_EXTRA)
+    library = load_library("daqhats")
     address = port.removeprefix("mcc172:")
     if not address.isdigit():
         raise ValueError(f"port={port!r}: mcc172: is followed by the address of the board, 0 to 7, as in mcc172:0")
@@ -86,21 +89,18 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     for sensor in inputs:
         if sensor.channel.full_scale != MCC172_FULL_SCALE:
             raise ValueError(f"range_v={sensor.channel.full_scale:g}: an MCC 172 has {MCC172_FULL_SCALE:g} V alone")
-    try:
+    with convert_open_errors(port, library.HatError):
         board = library.mcc172(int(address))
         for sensor in inputs:
             board.iepe_config_write(sensor.number, int(sensor.iepe))
         rate = _set_mcc172_rate(library, board, sample_rate or MCC172_MAX_RATE)
         identity = DeviceIdentity("MCC 172", board.serial(), board.firmware_version().version)
-    except library.HatError as error:
-        words = " ".join(str(error).split())
-        raise DeviceError(f"{port} cannot be opened ({words})", "`lobewatch ports` lists what there is") from error
     channels = tuple(replace(sensor.channel, adc_bits=24) for sensor in inputs)
     reader = Mcc172Reader(library, board, [sensor.number for sensor in inputs], rate)
     return LibraryDevice(port, reader, identity, channels, rate, "buffer overrun")
 
 
-class Mcc172Reader:
+class Mcc172Reader(LibraryReader):
     """Reader of a continuous scan of both inputs."""
 
     def __init__(self, library: Any, board: Any, numbers: Sequence[int], rate: float) -> None:
@@ -129,10 +129,6 @@ class Mcc172Reader:
         for number in self._numbers:
             self._board.iepe_config_write(number, 0)
 
-    def fault(self) -> str:
-        """Return an empty text: the board does not report faults."""
-        return ""
-
 
 def _set_mcc172_rate(library: Any, board: Any, rate: float) -> float:
     """Set the nearest rate, wait until the converters are synchronized, and return the rate (Hz)."""
@@ -145,7 +141,6 @@ def _set_mcc172_rate(library: Any, board: Any, rate: float) -> float:
     return float(clock.sample_rate_per_channel)
 
 
-ULDAQ_EXTRA = "uldaq"
 ULDAQ_DEFAULT_RATE = 50000.0
 """Default sample rate (Hz)."""
 ULDAQ_RING_TIME = 2.0
@@ -162,7 +157,7 @@ def search_uldaq() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_uldaq` takes, empty if the library is not installed.
     """
-    library = find_library("uldaq", ULDAQ_EXTRA)
+    library = find_library("uldaq")
     if library is None:
         return []
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
@@ -195,7 +190,7 @@ def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     ValueError
         The device does not have an input or range.
     """
-    library = load_library("uldaq", ULDAQ_EXTRA)
+    library = load_library("uldaq")
     wanted = port.removeprefix("uldaq:")
     entries = [
         entry
@@ -203,22 +198,18 @@ def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         if entry.unique_id.casefold() == wanted.casefold()
     ]
     if not entries:
-        raise DeviceError(f"{wanted!r} is not plugged in", "`lobewatch ports` lists what there is")
+        raise DeviceError(f"{wanted!r} is not plugged in", OPEN_REMEDY)
     device = library.DaqDevice(entries[0])
-    try:
+    with convert_open_errors(port, library.ULException, "check that no other program uses it"), ExitStack() as cleanup:
+        cleanup.callback(device.release)
         device.connect()
         reader = UldaqReader(library, device, inputs, sample_rate or ULDAQ_DEFAULT_RATE)
-    except library.ULException as error:
-        device.release()
-        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
-    except BaseException:
-        device.release()
-        raise
+        cleanup.pop_all()
     channels = tuple(replace(sensor.channel, adc_bits=reader.bits) for sensor in inputs)
     return LibraryDevice(port, reader, _read_uldaq_identity(entries[0]), channels, reader.rate, "scan count")
 
 
-class UldaqReader:
+class UldaqReader(LibraryReader):
     """Reader of the ring buffer that a continuous scan fills."""
 
     def __init__(self, library: Any, device: Any, inputs: Sequence[SensorInput], rate: float) -> None:
@@ -268,10 +259,6 @@ class UldaqReader:
     def close(self) -> None:
         self._device.disconnect()
         self._device.release()
-
-    def fault(self) -> str:
-        """Return an empty text: the device does not report faults."""
-        return ""
 
 
 def _read_uldaq_identity(entry: Any) -> DeviceIdentity:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from acquisition.channel import Channel, SensorInput
-from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-NIDAQMX_EXTRA = "nidaqmx"
 NIDAQMX_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 NIDAQMX_BUFFER_TIME = 10.0
@@ -36,12 +37,12 @@ def search_nidaqmx() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_nidaqmx` takes, empty if the library or NI's driver is not installed.
     """
-    if find_library("nidaqmx", NIDAQMX_EXTRA) is None:
+    if find_library("nidaqmx") is None:
         return []
     try:
-        devices = [*load_library("nidaqmx.system", NIDAQMX_EXTRA).System.local().devices]
+        devices = [*load_library("nidaqmx.system").System.local().devices]
         listed = [(device, len(device.ai_physical_chans)) for device in devices]
-    except load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error:  # NI's own driver is not installed
+    except load_library("nidaqmx.errors").Error:  # NI's own driver is not installed
         return []
     return [
         DeviceAddress(f"nidaqmx:{device.name}", _read_identity(device), f"{count} inputs")
@@ -76,33 +77,27 @@ def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | 
     ValueError
         The device does not have an input.
     """
-    library = load_library("nidaqmx", NIDAQMX_EXTRA)
-    task = None
-    try:
-        device = load_library("nidaqmx.system", NIDAQMX_EXTRA).Device(port.removeprefix("nidaqmx:"))
+    library = load_library("nidaqmx")
+    with convert_open_errors(port, load_library("nidaqmx.errors").Error), ExitStack() as cleanup:
+        device = load_library("nidaqmx.system").Device(port.removeprefix("nidaqmx:"))
         check_input_numbers([sensor.number for sensor in inputs], len(device.ai_physical_chans), device.product_type)
         task = library.Task()
+        cleanup.callback(task.close)
         channels = tuple(_add_input(task, device, sensor) for sensor in inputs)
         rate = _set_rate(task, sample_rate or device.ai_max_multi_chan_rate)
         reader = NidaqmxReader(task, len(inputs), rate)
+        cleanup.pop_all()
         return LibraryDevice(port, reader, _read_identity(device), channels, rate, "buffer overrun")
-    except BaseException as error:
-        if task is not None:
-            task.close()
-        if not isinstance(error, load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error):
-            raise
-        words = " ".join(str(error).split())
-        raise DeviceError(f"{port} cannot be opened ({words})", "`lobewatch ports` lists what there is") from error
 
 
-class NidaqmxReader:
+class NidaqmxReader(LibraryReader):
     """Reader of a task that samples continuously."""
 
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:
         """Take the task with its inputs and its rate (Hz)."""
-        self.errors: tuple[type[Exception], ...] = (load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error,)
+        self.errors: tuple[type[Exception], ...] = (load_library("nidaqmx.errors").Error,)
         self._task = task
-        self._reader = load_library("nidaqmx.stream_readers", NIDAQMX_EXTRA).AnalogMultiChannelReader(task.in_stream)
+        self._reader = load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
         self._shape = n_channels, round(rate * NIDAQMX_BLOCK_TIME)
 
     def start(self) -> None:
@@ -138,7 +133,7 @@ def _read_identity(device: Any) -> DeviceIdentity:
 
 def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
     """Add an input to the task, powered if it feeds its sensor. Return the channel with its real range."""
-    constants = load_library("nidaqmx.constants", NIDAQMX_EXTRA)
+    constants = load_library("nidaqmx.constants")
     scale = sensor.channel.full_scale
     entry = task.ai_channels.add_ai_voltage_chan(f"{device.name}/ai{sensor.number}", min_val=-scale, max_val=scale)
     currents = device.ai_current_int_excit_discrete_vals
@@ -151,6 +146,6 @@ def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
 
 def _set_rate(task: Any, rate: float) -> float:
     """Set the clock of a task and return the real sample rate (Hz)."""
-    continuous = load_library("nidaqmx.constants", NIDAQMX_EXTRA).AcquisitionType.CONTINUOUS
+    continuous = load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
     task.timing.cfg_samp_clk_timing(rate, sample_mode=continuous, samps_per_chan=round(rate * NIDAQMX_BUFFER_TIME))
     return float(task.timing.samp_clk_rate)

@@ -198,7 +198,7 @@ def test_the_rate_is_one_that_the_device_has(name: str, asked: float, actual: fl
         ("audio", {"rate": 51200.0}, ValueError, "sample_rate_hz=51200: 485B39 .* has no such rate"),
         ("audio", {"range_v": 5.0}, ValueError, "range_v=5: the calibration of 485B39 says 9.916 V for input 0"),
         ("audio", {"numbers": (0, 2)}, ValueError, "input=2: 485B39 .* has the inputs 0 to 1"),
-        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 cannot be opened .*invalid.*lobewatch ports"),
+        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 cannot be opened .*invalid.*acquisition.scan_ports"),
         ("nidaqmx", {"numbers": (0, 4)}, ValueError, "input=4: NI 9234 has the inputs 0 to 3"),
         ("mcc172", {"port": "mcc172:first"}, ValueError, "address of the board, 0 to 7"),
         ("mcc172", {"port": "mcc172:3"}, DeviceError, "Addr 3: Board not responding"),

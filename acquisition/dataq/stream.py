@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Flags
 from acquisition.dataq.protocol import OVERFLOW_REPLY, USB_PACKET_BYTES
 from acquisition.errors import DeviceError
 
@@ -37,7 +38,7 @@ class DigitalClock:
         self._edge: int | None = None
         self._waited = 0
 
-    def find_gap(self, high: NDArray[np.bool_]) -> tuple[int, int]:
+    def find_gap(self, high: Flags) -> tuple[int, int]:
         """Return how many scans precede the next gap, and how many are missing there (0: none).
 
         The place is that of the next edge, at most a period late. The number is the smallest that fits, right except
@@ -83,7 +84,7 @@ class DigitalClock:
         ):
             raise _make_clock_error()
 
-    def _go_on(self, high: NDArray[np.bool_]) -> None:
+    def _go_on(self, high: Flags) -> None:
         self._high = bool(high[-1])
         self._waited += high.size
         if self._edge is not None:
@@ -105,7 +106,7 @@ HELD_BACK_BYTES = 32
 SYNC_WINDOW_SCANS = 32
 """Scans that must agree before a position is accepted as that of the digital word."""
 
-CodeBlock = tuple[NDArray[np.int32], int]
+CodeBlock = tuple[Codes, int]
 """Codes, shape (n_channels, n), and the number of scans lost before them."""
 
 

@@ -16,17 +16,17 @@ from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DataError
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
-SignalFunction = Callable[[int, int], NDArray[np.float64]]
+SignalFunction = Callable[[int, int], Floats]
 """Function (first_scan, n_scans) that returns values in N and m/s^2, shape (n_channels, n_scans)."""
 
 
-def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDArray[np.int32]:
+def quantise(signal: Floats, channels: tuple[Channel, ...]) -> Codes:
     """Convert values to ADC codes.
 
     Parameters
@@ -177,7 +177,9 @@ class PtyWire:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            raise DataError(f"no pseudo-terminal can be had here ({error}); go through TCP, with --tcp") from error
+            raise DataError(
+                f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
+            ) from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
+
 NOISE_BLOCK_SCANS = 512
 """Scans whose noise is generated at once. Blocks of any multiple of them have the same noise."""
 _PULSE_HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
@@ -33,16 +35,16 @@ class Structure:
     True
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Undamped natural frequencies (Hz), shape (n,)."""
-    damping_ratio: NDArray[np.float64]
+    damping_ratio: Floats
     """Viscous damping ratios (-), shape (n,)."""
-    stiffness: NDArray[np.float64]
+    stiffness: Floats
     """Modal stiffnesses from hammer to sensor (N/m), shape (n,). Negative if both move in opposite directions."""
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 
-    def response(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
+    def response(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         """Return the acceleration after a pulse sin^4(pi t/T) of 1 N.
 
         Parameters
@@ -79,9 +81,7 @@ class Structure:
         return result
 
 
-def _free_amplitude(
-    displacement: NDArray[np.float64], velocity: NDArray[np.float64], root: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+def _free_amplitude(displacement: Floats, velocity: Floats, root: Complexes) -> Complexes:
     """Return C such that Re(C exp(root t)) has this displacement and velocity at t = 0, shape (n,)."""
     return displacement + 1j * (root.real * displacement - velocity) / root.imag
 
@@ -125,13 +125,13 @@ class HammeredStructure:
     """Modes from the hammer to each further sensor."""
     _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
-    _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)
+    _waves: list[tuple[int, Floats]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         """Give the noise its own generator, so that hits do not depend on the block length."""
         self._noise = self.random.spawn(1)[0]
 
-    def __call__(self, first_scan: int, n_scans: int) -> NDArray[np.float64]:
+    def __call__(self, first_scan: int, n_scans: int) -> Floats:
         """Return the next scans."""
         while self._next_hit < first_scan + n_scans:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
@@ -144,14 +144,14 @@ class HammeredStructure:
                 signals[:, low - first_scan : high - first_scan] += wave[:, low - start : high - start]
         return signals
 
-    def _noise_of(self, n_scans: int) -> NDArray[np.float64]:
+    def _noise_of(self, n_scans: int) -> Floats:
         rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.cross_structures))]
         pieces, rest = divmod(n_scans, NOISE_BLOCK_SCANS)
         whole = self._noise.standard_normal((pieces, len(rms), NOISE_BLOCK_SCANS))
         drawn = np.concatenate([*whole, self._noise.standard_normal((len(rms), rest))], axis=1)
         return np.asarray(np.array(rms)[:, np.newaxis] * drawn)
 
-    def _hit(self, scan: float) -> tuple[int, NDArray[np.float64]]:
+    def _hit(self, scan: float) -> tuple[int, Floats]:
         peak = self.random.uniform(*self.hammering.force_range)
         width = self.random.uniform(*self.hammering.width_range)
         fault = self.random.uniform()
@@ -171,6 +171,6 @@ class HammeredStructure:
         slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in felt)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
-    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
+    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.cross_structures))])

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.milling import TipMotion
-
-Floats = NDArray[np.float64]
 
 SENSOR_MOUNT_FREQUENCY = 20e3
 """Frequency above which the sensor mount attenuates by 12 dB per octave (Hz)."""
@@ -38,7 +37,7 @@ class Housing:
     noise: float = 0.0
     """Noise of the sensor and its cable (m/s^2 rms)."""
 
-    def transfer(self, frequency: NDArray[np.floating[Any]]) -> NDArray[np.complex128]:
+    def transfer(self, frequency: NDArray[np.floating[Any]]) -> Complexes:
         """Return the transfer function from tip to sensor acceleration for a gain of 1.
 
         Parameters
@@ -51,7 +50,7 @@ class Housing:
             r = frequency / natural
             total += share / (1 - r**2 + 2j * zeta * r)
         r = frequency / SENSOR_MOUNT_FREQUENCY
-        heard: NDArray[np.complex128] = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
+        heard: Complexes = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
         return heard
 
 

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.milling_cut import (
     MillingCut,
     ModeTables,
@@ -33,8 +34,6 @@ from acquisition.emulation.milling_cut import (
     build_tables,
     count_steps_needed,
 )
-
-Floats = NDArray[np.float64]
 
 MAX_STEP_COUNT_FACTOR = 1.25
 """Factor by which steps per turn may exceed those needed, to make pitches whole numbers of steps."""
@@ -52,7 +51,7 @@ def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
 
 def simulate_uneven_cutting(
     cut: MillingCut, modes: ModeTables, tooth: ToothTables, passage: Passage
-) -> tuple[NDArray[np.complex128], Floats, NDArray[np.complex128]]:
+) -> tuple[Complexes, Floats, Complexes]:
     """Simulate a cut with uneven pitch from first to last contact.
 
     Returns the mode states after each step and their gains in it, both (n, 1, m), and the last state (m,).
@@ -177,7 +176,7 @@ def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
 
 def _simulate_group(
     cuts: Sequence[MillingCut], modes: ModeTables, teeth: ToothTables, passage: Passage
-) -> tuple[NDArray[np.float32], NDArray[np.complex128]]:
+) -> tuple[NDArray[np.float32], Complexes]:
     """Return acceleration from first to last contact (n, c, 2) in m/s^2, and the mode states then (c, m)."""
     steps, step = len(teeth.root), modes.step
     periods = math.ceil(passage.cutting / (steps * float(np.min(step))))
@@ -203,13 +202,13 @@ def _simulate_group(
 
 
 def _step_tooth_period(
-    swing: NDArray[np.complex128],
-    flight: NDArray[np.complex128],
+    swing: Complexes,
+    flight: Complexes,
     reach: Floats,
     push: Floats,
     rub: Floats,
     room: Floats,
-) -> tuple[NDArray[np.complex128], Floats, Floats]:
+) -> tuple[Complexes, Floats, Floats]:
     """Step one tooth period: mode states after each step, their gains in it (s, c, m), and chips (s, c, e)."""
     swings = np.empty((len(room), *swing.shape), dtype=complex)
     gains, chips = np.empty(swings.shape), np.empty(room.shape)
@@ -227,7 +226,7 @@ def _step_tooth_period(
     return swings, gains, chips
 
 
-def _tip_acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
+def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Floats:
     """Return q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), at the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
     acceleration: Floats = np.einsum(
@@ -238,7 +237,7 @@ def _tip_acceleration(swings: NDArray[np.complex128], gains: Floats, modes: Mode
 
 def _assemble_motion(
     cutting: NDArray[np.float32],
-    swing: NDArray[np.complex128],
+    swing: Complexes,
     modes: ModeTables,
     place: int,
     passage: Passage,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.hammered_structure import Structure
 
 
@@ -102,7 +103,7 @@ class Passage:
         if not (min(self.before, self.ramp, self.steady, self.after) >= 0 and self.cutting > 0):
             raise ValueError(f"{self}: times must be >= 0, and ramp or steady > 0")
 
-    def depth_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth_at(self, time: Floats) -> Floats:
         """Return the share of the full depth.
 
         Parameters
@@ -123,8 +124,6 @@ class Passage:
         """Total time (s)."""
         return self.before + self.cutting + self.after
 
-
-Floats = NDArray[np.float64]
 
 MIN_STEPS_PER_CYCLE, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC = 16, 30, 16
 """Fewest steps per cycle of the fastest mode (as stiffened by the cut), per tooth period, and per arc of cut."""
@@ -148,9 +147,9 @@ def count_steps_needed(cut: MillingCut) -> int:
 class ModeTables:
     """Modes m of cuts c. A real mode is z = (q' + zeta w q) / w_d + i q, so that free vibration is a factor."""
 
-    pole: NDArray[np.complex128]
+    pole: Complexes
     """Poles -zeta w + i w_d (rad/s), shape (c, m). 0 if a cut has fewer modes."""
-    flight: NDArray[np.complex128]
+    flight: Complexes
     """Factor of z over a step, shape (c, m)."""
     axis: Floats
     """Motion of the tip along x and y of the machine by each mode, shape (c, 2, m)."""

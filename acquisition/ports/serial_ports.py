@@ -128,7 +128,7 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
     busy = "another program uses it: close that program"
     if platform == "linux" and not port.startswith("socket:"):
         busy += f" (`sudo fuser -v {port}` names it; ModemManager lets go after half a minute)"
-    missing = "check the cable and the port's name (`lobewatch ports` lists all)"
+    missing = "check the cable and the port's name (`acquisition.scan_ports` lists all)"
     hints = {
         "lock": busy,
         "busy": busy,

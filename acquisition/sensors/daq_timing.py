@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DeviceError, Remark
 from acquisition.source import Source
 
@@ -167,10 +168,12 @@ def rate_remark(measured: MeasuredRate) -> Remark | None:
         return None
     share = measured.std / measured.rate
     text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
-    return Remark("rate-not-sure", "", text, "close other programs and run lobewatch sensors, which measures it again")
+    return Remark(
+        "rate-not-sure", "", text, "close other programs and run acquisition.measure_rate, which measures it again"
+    )
 
 
-def _fit_scan_period(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[float, float]:
+def _fit_scan_period(scans: Floats, arrived: Floats) -> tuple[float, float]:
     """Return seconds per scan and standard error, from the least delayed block of each stretch."""
     period = (arrived[-1] - arrived[0]) / (scans[-1] - scans[0])
     std = 0.0
@@ -183,7 +186,7 @@ def _fit_scan_period(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -
     return period, std
 
 
-def _fit_robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
     """Return least-squares slope and standard error without the points far above the others."""
     rough = y - _median_slope(x, y) * x
     above = rough - np.median(rough)
@@ -198,7 +201,7 @@ def _fit_robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[f
     return slope, float(np.sqrt(variance))
 
 
-def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def _median_slope(x: Floats, y: Floats) -> float:
     """Return the median of the slopes of all pairs of points (Theil and Sen). x increases."""
     first, second = np.triu_indices(x.size, 1)
     return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
@@ -276,7 +279,7 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
 
 
-def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) -> MeasuredSkew:
+def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     """Return the skew of records[0] and second, in samples."""
     cross, power = _segment_spectra(np.stack([records[0], second]))
     mean = np.mean(cross, axis=0)
@@ -302,13 +305,13 @@ def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) 
     return MeasuredSkew(rough + float(np.angle(np.mean(turned, axis=0)) @ weight), float(std), share)
 
 
-def _shift_back(record: NDArray[np.float64], samples: float) -> NDArray[np.float64]:
+def _shift_back(record: Floats, samples: float) -> Floats:
     """Return the record as if taken this many samples earlier. Its ends are not right."""
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(record.size) * samples)
     return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
 
 
-def _check_record(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def _check_record(values: ArrayLike, name: str) -> Floats:
     record = np.asarray(values, dtype=np.float64)
     if record.ndim != 1 or record.size < MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES or not np.all(np.isfinite(record)):
         raise ValueError(
@@ -318,14 +321,14 @@ def _check_record(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return record - np.mean(record)
 
 
-def _check_records(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
     records = [_check_record(first, "first"), _check_record(second, "second")]
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
     return np.stack(records)
 
 
-def _segment_spectra(records: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+def _segment_spectra(records: Floats) -> tuple[Complexes, Floats]:
     """Return conj(X) Y of each segment but the two at the ends (n, lines), and |X|^2, |Y|^2 (2, n, lines)."""
     n = records.shape[1] // SKEW_SEGMENT_SAMPLES
     segments = records[:, : n * SKEW_SEGMENT_SAMPLES].reshape(2, n, SKEW_SEGMENT_SAMPLES)[:, 1:-1]
@@ -333,7 +336,7 @@ def _segment_spectra(records: NDArray[np.float64]) -> tuple[NDArray[np.complex12
     return np.conj(spectra[0]) * spectra[1], np.abs(spectra) ** 2
 
 
-def _find_correlation_peak(cross: NDArray[np.complex128]) -> float:
+def _find_correlation_peak(cross: Complexes) -> float:
     """Return the skew, to a fraction of a sample, at the largest magnitude of the correlation."""
     size = CORRELATION_OVERSAMPLING * SKEW_SEGMENT_SAMPLES
     lag = int(np.argmax(np.abs(np.fft.irfft(cross, size))))

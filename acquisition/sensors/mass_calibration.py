@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.channel import Channel
 from acquisition.errors import Remark
 from acquisition.estimation.estimate_frf import compute_cross_spectra, estimate_frf
@@ -210,7 +211,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     )
 
 
-def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.complex128]) -> int:
+def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Complexes) -> int:
     """Return the number of lines before m A/F leaves its initial value by 5 %."""
     if f.size < MIN_CALIBRATION_LINES:
         return f.size
@@ -222,9 +223,7 @@ def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s
     return int(off[0]) if off.size else f.size
 
 
-def _fit_ratio(
-    f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _fit_ratio(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Floats) -> Floats:
     """Return q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
     root = np.sqrt(s_ff)
     return np.asarray(

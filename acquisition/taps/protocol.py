@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 from cobs import cobs
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel
 from acquisition.source import DeviceIdentity, Event, EventKind
 
@@ -163,7 +163,7 @@ class FrameDecoder:
         return good
 
 
-def encode_data(first_scan: int, codes: NDArray[np.int32], bits: int = 16, overload: int = 0) -> bytes:
+def encode_data(first_scan: int, codes: Codes, bits: int = 16, overload: int = 0) -> bytes:
     """Encode scans (n_channels, n_scans) as the body of a DATA frame, with words of 16, 24 or 32 bits."""
     n_channels, n_scans = codes.shape
     words = np.ascontiguousarray(codes.T)
@@ -186,7 +186,7 @@ def decode_data(body: bytes) -> Block:
     return Block(first, codes.reshape(n_scans, n_channels).T, overload)
 
 
-def _decode_words(samples: bytes, bits: int) -> NDArray[np.int32]:
+def _decode_words(samples: bytes, bits: int) -> Codes:
     if bits == 16:
         return np.frombuffer(samples, "<i2").astype(np.int32)
     if bits == 32:

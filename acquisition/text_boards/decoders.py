@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
+
 COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
 """Values at which board counters wrap to 0."""
 
@@ -20,7 +22,7 @@ COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
 class PrintedRows:
     """Consecutive rows of numbers without a broken one between them."""
 
-    rows: NDArray[np.float64]
+    rows: Floats
     """Numbers, shape (n_scans, n_columns)."""
     broken_before: int = 0
     """Number of broken lines or frames before them."""
@@ -30,7 +32,7 @@ class PrintedRows:
 class ScanRun:
     """Consecutive scans."""
 
-    values: NDArray[np.float64]
+    values: Floats
     """Values as printed, one row per sensor, shape (n_sensors, n_scans)."""
     lost_before: int = 0
     """Scans lost before them, by the counter. Without one, the broken lines or frames: a lower bound."""

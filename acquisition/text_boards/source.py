@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink, find_usb_identity
@@ -144,7 +144,7 @@ class TextBoardSource(ClosedOnExit):
                     f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
                 )
 
-    def _codes(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _codes(self, values: Floats) -> Codes:
         """Return the codes of the converter, one row per channel."""
         rows = values[self._rows]
         if self._printing.frame is None and self._printing.adc_bits is None:
@@ -152,7 +152,7 @@ class TextBoardSource(ClosedOnExit):
             return np.array([channel.encode(row / channel.sensitivity) for channel, row in volts], np.int32)
         low, high = self.channels[0].rails
         zero = 0 if self._printing.frame else -low
-        codes: NDArray[np.int32] = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
+        codes: Codes = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
         return codes
 
 

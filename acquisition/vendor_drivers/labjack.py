@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
@@ -125,7 +125,7 @@ class LjmReader(LibraryReader):
             self._pieces.extend(self._runs(np.array(self._library.eStreamRead(self._handle)[0])))
         return self._pieces.popleft() if self._pieces else None
 
-    def _runs(self, values: NDArray[np.float64]) -> Iterator[VoltageBlock]:
+    def _runs(self, values: Floats) -> Iterator[VoltageBlock]:
         """Yield the runs of scans without a skipped sample."""
         volts = values.reshape(-1, len(self._inputs)).T
         whole = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)

@@ -11,8 +11,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
@@ -69,7 +69,7 @@ def check_input_numbers(numbers: Sequence[int], count: int, device: str) -> None
 class VoltageBlock:
     """Consecutive scans as a library returns them."""
 
-    volts: NDArray[np.float64]
+    volts: Floats
     """Voltages at the inputs (V), shape (n_channels, n_scans)."""
     lost_before: int = 0
     """Number of scans lost before this block, 1 if the library reports a loss without a number."""
@@ -167,7 +167,7 @@ class LibraryDevice(ClosedOnExit):
                     "unplug it and plug it in again",
                 )
 
-    def _codes(self, volts: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _codes(self, volts: Floats) -> Codes:
         rows = zip(self.channels, volts, strict=True)
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
@@ -250,7 +250,7 @@ class UldaqReader(LibraryReader):
         lost = max(come - self._read - self._size // 2, 0)  # half of the ring: the rest may be written meanwhile
         places = np.arange(self._read + lost, come) % self._size
         self._read = come
-        volts: NDArray[np.float64] = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
+        volts: Floats = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
         return VoltageBlock(volts, lost)
 
     def stop(self) -> None:

@@ -17,6 +17,7 @@ from acquisition import Block, Channel, DataError, Description, Device, DeviceEr
 from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
+from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook import Logbook
@@ -29,7 +30,6 @@ from lobewatch.tap.live_curves import find_extremes
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""
-Floats = NDArray[np.float64]
 
 
 class CutStep(enum.StrEnum):
@@ -210,7 +210,7 @@ def record_cut(
             picture(**waiting, cut_seconds=None)
     raise DataError(
         f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
-        "more --seconds"
+        "more record_cut.patience"
     )
 
 
@@ -277,9 +277,11 @@ def acquire_cut(
         return read_cut_recording(file, description)
     port = port or folder.machine.daq.port
     if not port:
-        raise ValueError(f"no port: give --port, --file, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port: give acquire_cut.port, acquire_cut.file, or port in [daq] of {folder.toml}")
     if port.startswith(REPLAY_PREFIX):
-        raise ValueError(f"--port {port}: a recording of hits; give the recording of a cut with --file")
+        raise ValueError(
+            f"acquire_cut.port {port}: a recording of hits; give the recording of a cut with acquire_cut.file"
+        )
     show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
     show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
     with open_device(folder.machine.daq, port) as device:
@@ -293,17 +295,17 @@ def acquire_cut(
 def check_sensor_kind(sensor: str, file: Path | None) -> str:
     """Return a kind of sensor. ValueError for an unknown one, and for a microphone at a device."""
     if sensor not in get_args(CutSensor):
-        raise ValueError(f"--sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
+        raise ValueError(f"Description.sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
     if sensor == "microphone" and file is None:
-        raise ValueError("--sensor microphone is for a --file; a device hears by its accelerometer")
+        raise ValueError("Description.sensor microphone is for a acquire_cut.file; a device hears by its accelerometer")
     return sensor
 
 
 def check_tacho_options(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
     """Return the tachometer fields of a description. ValueError at a device, which has none."""
     if file is None and (tacho or pulses is not None):
-        given = f"--tacho {tacho}" if tacho else f"--pulses {pulses}"
-        raise ValueError(f"{given} is for a --file; of a device only the accelerometer is heard")
+        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
+        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
     return {"tacho": tacho, "pulses": pulses}
 
 

@@ -188,7 +188,7 @@ def _get_measured_state(measurement: Measurement) -> SpindleState:
     mode, calibration = measurement.followed, measurement.calibration
     if mode is None or calibration is None:
         why = "; ".join(map(str, measurement.remarks))
-        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller --scatter")
+        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller MountingVariation.scatter")
     return SpindleState(mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)
 
 

@@ -5,25 +5,29 @@ Spindle and cut differ from the tapped machine and from machine.toml by a hidden
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import DataError, Driver, EmulationSetup, EmulatorThread, Structure
-from acquisition.emulation import Housing, HousingSignal, MillingCut, Passage, make_random_housing, simulate_cut
+from acquisition import Driver, EmulatorThread, SensorInput, Structure
+from acquisition.emulation import (
+    Housing,
+    HousingSignal,
+    MillingCut,
+    Passage,
+    SignalFunction,
+    make_random_housing,
+    simulate_cut,
+)
 from dsm import Spindle
 from lobes import Cut, Program, program_limit
 from lobewatch.cuts.learning.prior_samples import ROTATING_FORCE_PRIOR
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.emulated_spindle import (
-    EMULATED_SAMPLE_RATE,
-    build_structure,
-    get_emulated_inputs,
-    map_signal_to_inputs,
-)
+from lobewatch.tap.emulated_spindle import build_structure, emulate_device, get_spindle_table, map_signal_to_inputs
 from lobewatch.verdicts.program_samples import (
     ROTATING_DAMPING_FACTOR,
     ROTATING_FREQUENCY_FACTOR,
@@ -122,30 +126,22 @@ def emulate_cut(
     spindle: replaces the model of the tool. DataError if machine.toml has no model of it, or lacks the sensors of a
     device that does not describe them itself.
     """
-    if driver.emulate is None:
-        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
     motion, housing = simulate_cut(cut, passage), _normalize_gain(make_random_housing(random, cut.speed_rpm))
-    inputs = get_emulated_inputs(folder, driver)
-    bench = EmulationSetup(
-        lambda rate: map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise)),
-        inputs,
-        EMULATED_SAMPLE_RATE,
-        realtime,
-        tcp,
-        folder.machine.daq.digital_clock,
-    )
-    return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _find_true_limit(cut, setting))
+
+    def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
+        return map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
+
+    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
 
 
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Return the modes of the tip that a cut moves."""
-    table = folder.machine.spindle
-    if table is None:
-        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    whole = build_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
+    damping_ratio = get_spindle_table(folder).damping_ratio
+    whole = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
     softest = int(np.argmin(whole.stiffness))
     moved = (whole.stiffness < MAX_MODE_STIFFNESS_RATIO * whole.stiffness[softest]) & (
         whole.frequency < MAX_EMULATED_MODE_FREQUENCY

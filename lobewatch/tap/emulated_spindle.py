@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import (
     CROSS_TAP,
@@ -30,7 +29,9 @@ from acquisition import (
 )
 from acquisition.emulation import SignalFunction
 from dsm import Spindle, modes_at, static_stiffness
+from lobewatch.arrays import Floats
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.spindle_tables import SpindleTable
 
 EMULATED_MODES = 8
 """Number of modes simulated. All higher ones are a static flexibility."""
@@ -80,12 +81,13 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
     for an invalid angle, or one that gives no cross FRF.
     """
     if not 0 <= degrees <= 90:
-        raise ValueError(f"--askew {degrees:g}: is not an angle of 0 to 90 degrees")
+        raise ValueError(f"rotate_structure.degrees {degrees:g}: is not an angle of 0 to 90 degrees")
     c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
         raise ValueError(
-            f"--askew {degrees:g} --direction xy: modes along x and y show nothing across; give another angle"
+            f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: "
+            "modes along x and y show nothing across; give another angle"
         )
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     seen = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
@@ -121,7 +123,7 @@ def open_synchronized_device(
     """
     hammered, wanted = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
 
-    def signal(first_scan: int, n_scans: int) -> NDArray[np.float64]:
+    def signal(first_scan: int, n_scans: int) -> Floats:
         wanted.acquire(timeout=HOST_WAIT_TIME)
         return hammered(first_scan, n_scans)
 
@@ -165,34 +167,52 @@ def emulate_machine(
     as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no spindle,
     or lacks the sensors of a device that does not describe them itself.
     """
-    if driver.emulate is None:
-        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
     structure = _select_direction(built, askew, direction)
+
+    def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
+        is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
+        cross = [_select_cross_direction(built, askew, direction)] if is_crossed else []
+        return map_signal_to_inputs(inputs, HammeredStructure(structure, rate, random, Hammering(), cross), direction)
+
+    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
+
+
+def emulate_device(
+    folder: MachineFolder,
+    driver: Driver,
+    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
+    *,
+    realtime: bool,
+    tcp: bool,
+) -> EmulatorThread:
+    """Make an emulated device of this kind. signal_of: function of its sensors and sample rate (Hz).
+
+    DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
+    """
+    if driver.emulate is None:
+        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     inputs = get_emulated_inputs(folder, driver)
-    beside = (
-        [_select_cross_direction(built, askew, direction)]
-        if any(_is_cross_sensor(sensor, direction) for sensor in inputs)
-        else []
+    has_clock = folder.machine.daq.digital_clock
+    return driver.emulate(
+        EmulationSetup(lambda rate: signal_of(inputs, rate), inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock)
     )
-    bench = EmulationSetup(
-        lambda rate: map_signal_to_inputs(
-            inputs, HammeredStructure(structure, rate, random, Hammering(), beside), direction
-        ),
-        inputs,
-        EMULATED_SAMPLE_RATE,
-        realtime,
-        tcp,
-        folder.machine.daq.digital_clock,
-    )
-    return EmulatedMachine(driver.emulate(bench), float(structure.frequency[0]), float(structure.stiffness[0]))
+
+
+def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
+    """Return [spindle] of machine.toml. DataError if there is none."""
+    if folder.machine.spindle is None:
+        raise DataError(
+            f"{folder.toml}: no model to {purpose}: "
+            "add a [spindle] table (or use folder_files.make_machine_folder.template)"
+        )
+    return folder.machine.spindle
 
 
 def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
-    spindle = folder.machine.spindle
-    if spindle is None:
-        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    return build_structure(replacement or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
+    table = get_spindle_table(folder)
+    return build_structure(replacement or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
 def _select_direction(built: Structure, askew: float | None, direction: TapDirection) -> Structure:

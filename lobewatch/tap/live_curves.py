@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from acquisition import Frf, Hit, RunningMean, compute_cross_spectra, extract_free_decay
 from acquisition.estimation.estimate_frf import estimate_frf_from_spectra
 from acquisition.hits.pulse import find_pulse
+from lobewatch.arrays import Floats, Integers
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import LiveCurves
 from modal import decay_spectra
@@ -80,20 +81,20 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
     )
 
 
-def _get_coherence(frf: Frf | None) -> NDArray[np.float64] | None:
+def _get_coherence(frf: Frf | None) -> Floats | None:
     return None if frf is None or frf.n_averages < MIN_HITS_FOR_COHERENCE else frf.coherence
 
 
-def _pick_lines(curve: NDArray[np.float64] | None, lines: NDArray[np.int64]) -> NDArray[np.float64] | None:
+def _pick_lines(curve: Floats | None, lines: Integers) -> Floats | None:
     return None if curve is None else curve[lines]
 
 
-def _to_decibels(power: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_decibels(power: Floats) -> Floats:
     """Return dB below the largest value, at most 100."""
     return np.asarray(10 * np.log10(np.maximum(power / np.max(power), 1e-10)))
 
 
-def _select_samples(hit: Hit) -> NDArray[np.int64]:
+def _select_samples(hit: Hit) -> Integers:
     """Select the samples to show: all around the pulse, the extremes of every bin elsewhere."""
     kept = find_extremes([hit.force, hit.acceleration], hit.force.size)
     pulse = find_pulse(hit)
@@ -104,7 +105,7 @@ def _select_samples(hit: Hit) -> NDArray[np.int64]:
     return np.union1d(kept, around[:: around.size // CURVE_BINS + 1])
 
 
-def find_extremes(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
+def find_extremes(curves: Sequence[NDArray[Any]], end: int) -> Integers:
     """Return increasing indices below `end` at which a curve is highest or lowest in its bin."""
     width = max(-(-end // CURVE_BINS), 1)
     if width == 1 or not curves:

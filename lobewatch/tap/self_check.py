@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
 from dsm import format_rounded, natural_frequencies
+from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
@@ -138,19 +139,19 @@ def _check_response_noise(rms: float, channel: Channel) -> Check:
     return Check("response noise", False, f"{text}, {100 * rms / scale:.2g} % of the range: {cure}")
 
 
-def _power_spectrum(signal: NDArray[np.float64], rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _power_spectrum(signal: Floats, rate: float) -> tuple[Floats, Floats]:
     """Return frequencies (Hz) and power of a Hann-windowed record. The powers add up to its mean square."""
     window = np.hanning(signal.size)
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
     return np.arange(power.size) * rate / signal.size, 2 * power / (signal.size * np.sum(window**2))
 
 
-def _select_line(frequency: NDArray[np.float64], line: float) -> NDArray[np.bool_]:
+def _select_line(frequency: Floats, line: float) -> Flags:
     """Select the lines over which a Hann window spreads one frequency."""
     return np.asarray(np.abs(frequency - line) <= 2 * frequency[1])
 
 
-def _select_mains_lines(frequency: NDArray[np.float64], mains: float) -> NDArray[np.bool_]:
+def _select_mains_lines(frequency: Floats, mains: float) -> Flags:
     return np.asarray(
         np.any([_select_line(frequency, mains * k) for k in range(1, CHECKED_MAINS_HARMONICS + 1)], axis=0)
     )
@@ -187,7 +188,7 @@ def _check_spindle(baseline: Hit) -> Check:
     return Check("spindle", True, "no steady vibration")
 
 
-def _list_signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
+def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:
     if baseline.channels is None:
         return []
     units = {"force": "N", "acceleration": "m/s^2"}

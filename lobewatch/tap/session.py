@@ -304,7 +304,7 @@ def plan_session(
     machine = folder.machine
     port = port or machine.daq.port
     if not port:
-        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port: give plan_session.port, or port in [daq] of {folder.toml}")
     tool, wanted = tool or machine.tap.tool, parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")

@@ -7,10 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from acquisition import HitFlags
+from lobewatch.arrays import Floats
 
 
 class TapStep(enum.StrEnum):
@@ -72,23 +70,23 @@ class ListedHit:
 class LiveCurves:
     """Curves of the screen, reduced to what a screen can show."""
 
-    time: NDArray[np.float64]
+    time: Floats
     """Time from the trigger of the last hit (s), shape (n,)."""
-    force: NDArray[np.float64] | None
+    force: Floats | None
     """Force of the last hit (N), shape (n,). None if not measured."""
-    acceleration: NDArray[np.float64]
+    acceleration: Floats
     """Acceleration of the last hit (m/s^2), shape (n,)."""
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Frequencies (Hz), shape (m,)."""
-    mean: NDArray[np.float64] | None
+    mean: Floats | None
     """Receptance magnitude of the mean of the good hits (m/N), shape (m,). None before the first good one."""
-    last: NDArray[np.float64] | None
+    last: Floats | None
     """Receptance magnitude of the last hit (m/N), shape (m,). None without a pulse. Without a force that of its
     free decay, up to a factor.
     """
-    coherence: NDArray[np.float64] | None
+    coherence: Floats | None
     """Coherence of the good hits (-), shape (m,). None for fewer than 3."""
-    force_spectrum: NDArray[np.float64] | None
+    force_spectrum: Floats | None
     """Spectrum of the force of the last hit (dB below its largest value), shape (m,)."""
     usable_band: tuple[float, float] | None
     """Band that the force excites (Hz)."""

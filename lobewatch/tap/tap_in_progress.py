@@ -111,7 +111,7 @@ class TapInProgress:
         """Return the error that rejects mixing hits of two set-ups."""
         return ValueError(
             f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
-            "begin anew with --new"
+            "begin anew with plan_session.resume=False"
         )
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:

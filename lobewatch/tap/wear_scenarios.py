@@ -9,13 +9,12 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition import DataError
 from dsm import Spindle, calibrate, natural_frequencies
+from lobewatch.arrays import Floats
 from lobewatch.machine import MachineFolder
 from lobewatch.monitoring.level_model import STEEL_FREQUENCY_PER_KELVIN
-from lobewatch.tap.emulated_spindle import set_bearing_stiffness
+from lobewatch.tap.emulated_spindle import get_spindle_table, set_bearing_stiffness
 
 SCENARIO_DROP = 0.10
 """Relative drop of f1 over a scenario that wears the spindle out, chosen."""
@@ -64,9 +63,7 @@ class SpindleWear:
     @classmethod
     def of(cls, folder: MachineFolder, months: int, story: WearScenario) -> Self:
         """Return the wear of the spindle of a machine. DataError if machine.toml has none."""
-        table = folder.machine.spindle
-        if table is None:
-            raise DataError(f"{folder.toml}: no model to age: add a [spindle] table (or use lobewatch init --example)")
+        table = get_spindle_table(folder, "age")
         return cls(table.build(), table.bearing_stiffness_n_per_um * 1e6, months, story)
 
     @property
@@ -136,8 +133,6 @@ MEAN_SPINDLE_TEMPERATURE = 22.0
 MONTHS_PER_YEAR = 12.0
 """Length of a year (months)."""
 
-Floats = NDArray[np.float64]
-
 
 class MountingVariation(NamedTuple):
     """Variation between tests by reclamping and temperature."""
@@ -152,11 +147,13 @@ class MountingVariation(NamedTuple):
     def check(self) -> None:
         """Raise ValueError for impossible values."""
         if not 0 <= self.scatter <= 0.05:
-            raise ValueError(f"--scatter {100 * self.scatter:g} is not between 0 and 5 %")
+            raise ValueError(f"MountingVariation.scatter {100 * self.scatter:g} is not between 0 and 5 %")
         if not 0 <= self.bad_share <= 0.5:
-            raise ValueError(f"--bad-clampings {100 * self.bad_share:g} is not between 0 and 50 %")
+            raise ValueError(f"MountingVariation.bad_share {100 * self.bad_share:g} is not between 0 and 50 %")
         if self.temperature_swing is not None and not 0 <= self.temperature_swing <= 30:
-            raise ValueError(f"--temperature {self.temperature_swing:g} is not between 0 and 30 K")
+            raise ValueError(
+                f"MountingVariation.temperature_swing {self.temperature_swing:g} is not between 0 and 30 K"
+            )
 
     def temperatures(self, months: int) -> Floats | None:
         """Return the spindle temperature in each month, the first in winter (degC), shape (months,)."""

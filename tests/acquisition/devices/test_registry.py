@@ -1,4 +1,4 @@
-"""Drivers of other packages: found, refused with the name of their package, asked only where the vendor fits."""
+"""Drivers of other packages: found, rejected with the name of their package, and probed only if the vendor fits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Install = Callable[[str, str], None]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
-    """Puts a package with a driver `odd` on the path: its name, and what the entry point leads to."""
+    """Install a package with a driver `odd`: its name, and what the entry point leads to."""
 
     def put(package: str, target: str) -> None:
         folder = tmp_path / package
@@ -94,7 +94,7 @@ def test_a_name_that_nobody_brings() -> None:
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """A pseudo-terminal at which nobody answers."""
+    """Open a pseudo-terminal at which nobody answers."""
     ends = os.openpty()
     tty.setraw(ends[1])
     yield os.ttyname(ends[1])

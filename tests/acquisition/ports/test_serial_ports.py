@@ -1,4 +1,4 @@
-"""The serial port below every driver: a late consumer, two programs, a pulled cable, a device that comes back."""
+"""Serial ports: a late consumer, two programs, a pulled cable, a device that comes back."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ input()
 
 
 class Cable:
-    """The device's end of a pseudo-terminal."""
+    """Device end of a pseudo-terminal."""
 
     def __init__(self) -> None:
         import tty

@@ -76,12 +76,7 @@ class SimulatedSource(ClosedOnExit):
     """Empty: no scans can be lost."""
 
     def __init__(
-        self,
-        signal: SignalFunction,
-        channels: tuple[Channel, ...],
-        sample_rate: float,
-        n_scans: int,
-        block: int = 512,
+        self, signal: SignalFunction, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
     ) -> None:
         self.channels = channels
         """Channel of each input."""

@@ -202,12 +202,7 @@ def _simulate_group(
 
 
 def _step_tooth_period(
-    swing: Complexes,
-    flight: Complexes,
-    reach: Floats,
-    push: Floats,
-    rub: Floats,
-    room: Floats,
+    swing: Complexes, flight: Complexes, reach: Floats, push: Floats, rub: Floats, room: Floats
 ) -> tuple[Complexes, Floats, Floats]:
     """Step one tooth period: mode states after each step, their gains in it (s, c, m), and chips (s, c, e)."""
     swings = np.empty((len(room), *swing.shape), dtype=complex)
@@ -236,12 +231,7 @@ def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Fl
 
 
 def _assemble_motion(
-    cutting: NDArray[np.float32],
-    swing: Complexes,
-    modes: ModeTables,
-    place: int,
-    passage: Passage,
-    turn: int,
+    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage, turn: int
 ) -> TipMotion:
     """Put one cut between rest and free decay. turn: steps per turn."""
     step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]

@@ -88,11 +88,7 @@ class TextBoardSource(ClosedOnExit):
     """Empty: the board reports no faults."""
 
     def __init__(
-        self,
-        port: str,
-        inputs: Sequence[SensorInput],
-        sample_rate: float | None,
-        printing: OutputFormat | None = None,
+        self, port: str, inputs: Sequence[SensorInput], sample_rate: float | None, printing: OutputFormat | None = None
     ) -> None:
         self.sample_rate = check_text_board(inputs, sample_rate)
         self.events: deque[Event] = deque()

@@ -7,8 +7,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +15,7 @@ from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 REPLAY_QUIET_TIME = 1.0
 """Quiet before, between and after the hits (s)."""
@@ -27,7 +25,7 @@ REPLAY_ADC_BITS = 24
 """Converter that recordings without codes are read through."""
 
 
-class FileSource:
+class FileSource(ClosedOnExit):
     """The hits of a recording one after the other, with quiet between them.
 
     Codes are those of the recording, bit by bit; lost scans and reported overloads are there again. A recording
@@ -60,16 +58,6 @@ class FileSource:
         """It tells of no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
-
-    def __enter__(self) -> Self:
-        """The source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End it."""
-        self.close()
 
     def start(self) -> None:
         """Begin at the first hit."""

@@ -57,6 +57,26 @@ OPTION_NAMES: Mapping[str, str] = {
     "list_comparison_files.beside": "--beside",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
     "session.TapSession": "lobewatch tap",
+    # acquisition.devices, lobewatch.tap, lobewatch.sensors
+    "Description.pulses": "--pulses",
+    "Description.sensor": "--sensor",
+    "Description.tacho": "--tacho",
+    "EmulationSetup.tcp": "--tcp",
+    "MountingVariation.bad_share": "--bad-clampings",
+    "MountingVariation.scatter": "--scatter",
+    "MountingVariation.temperature_swing": "--temperature",
+    "ScreenServer.listen": "--listen",
+    "acquire_cut.file": "--file",
+    "acquire_cut.port": "--port",
+    "acquisition.measure_rate": "lobewatch sensors",
+    "acquisition.scan_ports": "lobewatch ports",
+    "folder_files.make_machine_folder.template": "lobewatch init --example",
+    "plan_session.port": "--port",
+    "plan_session.resume=False": "--new",
+    "record_cut.patience": "--seconds",
+    "rotate_structure.degrees": "--askew",
+    "rotate_structure.direction": "--direction",
+    "screen.ScreenServer": "--screen",
 }
 """Option or command for each field or function that a message names."""
 

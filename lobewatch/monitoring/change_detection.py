@@ -21,8 +21,8 @@ from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
@@ -37,7 +37,6 @@ MIN_SHARED_CHANGE = 0.5
 SCORE_BLOCK_ROWS = 64
 """Number of points that are judged at once, to bound the memory."""
 
-Floats = NDArray[np.float64]
 ChangeKind = Literal["step", "slope"]
 CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
 MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
@@ -62,9 +61,9 @@ class LikeliestChange(NamedTuple):
 
     score: Floats
     """Score: how ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
-    is_step: NDArray[np.bool_]
+    is_step: Flags
     """Whether the change is a step, shape (r,)."""
-    point: NDArray[np.intp]
+    point: Indices
     """Index of its point as in Fall, shape (r,)."""
 
     @classmethod
@@ -91,7 +90,7 @@ class ChangeMonitor:
         return self.change.score
 
     @cached_property
-    def is_sure(self) -> NDArray[np.bool_]:
+    def is_sure(self) -> Flags:
         """Whether each point is sure of a change, shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.scores >= SURE_CHANGE_SCORE)
@@ -160,7 +159,7 @@ def _merge_directions(
     alone: LikeliestChange,
     common: LevelModel,
     together: LikeliestChange,
-    shared: NDArray[np.intp],
+    shared: Indices,
 ) -> LikeliestChange:
     """The surer of what a series did alone and what the mean of both directions did, where the series did that too.
 
@@ -178,7 +177,7 @@ def _merge_directions(
     return merged
 
 
-def _find_likeliest_changes(base: LevelModel, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
+def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestChange, LikeliestChange]:
     """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
     blocks = [
         _find_largest_changes(base, last[begin : begin + SCORE_BLOCK_ROWS] + 1)
@@ -189,7 +188,7 @@ def _find_likeliest_changes(base: LevelModel, last: NDArray[np.intp]) -> tuple[L
     return fall, rise
 
 
-def _find_largest_changes(base: LevelModel, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
     """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
     points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
@@ -204,9 +203,7 @@ def _find_largest_changes(base: LevelModel, n: NDArray[np.intp]) -> tuple[NDArra
     return points, leans
 
 
-def _choose_likeliest(
-    base: LevelModel, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats
-) -> LikeliestChange:
+def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
     """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
     t = [base.t_statistic(lean, n) for lean in leans]
     scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.monitoring.level_model import build_level_model
 from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
 from lobewatch.monitoring.series_points import Readings
@@ -47,7 +47,6 @@ QUANTILE_HALVINGS = 40
 FAN_STANDARD_ERRORS = 50
 """Standard errors around the means within which any level of a fan lies."""
 
-Floats = NDArray[np.float64]
 FitFamily = ShapeFits | RandomWalkFits
 """Shapes of one sort, fitted to a series."""
 

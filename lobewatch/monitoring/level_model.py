@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, winsorize
 
 MIN_TEMPERATURE_POINTS = 12
@@ -27,8 +27,6 @@ MIN_SINGULAR_SHARE = 1e-12
 MIN_RESIDUAL_SHARE = 1e-20
 """Least share of the sum of squares that is taken as left: less is rounding."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class LevelModel:
@@ -45,7 +43,7 @@ class LevelModel:
     scatter_prior: ScatterPrior = NO_SCATTER_PRIOR
     """What is known of the scatter from point to point beforehand."""
 
-    def precision(self, n: NDArray[np.intp]) -> Floats:
+    def precision(self, n: Indices) -> Floats:
         """Precision of the coefficients as known beforehand, times the variance of n (r,) points, shape (r, p, p)."""
         p = self.columns.shape[1]
         precision = np.zeros((n.size, p, p))
@@ -58,7 +56,7 @@ class LevelModel:
             )
         return precision
 
-    def explained_root(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+    def explained_root(self, kind: str, n: Indices, k: Indices) -> Floats:
         """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
 
         With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
@@ -75,13 +73,13 @@ class LevelModel:
             product /= root
         return product
 
-    def t_statistic(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
+    def t_statistic(self, lean: Floats, n: Indices) -> Floats:
         """Student's t of changes that explain so much in the first n, shape (r,) each."""
         total = self._residual_squares_up_to[n]
         left = np.maximum(total - lean**2, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
         return np.asarray(lean / np.sqrt((left + self._prior_squares) / self.freedom(n)))
 
-    def freedom(self, n: NDArray[np.intp]) -> Floats:
+    def freedom(self, n: Indices) -> Floats:
         """Degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
@@ -100,7 +98,7 @@ class LevelModel:
         left = max(total - size * product, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
         return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
 
-    def change_sizes(self, fell: NDArray[np.bool_], n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+    def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
         """Sizes of changes from points k (r,) on in the first n (r,), shape (r,): steps, or slopes a point."""
         sizes = np.empty(n.size)
         for kind, rows in (("step", np.flatnonzero(fell)), ("slope", np.flatnonzero(~fell))):
@@ -109,7 +107,7 @@ class LevelModel:
                 sizes[rows] = (product / square)[:, 0]
         return sizes
 
-    def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    def _change(self, kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
         """Products of the column of a change with the series and with itself, what the base leaves of both."""
         tail, square = (
             [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])],
@@ -124,7 +122,7 @@ class LevelModel:
                 square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
         return product, square
 
-    def _tail(self, i: int, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+    def _tail(self, i: int, kind: str, n: Indices, k: Indices) -> Floats:
         """Product of the column of a change with the series (0) or one of the columns (from 1 on)."""
         sums, moments = self._sums[i], self._moments[i]
         tail: Floats = sums[n] - sums[k]
@@ -223,7 +221,7 @@ class ColumnFits(NamedTuple):
     freedom: int
     """Degrees of freedom; the temperature costs none, its influence is known beforehand."""
 
-    def select(self, numbers: NDArray[np.intp]) -> ColumnFits:
+    def select(self, numbers: Indices) -> ColumnFits:
         """The fits of some of the sets."""
         rss, size, inverse, leaning = (values[numbers] for values in self[:4])
         return ColumnFits(rss, size, inverse, leaning, self.level, self.level_variance, self.freedom)
@@ -241,13 +239,13 @@ class ColumnFits(NamedTuple):
         return (self.size * slopes).sum(axis=1), np.sqrt(variance * self.rss / self.freedom)
 
 
-def _change_square(kind: str, length: NDArray[np.intp]) -> Floats:
+def _change_square(kind: str, length: Indices) -> Floats:
     """Product of the column of a change over so many points with itself."""
     points = length.astype(np.float64)
     return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
 
 
-def _change_without_level(kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _change_without_level(kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
     """Sums of the columns of changes from each point k (m,) on in the first n (r, 1), and the root of the square of
     what a column of ones leaves of them, shape (r, m) each."""
     length = (n - k).astype(np.float64)

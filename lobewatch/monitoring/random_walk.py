@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.monitoring.level_model import MIN_RESIDUAL_SHARE, LevelModel
 from lobewatch.monitoring.trend_shapes import PRIOR_ODDS, ShapeKind, TrendShape
 
@@ -19,8 +19,6 @@ LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances that the level gathers over the span, in that of a point; chosen."""
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
 """Variances that the rate, in levels a span, gathers over the span, likewise; chosen."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +39,7 @@ class RandomWalkFits:
         """Degrees of freedom, shape (j,)."""
         return np.full(len(self.shapes), self.points.freedom)
 
-    def select(self, numbers: NDArray[np.intp]) -> Self:
+    def select(self, numbers: Indices) -> Self:
         """Some of the lines alone."""
         shapes = tuple(self.shapes[j] for j in numbers)
         return replace(self, shapes=shapes, evidence=self.evidence[numbers], variance=self.variance[numbers])

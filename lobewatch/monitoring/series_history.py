@@ -13,9 +13,9 @@ from functools import cached_property
 from itertools import chain, compress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsm import RemainingPreload, calibrate, remaining_preload
+from lobewatch.arrays import Flags, Floats
 from lobewatch.history.history import WATCHED_VALUES, HistoryRow
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
@@ -32,9 +32,9 @@ class ValueHistory:
     """Field of a row, one of `WATCHED`."""
     rows: tuple[HistoryRow, ...]
     """Rows of the series, oldest first, n of them."""
-    values: NDArray[np.float64]
+    values: Floats
     """Value of each row and its standard error, shape (n, 2)."""
-    has_questions: NDArray[np.bool_]
+    has_questions: Flags
     """Whether anything is asked about a row that nobody has answered, shape (n,)."""
     other_direction: ValueHistory | None = None
     """The same value in the other direction; None where nothing is known of it, or where it does not count."""
@@ -111,7 +111,7 @@ class ValueHistory:
         return None if change is None else (times[change.point], change)
 
     @property
-    def _positive(self) -> tuple[tuple[HistoryRow, ...], NDArray[np.float64]]:
+    def _positive(self) -> tuple[tuple[HistoryRow, ...], Floats]:
         """The sure rows whose value is one to take a logarithm of, with their numbers, shape (n, 2)."""
         counts = np.isfinite(self.values[:, 0]) & ~self.has_questions & (self.values[:, 0] > 0)
         return self._select(counts), self.values[counts]
@@ -121,7 +121,7 @@ class ValueHistory:
         """The rows that the trend is of, oldest first."""
         return self._positive[0]
 
-    def _select(self, counts: NDArray[np.bool_]) -> tuple[HistoryRow, ...]:
+    def _select(self, counts: Flags) -> tuple[HistoryRow, ...]:
         return self.rows if counts.all() else tuple(compress(self.rows, counts.tolist()))
 
 

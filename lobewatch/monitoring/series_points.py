@@ -12,9 +12,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Floats, Indices
 
 
 class ScatterPrior(NamedTuple):
@@ -67,7 +66,7 @@ class Readings:
         return replace(self, y=self.y[begin:], temperature=temperature, operators=operators, other_direction=other)
 
     @property
-    def shared_points(self) -> NDArray[np.intp]:
+    def shared_points(self) -> Indices:
         """Points that the other direction has too."""
         return (
             np.empty(0, np.intp) if self.other_direction is None else np.flatnonzero(np.isfinite(self.other_direction))

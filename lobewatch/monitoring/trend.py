@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
 from lobewatch.monitoring.series_points import (
@@ -38,8 +38,6 @@ MAX_RUN_IN_RATE = 0.4
 """Rate of a fall over its mean rate so far below which it has slowed down; chosen."""
 N_START_POINTS = 3
 """Points that the start of a series is looked for in while it has no fitted line; chosen."""
-
-Floats = NDArray[np.float64]
 
 
 class TapValue(NamedTuple):

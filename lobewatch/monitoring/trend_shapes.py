@@ -9,8 +9,8 @@ from itertools import groupby
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.monitoring.level_model import ColumnFits, LevelModel
 
 EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
@@ -22,7 +22,6 @@ RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.1, 1.2
 MIN_RUNAWAY_DISTANCE = 1e-6
 """Least share of the way to that end at which such a curve is drawn."""
 
-Floats = NDArray[np.float64]
 ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
 SHAPE_KINDS: tuple[ShapeKind, ...] = (
     "none",
@@ -168,7 +167,7 @@ class ShapeFits:
         """Variance of a point around each shape, shape (j,)."""
         return self.fits.rss / self.fits.freedom
 
-    def select(self, numbers: NDArray[np.intp]) -> Self:
+    def select(self, numbers: Indices) -> Self:
         """Some of the shapes alone."""
         shapes = tuple(self.shapes[j] for j in numbers)
         return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))

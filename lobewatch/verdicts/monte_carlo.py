@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows, Program, ProgramLimit, StabilityLobes
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
+from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.lobe_chart import find_cut_table
@@ -46,18 +46,16 @@ RECHECKED_LIMIT_SHARES = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
 WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
 """... in the directions of feed whose limit is at most so many times the lowest one, the lowest of them."""
 
-Floats = NDArray[np.float64]
 
-
-def find_sample_limits(draws: ProgramSamples, depth: float) -> Floats:
+def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
     """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
 
     Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
     linearly interpolated. depth: that of the program (m).
     """
-    limit, worst = float(draws.limits[0]), draws.with_lowest_cuts(0.0)
-    near = draws.with_lowest_cuts(SIMILAR_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS)
-    softness = (draws.rows.tangential[0] / draws.rows.tangential)[:, np.newaxis]
+    limit, worst = float(samples.limits[0]), samples.with_lowest_cuts(0.0)
+    near = samples.with_lowest_cuts(SIMILAR_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS)
+    softness = (samples.rows.tangential[0] / samples.rows.tangential)[:, np.newaxis]
     tried = (
         softness * limit * TRIED_LIMIT_SHARES
         if np.isfinite(limit)
@@ -82,7 +80,7 @@ def find_sample_limits(draws: ProgramSamples, depth: float) -> Floats:
     return limits
 
 
-def refine_sample_limits(draws: ProgramSamples, limits: Floats) -> Floats:
+def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
     """Limits (m) as `find_sample_limits` gives them, each in the direction of feed that is worst for that very draw.
 
     For numbers of single draws, such as ratios of two cuts on the same spindle.
@@ -91,7 +89,7 @@ def refine_sample_limits(draws: ProgramSamples, limits: Floats) -> Floats:
     if not finite.size:
         return settled
     tried = limits[finite, np.newaxis] * RECHECKED_LIMIT_SHARES
-    near = draws.with_lowest_cuts(WIDER_FEED_LIMIT * float(draws.limits[0]), MAX_WIDER_FEEDS)[finite]
+    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * float(samples.limits[0]), MAX_WIDER_FEEDS)[finite]
     low, high, at_low, at_high = _bracket_limits(tried, near.growth(tried))
     crossing = _interpolate_limits(low, high, at_low, at_high)
     settled[finite] = np.where(np.isfinite(crossing), crossing, limits[finite])
@@ -137,7 +135,7 @@ class MonteCarloResult(NamedTuple):
     """99 % quantile of the limit over the doubt (m)."""
     samples: ProgramSamples
     """Spindles that it was judged on."""
-    chatters: NDArray[np.bool_]
+    chatters: Flags
     """Whether each draw chatters, without the middle, shape (DRAWS,)."""
     axes_ratio: float
     """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
@@ -174,26 +172,26 @@ def sample_program(
     """A program with the coefficients that were learnt; either: milled up and down, the worse counts."""
     program, spindle = build_program(table, machine), at_speed.scale_modes(assembly)
     cuts = cutting_conditions_of(table, machine, spindle, either)
-    middle, axes, across = find_worst_limit(program, spindle, cuts)
-    doubt = at_speed.uncertainty or uncertainty_of(assembly, table, machine)
-    return SampledProgram(program.depth, middle, draw_samples(program, middle, cuts, spindle, doubt, axes), across)
+    median, axes, across = find_worst_limit(program, spindle, cuts)
+    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, table, machine)
+    return SampledProgram(
+        program.depth, median, draw_samples(program, median, cuts, spindle, uncertainty, axes), across
+    )
 
 
 def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
     """What is seen of a program on all spindles that it may be run on."""
-    depth, middle, draws, across = program
-    limits = find_sample_limits(draws, depth)[1:]
+    depth, median, samples, across = program
+    limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
-    below = SKIPPED_CUT_MARGIN * depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
-    around = draws.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
-    near = (draws.limits <= below) | around
-    chatters = _find_chattering(draws, near, around, limits, depth)
-    return MonteCarloResult(middle, float(np.min(limits)), float(low), float(high), draws, chatters, across)
+    below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
+    around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
+    near = (samples.limits <= below) | around
+    chatters = _find_chattering(samples, near, around, limits, depth)
+    return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, across)
 
 
-def _find_chattering(
-    draws: ProgramSamples, near: NDArray[np.bool_], around: NDArray[np.bool_], limits: Floats, depth: float
-) -> NDArray[np.bool_]:
+def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:
     """Whether each draw chatters at a depth (m) in any of the cuts, shape (DRAWS,); where none does, that is exact.
 
     limits: of the draws in the worst cut (m), shape (DRAWS,). In another cut that is near (cuts,) a draw is looked at
@@ -201,13 +199,13 @@ def _find_chattering(
     chatters around (cuts,). Only where none of these chatters all others are looked at, in all cuts.
     """
     chatters = limits <= depth
-    softness = limits / draws.limits[0] if np.isfinite(draws.limits[0]) else np.ones(limits.size)
-    likely = np.multiply.outer(draws.limits, softness) <= SKIPPED_SAMPLE_MARGIN * depth
+    softness = limits / samples.limits[0] if np.isfinite(samples.limits[0]) else np.ones(limits.size)
+    likely = np.multiply.outer(samples.limits, softness) <= SKIPPED_SAMPLE_MARGIN * depth
     likely = (likely | around[:, np.newaxis]) & near[:, np.newaxis]
     likely[0] = True
     for wanted in (likely, ~likely):
         cut, draw = np.nonzero(wanted & ~chatters)
-        grown = draws.growth_in_cuts(cut, draw + 1, np.full((cut.size, 1), depth))[:, 0]
+        grown = samples.growth_in_cuts(cut, draw + 1, np.full((cut.size, 1), depth))[:, 0]
         chatters[draw[grown >= 0]] = True
         if np.any(chatters):
             break
@@ -245,14 +243,14 @@ def compute_limit_band(
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))
-    doubt = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
-    draws = doubt.sample(rows, N_BAND_SAMPLES)
+    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
+    samples = uncertainty.sample(rows, N_BAND_SAMPLES)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
-    moved = (draws.speed_rpm / (draws.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
+    moved = (samples.speed_rpm / (samples.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
     low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))
-    speeds, middle = np.geomspace(low, high, N_BAND_SPEEDS), rows[np.zeros(N_BAND_SAMPLES, np.intp)]
-    depths = _band_depths(draws, cuts, draws.speed_rpm[:, np.newaxis] * speeds)
-    ratios = depths / _band_depths(middle, cuts, np.clip(moved * speeds, low, high))
+    speeds, median = np.geomspace(low, high, N_BAND_SPEEDS), rows[np.zeros(N_BAND_SAMPLES, np.intp)]
+    depths = _band_depths(samples, cuts, samples.speed_rpm[:, np.newaxis] * speeds)
+    ratios = depths / _band_depths(median, cuts, np.clip(moved * speeds, low, high))
     order = np.argsort(line.speed_rpm)
     rising = line.speed_rpm[order], np.minimum(line.depth[order], UNLIMITED_DEPTH)
     limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *rising)

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError
 from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
+from lobewatch.arrays import Floats, Indices
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
@@ -40,8 +40,6 @@ N_ADDED_SAMPLES = 8
 """Number of draws that do."""
 MIN_PITCH_GAIN = 1.05
 """Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +154,7 @@ class PitchSearch:
             patterns = [pattern for pattern in patterns if calm[pattern] > judged[likely].low]
         return max(judged.values(), key=lambda judged: judged.low)
 
-    def _stable_depth(self, pattern: PitchPattern, places: NDArray[np.intp]) -> float:
+    def _stable_depth(self, pattern: PitchPattern, places: Indices) -> float:
         """The deepest (m) at which the draws at some places are stable."""
         cuts, limits = self.samples.cuts[:N_PITCH_FEEDS], self.samples.limits[:N_PITCH_FEEDS]
         few = replace(self.samples[places], cuts=tuple(with_pitch_pattern(cut, pattern) for cut in cuts), limits=limits)
@@ -169,9 +167,9 @@ class PitchSearch:
     def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
         """Pitches by the judge, and the limit of each draw (m), the middle first."""
         table = _with_pitch(self.table, pattern)
-        judgement = run_monte_carlo(table, self.assembly, self.machine, self.at_speed)
-        band = judgement.median.limit, judgement.low, judgement.high
-        word, limits = classify_stability(table, judgement, self.assembly), _pitch_limits(judgement.samples, table)
+        result = run_monte_carlo(table, self.assembly, self.machine, self.at_speed)
+        band = result.median.limit, result.low, result.high
+        word, limits = classify_stability(table, result, self.assembly), _pitch_limits(result.samples, table)
         return _build_evaluation(pattern, word, band, limits, self.equal_limits), limits
 
 
@@ -179,11 +177,11 @@ def _with_pitch(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
     return msgspec.structs.replace(table, pitch_deg=pattern.pitch_deg)
 
 
-def _pitch_limits(draws: ProgramSamples, table: ProgramTable) -> Floats:
+def _pitch_limits(samples: ProgramSamples, table: ProgramTable) -> Floats:
     """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
     depth = table.depth_mm / 1e3
-    limits = refine_sample_limits(draws, find_sample_limits(draws, depth))
-    limits[0] = draws.limits[0]
+    limits = refine_sample_limits(samples, find_sample_limits(samples, depth))
+    limits[0] = samples.limits[0]
     return np.minimum(limits, MAX_PROGRAM_DEPTH_RATIO * depth)
 
 

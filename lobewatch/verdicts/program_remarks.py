@@ -95,14 +95,14 @@ MIN_CROSS_LIMIT_RATIO = 1.04
 """Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
 
 
-def assumption_remarks(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Iterator[Remark]:
+def assumption_remarks(table: ProgramTable, machine: Machine, result: MonteCarloResult) -> Iterator[Remark]:
     """Remarks on what is assumed because the program does not say it."""
     if (
         table.immersion < NARROW_CUT_IMMERSION
         and table.corner_radius_mm is None
         and not isinstance(table.radial_depth_mm, tuple)
     ):
-        yield _corner_remark(table, machine, judgement)
+        yield _corner_remark(table, machine, result)
     if machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
         yield Remark(
             "helix-not-written",
@@ -111,21 +111,21 @@ def assumption_remarks(table: ProgramTable, machine: Machine, judgement: MonteCa
             "0.7 to 1.7 times the limit",
             "write helix_deg, 0 for straight edges",
         )
-    if judgement.axes_ratio > MIN_CROSS_LIMIT_RATIO:
+    if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
         yield Remark(
             CROSS_NOT_TAPPED_CODE,
             table.name,
             "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
-            f"its limit by up to {100 * (judgement.axes_ratio - 1):.0f} %",
+            f"its limit by up to {100 * (result.axes_ratio - 1):.0f} %",
             "tap --direction xy: hit in x, sensor in y",
         )
 
 
-def _corner_remark(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Remark:
+def _corner_remark(table: ProgramTable, machine: Machine, result: MonteCarloResult) -> Remark:
     radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
     inside, radial = table.corner_immersion(radius), table.radial_mm[1]
-    limit = _limit_at_immersion(inside, table, machine, judgement.samples)
-    share = f", {100 * limit / judgement.median.limit:.0f} % of it" if limit < judgement.median.limit < math.inf else ""
+    limit = _limit_at_immersion(inside, table, machine, result.samples)
+    share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
     return Remark(
         "one-engagement",
         table.name,
@@ -136,31 +136,31 @@ def _corner_remark(table: ProgramTable, machine: Machine, judgement: MonteCarloR
     )
 
 
-def _limit_at_immersion(immersion: float, table: ProgramTable, machine: Machine, draws: ProgramSamples) -> float:
+def _limit_at_immersion(immersion: float, table: ProgramTable, machine: Machine, samples: ProgramSamples) -> float:
     """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
-    cut, middle = replace(machine.build_cut(table), immersion=immersion), draws.rows[np.array([0])]
+    cut, median = replace(machine.build_cut(table), immersion=immersion), samples.rows[np.array([0])]
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
     speed = np.array([table.speed_rpm])
-    return min(float(ZeroOrderBatch.of(middle.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
+    return min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
 
 
 N_CAUSE_SAMPLES = 60
 """Number of draws that chatter, of which it is seen what each lacks to be stable."""
 
 
-def find_decisive_cause(judgement: MonteCarloResult, depth: float) -> str:
+def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
     """The cause without which most of the draws that chatter at a depth (m) would not.
 
     Where none of them chatters a direction that was not tapped is all that is left open.
     """
-    draws, doubt = judgement.samples, judgement.samples.uncertainty
-    if "untapped" in doubt.modes or not np.any(judgement.chatters):
+    samples, uncertainty = result.samples, result.samples.uncertainty
+    if "untapped" in uncertainty.modes or not np.any(result.chatters):
         return "untapped"
-    places, middle = np.flatnonzero(judgement.chatters)[:N_CAUSE_SAMPLES], draws.rows[np.array([0])]
+    places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
-    for cause in doubt.causes:
-        rows = doubt.sample(middle, N_PROGRAM_SAMPLES, without=cause)[places]
-        shares[cause] = float(np.mean(replace(draws, rows=rows).growth(depth) < 0))
+    for cause in uncertainty.causes:
+        rows = uncertainty.sample(median, N_PROGRAM_SAMPLES, without=cause)[places]
+        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(depth) < 0))
     return max(shares, key=lambda cause: shares[cause])
 
 

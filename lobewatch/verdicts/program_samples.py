@@ -9,7 +9,6 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import (
     Cut,
@@ -26,6 +25,7 @@ from lobes import (
 )
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engagement
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
@@ -91,8 +91,6 @@ N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
 MIN_ROTATING_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class ProgramSamples:
@@ -138,11 +136,11 @@ class ProgramSamples:
         grown[sample] = np.max(np.vstack((grown[sample], others)), axis=0)
         return grown
 
-    def _growth_at_depth(self, cut: NDArray[np.intp], row: NDArray[np.intp], depth: float) -> Floats:
+    def _growth_at_depth(self, cut: Indices, row: Indices, depth: float) -> Floats:
         """Growth of some draws, each in one of the cuts (k,), at a depth (m), shape (k,)."""
         return self.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))[:, 0]
 
-    def growth_in_cuts(self, cut: NDArray[np.intp], row: NDArray[np.intp], depths: Floats) -> Floats:
+    def growth_in_cuts(self, cut: Indices, row: Indices, depths: Floats) -> Floats:
         """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
         grown = np.empty(depths.shape)
         angles = np.array([each.feed_angle for each in self.cuts])
@@ -154,7 +152,7 @@ class ProgramSamples:
                 grown[here] = growth_rate(rows, depths[here], number)
         return grown
 
-    def __getitem__(self, places: NDArray[np.intp]) -> ProgramSamples:
+    def __getitem__(self, places: Indices) -> ProgramSamples:
         """The draws at some places."""
         return replace(self, rows=self.rows[places])
 
@@ -164,22 +162,22 @@ class ProgramSamples:
         wanted[0] = True
         return self.with_cuts(wanted)
 
-    def with_cuts(self, wanted: NDArray[np.bool_]) -> ProgramSamples:
+    def with_cuts(self, wanted: Flags) -> ProgramSamples:
         """The cuts at some places alone; the worst where it is none of them."""
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
 
-    def median_growth_near(self, depth: float, fall: float = 0.0, apart: float = 1.0) -> Floats:
+    def median_growth_near(self, depth: float, drop: float = 0.0, apart: float = 1.0) -> Floats:
         """Largest growth of the middle in each cut at a depth (m), as far as speed and frequency may be off.
 
         fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
         slower and faster, that counts too. Shape (cuts,).
         """
         beside = self.uncertainty.speed + FREQUENCY_MARGIN
-        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - fall)
-        middle = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
+        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - drop)
+        median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
         cut, row = np.divmod(np.arange(len(self.cuts) * N_MARGIN_SPEEDS), N_MARGIN_SPEEDS)
-        grown = middle.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
+        grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
         return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
 
     def scale(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramSamples:
@@ -235,23 +233,25 @@ def find_worst_limit(program: Program, assembly: Assembly, cuts: Sequence[Cut]) 
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
 
 
-def find_likely_axes(program: Program, assembly: Assembly, cuts: Sequence[Cut], doubt: Uncertainty) -> Floats | None:
+def find_likely_axes(
+    program: Program, assembly: Assembly, cuts: Sequence[Cut], uncertainty: Uncertainty
+) -> Floats | None:
     """Axes that are likely to have the lowest limit: those in which the program grows most at its depth."""
     patterns = assembly.principal_directions.sign_patterns
     if len(patterns) == 1:
         return patterns[0]
     rows = reduce(join_rows, (build_median_row(program, assembly, axes) for axes in patterns))
-    middles = ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
+    middles = ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, uncertainty)
     return patterns[int(np.argmax(middles.growth(program.depth)))]
 
 
 def draw_likely_samples(
-    program: Program, cuts: Sequence[Cut], assembly: Assembly, doubt: Uncertainty
+    program: Program, cuts: Sequence[Cut], assembly: Assembly, uncertainty: Uncertainty
 ) -> ProgramSamples:
     """The draws of a program whose limit nobody knows yet, with `find_likely_axes`, its cuts in no order."""
-    middle = build_median_row(program, assembly, find_likely_axes(program, assembly, cuts, doubt))
-    rows = join_rows(middle, doubt.sample(middle, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
+    median = build_median_row(program, assembly, find_likely_axes(program, assembly, cuts, uncertainty))
+    rows = join_rows(median, uncertainty.sample(median, N_PROGRAM_SAMPLES))
+    return ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, uncertainty)
 
 
 def draw_samples(
@@ -259,24 +259,24 @@ def draw_samples(
     limit: ProgramLimit,
     cuts: Sequence[Cut],
     assembly: Assembly,
-    doubt: Uncertainty,
+    uncertainty: Uncertainty,
     axes: Floats | None = None,
 ) -> ProgramSamples:
     """The draws of a program; limit: that in the middle of the doubt, with modes along axes (n, 2)."""
-    middle, limits = build_median_row(program, assembly, axes), np.array(limit.limits)
+    median, limits = build_median_row(program, assembly, axes), np.array(limit.limits)
     order = np.argsort(limits)
-    finer = max(limit.pieces // int(count_pieces(middle, MAX_PROGRAM_DEPTH_RATIO * program.depth)[0]), 1)
-    rows = join_rows(middle, doubt.sample(middle, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts[place] for place in order), limits[order], finer, doubt)
+    finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * program.depth)[0]), 1)
+    rows = join_rows(median, uncertainty.sample(median, N_PROGRAM_SAMPLES))
+    return ProgramSamples(rows, tuple(cuts[place] for place in order), limits[order], finer, uncertainty)
 
 
-def draw_rotating_samples(draws: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
+def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
     """The draws with what may differ between a spindle at rest and one in the cut, alike in all modes of a draw."""
-    rows, random = draws.rows, np.random.default_rng(seed)
+    rows, random = samples.rows, np.random.default_rng(seed)
     frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
 
-    def factor(middle: float, spread: float, normal: Floats) -> Floats:
-        return np.asarray(np.maximum(middle * (1 + spread * normal), MIN_ROTATING_FACTOR * middle)[:, np.newaxis])
+    def factor(median: float, spread: float, normal: Floats) -> Floats:
+        return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
     push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
     changed = replace(
@@ -287,4 +287,4 @@ def draw_rotating_samples(draws: ProgramSamples, seed: int = ROTATING_SEED) -> P
         tangential=rows.tangential * push,
         radial=rows.radial * push,
     )
-    return replace(draws, rows=changed)
+    return replace(samples, rows=changed)

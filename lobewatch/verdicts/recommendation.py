@@ -42,11 +42,11 @@ class Advice:
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
     """Advice beside a verdict; empty where it is unknown."""
-    tool, draws = verdict.assembly, verdict.samples
-    if tool is None or draws is None:
+    tool, samples = verdict.assembly, verdict.samples
+    if tool is None or samples is None:
         return Advice()
     stiffness_at, remark = model_softening(tool)
-    decay = find_tolerable_drop(draws, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.is_stable else 0.0
+    decay = find_tolerable_drop(samples, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.is_stable else 0.0
     remarks = (remark,) if verdict.is_stable else ()
     if verdict.stability is Stability.STABLE or not is_compliance_known(verdict.program, tool):
         return Advice(tolerable_drop=decay, remarks=remarks)
@@ -197,14 +197,14 @@ def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
     """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
-    judgement = search.results[setting.speed_rpm, setting.depth_mm]
+    result = search.results[setting.speed_rpm, setting.depth_mm]
     at = {
         "speed_rpm": setting.speed_rpm,
         "depth_mm": setting.depth_mm,
-        "direction": judgement.samples.cuts[0].direction,
+        "direction": result.samples.cuts[0].direction,
     }
     program = msgspec.structs.replace(table, **at)
-    verdict = evaluate_program(program, search.assembly, search.machine, search.at_speed, judgement)
+    verdict = evaluate_program(program, search.assembly, search.machine, search.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
         return Recommendation(table, search.any_direction, reason=reason, alternatives=others)

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
@@ -42,8 +42,6 @@ DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
 MIN_SEARCHED_DEPTH = 1e-5
 """... down to this (m)."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class CriticalSamples:
@@ -53,7 +51,7 @@ class CriticalSamples:
     """Depth that is likely (m): the scale of what is looked at."""
     samples: ProgramSamples
     """All draws at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth to spare."""
-    likely_first: NDArray[np.intp]
+    likely_first: Indices
     """Places of the few that are likely the first to chatter."""
     chattered: frozenset[int] = frozenset()
     """Draws that count too since they have chattered elsewhere."""
@@ -90,8 +88,8 @@ def select_critical_samples(
     program: Program,
     cuts: Sequence[Cut],
     spindle: Assembly,
-    doubt: Uncertainty,
-    fall: float,
+    uncertainty: Uncertainty,
+    drop: float,
     stiffness_at: StiffnessAt,
     spare: float,
 ) -> CriticalSamples:
@@ -99,31 +97,31 @@ def select_critical_samples(
 
     spare: depth to spare in the middle of the doubt, relative.
     """
-    drawn = draw_likely_samples(program, cuts, spindle, doubt)
-    order = np.argsort(-drawn.median_growth_near(program.depth, fall, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
-    drawn = replace(drawn, cuts=tuple(cuts[place] for place in order), limits=drawn.limits[order])
-    aged = sweep_extremes(drawn, fall, stiffness_at)
+    samples_all = draw_likely_samples(program, cuts, spindle, uncertainty)
+    order = np.argsort(-samples_all.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    samples_all = replace(samples_all, cuts=tuple(cuts[place] for place in order), limits=samples_all.limits[order])
+    aged = sweep_extremes(samples_all, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
-    middle = drawn.rows[np.zeros(1, dtype=np.intp)]
+    median = samples_all.rows[np.zeros(1, dtype=np.intp)]
     push = (1 + spare) / ROBUST_DEPTH_FACTOR
-    middle = replace(middle, tangential=push * middle.tangential, radial=push * middle.radial)
+    median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     first = np.concatenate(
         (np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES], [grown.size])
     )
-    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, middle)), np.unique(first))
+    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, median)), np.unique(first))
 
 
-def find_deepest_stable(draws: ProgramSamples, most: float) -> float:
+def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
     """The deepest up to a depth (m) at which, and below which, all draws are stable (m); 0 where it is hardly any."""
     depths = most * CRITICAL_DEPTH_SHARES
-    grown = np.max(draws.growth(depths), axis=0)
+    grown = np.max(samples.growth(depths), axis=0)
     if np.all(grown < 0):
         return most
     first = int(np.argmax(grown >= 0))
     low = float(depths[first - 1]) if first else 0.0
     between = low + (depths[first] - low) * DEPTH_BRACKET_SHARES
-    finer = np.max(draws.growth(between), axis=0)
+    finer = np.max(samples.growth(between), axis=0)
     depth = np.concatenate(([low], between, [depths[first]]))
     value = np.concatenate(([grown[first - 1] if first else -np.inf], finer, [grown[first]]))
     bad = int(np.argmax(value >= 0))
@@ -190,7 +188,7 @@ class LikelyDepths:
 
 
 def estimate_likely_depths(
-    reach: CutRange, cuts: Sequence[Cut], spindle: Assembly, doubt: Uncertainty, fall: float, spare: float
+    reach: CutRange, cuts: Sequence[Cut], spindle: Assembly, uncertainty: Uncertainty, drop: float, spare: float
 ) -> LikelyDepths:
     """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
 
@@ -202,10 +200,10 @@ def estimate_likely_depths(
         np.array([lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts])
         * 1e3
     )
-    deepest, safe = reach.depth_limits(speeds), max(doubt.tangential.high, 1 + spare)
+    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + spare)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    beside = doubt.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROOM)
-    steps, ahead = math.ceil((beside + fall / 2) / LIKELY_SPEED_STEP), round(fall / 2 / LIKELY_SPEED_STEP)
+    beside = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROOM)
+    steps, ahead = math.ceil((beside + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:
         lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
@@ -223,7 +221,7 @@ def estimate_likely_depths(
 
 
 def _limits_by_multipliers(
-    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: NDArray[np.bool_]
+    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
 ) -> Floats:
     """Limits (mm) by multipliers, up to a depth (mm) (n,), where wanted (n,), between few speeds; else by zero order.
 
@@ -271,8 +269,8 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
     return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
 
 
-def _split_runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+def _split_runs(wanted: Flags) -> list[Indices]:
     """Places without a gap between them."""
-    places: NDArray[np.intp] = np.flatnonzero(wanted)
-    runs: Sequence[NDArray[np.intp]] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    places: Indices = np.flatnonzero(wanted)
+    runs: Sequence[Indices] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     return [run for run in runs if run.size]

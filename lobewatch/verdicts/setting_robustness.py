@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
@@ -47,26 +47,24 @@ MIN_ROBUST_DROP = 0.01
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 """Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
 
-Floats = NDArray[np.float64]
 
-
-def sweep_extremes(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """All draws at the slower speed, then after the fall: the ends of what must be safe."""
-    return _sweep_speeds_and_drops(draws, [1 / ROBUST_SPEED_FACTOR, 1], [0, fall], stiffness_at)
+    return _sweep_speeds_and_drops(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
 
 
-def sweep_neighborhood(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """All draws at these ends, after half of the fall, and at the faster speed."""
     return _sweep_speeds_and_drops(
-        draws, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, fall, fall / 2, 0], stiffness_at
+        samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at
     )
 
 
 def _sweep_speeds_and_drops(
-    draws: ProgramSamples, speeds: list[float], falls: list[float], stiffness_at: StiffnessAt
+    samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness_at: StiffnessAt
 ) -> ProgramSamples:
-    stiffness = np.array([stiffness_at(fall) for fall in falls])
-    return draws.sweep(np.array(speeds), 1 - np.array(falls), stiffness)
+    stiffness = np.array([stiffness_at(drop) for drop in drops])
+    return samples.sweep(np.array(speeds), 1 - np.array(drops), stiffness)
 
 
 def find_speed_window(
@@ -119,8 +117,8 @@ DEFAULT_NEEDED_DROP = 0.02
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
     """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
     days = N_TAP_INTERVALS * machine.machine.tap_interval_days
-    falls = [expected_frequency_drop(series, days) for series in assembly.series.values()]
+    drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
     return max(
-        (DEFAULT_NEEDED_DROP if fall is None else max(fall, MIN_ROBUST_DROP) for fall in falls),
+        (DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops),
         default=DEFAULT_NEEDED_DROP,
     )

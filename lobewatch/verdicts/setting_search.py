@@ -15,9 +15,9 @@ from functools import cached_property
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, Program
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
@@ -71,7 +71,6 @@ NEXT_DEPTH_SHARE = 0.98
 N_WINDOW_SAMPLES = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
 
-Floats = NDArray[np.float64]
 DepthsBySpeed = dict[float, float]
 """Depths (mm) that may be safe, by speeds (rpm)."""
 SharesBySpeed = dict[float, float]
@@ -300,24 +299,24 @@ class SettingSearch:
         grown = around.critical_growth(deep)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        judgement = evaluate_samples(program)
-        if not judgement.is_stable_throughout:
-            places = 1 + np.flatnonzero(judgement.chatters)
+        result = evaluate_samples(program)
+        if not result.is_stable_throughout:
+            places = 1 + np.flatnonzero(result.chatters)
             self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), judgement.lowest)
+            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
             return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = find_speed_window(near, hardest, speed, depth, self.cut_range)
         left = find_drop_margin(hardest, depth, self.stiffness_at)
-        self.results[speed, depth_mm] = judgement
+        self.results[speed, depth_mm] = result
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
 
-    def _reduced_depth(self, draws: ProgramSamples, grown: Floats, depth_mm: float) -> float:
+    def _reduced_depth(self, samples: ProgramSamples, grown: Floats, depth_mm: float) -> float:
         """A depth (mm) that these draws may let pass, which grow by so much at one (mm) with room (n,)."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
         return min(
-            1e3 * find_deepest_stable(draws[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
+            1e3 * find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
             depth_mm - DEPTH_STEP_MM,
         )
 

@@ -9,16 +9,15 @@ from typing import TypeVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Remark
+from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
 AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

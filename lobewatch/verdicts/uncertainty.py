@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, UncertaintyTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import PrincipalDirections
@@ -32,8 +32,6 @@ CROSS_CAUSE = "cross"
 """Cause of the doubt of the axes of modes: what direct taps leave open."""
 TEST_CUT_CAUSE = "cuts"
 """Cause of the doubt of modes that test cuts have taught: all that they have left open."""
-
-Floats = NDArray[np.float64]
 
 
 class FactorRange(NamedTuple):
@@ -62,10 +60,10 @@ class LearnedSamples:
     ratio: Floats
     """Kr/Kt over its mean, shape (r,)."""
 
-    def build_rows(self, middle: MillingRows, count: int, without: str) -> MillingRows:
+    def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
         """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
         take = np.arange(count) % len(self.tangential)
-        rows, spindle = middle[np.zeros(count, dtype=np.intp)], float(without != TEST_CUT_CAUSE)
+        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUT_CAUSE)
         force, direction = (
             1 + (factor[take] - 1) * (without != "coefficients") for factor in (self.tangential, self.ratio)
         )
@@ -110,27 +108,27 @@ class Uncertainty:
         across = [CROSS_CAUSE] if self.axes is not None and self.axes.are_uncertain else []
         return (*self.modes, *across, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
 
-    def sample(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
+    def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
 
         without: a cause that is taken as known.
         """
-        rows = self._sample_new_edges(middle, count, seed, without)
+        rows = self._sample_new_edges(median, count, seed, without)
         if self.wear == 1 or without == "wear":
             return rows
         worn = np.empty(count)
         worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
         return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
 
-    def _sample_new_edges(self, middle: MillingRows, count: int, seed: int, without: str) -> MillingRows:
+    def _sample_new_edges(self, median: MillingRows, count: int, seed: int, without: str) -> MillingRows:
         if self.learned is not None:
-            rows = self.learned.build_rows(middle, count, without)
+            rows = self.learned.build_rows(median, count, without)
             speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
             return self._with_sampled_axes(
                 replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
             )
         random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
-        factor = np.ones((count, middle.frequency.shape[1], 3))
+        factor = np.ones((count, median.frequency.shape[1], 3))
         turned = np.zeros(factor.shape[:2])
         for cause, widths in self.modes.items():
             uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
@@ -144,8 +142,8 @@ class Uncertainty:
         )
         if without == "coefficients":
             tangential, ratio = np.ones((2, count))
-        rows = middle[np.zeros(count, dtype=np.intp)]
-        drawn = replace(
+        rows = median[np.zeros(count, dtype=np.intp)]
+        samples_all = replace(
             rows,
             frequency=rows.frequency * factor[..., 0],
             damping_ratio=rows.damping_ratio * factor[..., 1],
@@ -155,7 +153,7 @@ class Uncertainty:
             tangential=rows.tangential * np.maximum(tangential, MIN_SAMPLE_FACTOR),
             radial=rows.radial * np.maximum(tangential, MIN_SAMPLE_FACTOR) * np.maximum(ratio, 0.0),
         )
-        return self._with_sampled_axes(drawn, seed, without)
+        return self._with_sampled_axes(samples_all, seed, without)
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
         """With axes drawn from what is open of them."""
@@ -246,12 +244,12 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
     """Kt and Kr/Kt over the middle: the published range where there is one, else that of [doubt]."""
-    middle = machine.coefficients(table)
-    if middle.tangential_range is None or middle.ratio_range is None:
+    median = machine.coefficients(table)
+    if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
         return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
-    ratio = middle.radial / middle.tangential
+    ratio = median.radial / median.tangential
     return (
-        FactorRange(*(limit / middle.tangential for limit in middle.tangential_range)),
-        FactorRange(*(limit / ratio for limit in middle.ratio_range)),
+        FactorRange(*(limit / median.tangential for limit in median.tangential_range)),
+        FactorRange(*(limit / ratio for limit in median.ratio_range)),
     )

@@ -147,7 +147,7 @@ def evaluate_program(
     tool: Assembly | DataError,
     machine: Machine,
     at_speed: SpindleAtSpeed = NO_TEST_CUTS,
-    judgement: MonteCarloResult | None = None,
+    result: MonteCarloResult | None = None,
 ) -> Verdict:
     """The verdict on a program as it stands in machine.toml, or why its tool is not known.
 
@@ -162,30 +162,30 @@ def evaluate_program(
     if asked := find_program_questions(machine, table, on_model):
         return _unknown_verdict(table, tuple(doubted.remark for doubted in asked), tool)
     table = at_speed.apply_coefficients(table)
-    judgement, depth = judgement or run_monte_carlo(table, tool, machine, at_speed), table.depth_mm / 1e3
-    middle, word, cause = judgement.median, classify_stability(table, judgement, tool), ""
-    remarks = [*_verdict_remarks(table, tool, at_speed, machine), *assumption_remarks(table, machine, judgement)]
+    result, depth = result or run_monte_carlo(table, tool, machine, at_speed), table.depth_mm / 1e3
+    median, word, cause = result.median, classify_stability(table, result, tool), ""
+    remarks = [*_verdict_remarks(table, tool, at_speed, machine), *assumption_remarks(table, machine, result)]
     if word is Stability.DOUBTFUL:
-        cause = _decisive_cause(table, judgement, tool)
-        tangential = middle.limit / depth * machine.build_cut(table).tangential
+        cause = _decisive_cause(table, result, tool)
+        tangential = median.limit / depth * machine.build_cut(table).tangential
         remarks.append(uncertainty_advice(cause, table, tangential, tool, at_speed.n_cuts))
     return Verdict(
         program=table,
         stability=word,
         assembly=tool,
         at_speed=at_speed,
-        limit=middle.limit,
-        limit_low=min(judgement.low, middle.limit),
-        limit_high=max(judgement.high, middle.limit),
-        chatter_risk=_chatter_risk(judgement, depth, at_speed),
+        limit=median.limit,
+        limit_low=min(result.low, median.limit),
+        limit_high=max(result.high, median.limit),
+        chatter_risk=_chatter_risk(result, depth, at_speed),
         decisive_cause=cause,
-        chatter_frequency=middle.chatter_frequency,
-        kind=middle.kind,
-        feed_angle=middle.feed_angle,
-        method=middle.method,
-        detail=f"{middle.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
+        chatter_frequency=median.chatter_frequency,
+        kind=median.kind,
+        feed_angle=median.feed_angle,
+        method=median.method,
+        detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
         drive_limit=float(drive_depth_limit(machine, table, np.array([table.speed_rpm]))[0]),
-        samples=judgement.samples,
+        samples=result.samples,
         remarks=tuple(remarks),
     )
 
@@ -202,14 +202,12 @@ def _unknown_verdict(
     return Verdict(table, Stability.UNKNOWN, assembly, remarks=(remark, *further))
 
 
-def classify_stability(table: ProgramTable, judgement: MonteCarloResult, assembly: Assembly) -> Stability:
+def classify_stability(table: ProgramTable, result: MonteCarloResult, assembly: Assembly) -> Stability:
     """The word on a program with a tool that was judged."""
-    if not judgement.median.stable:
+    if not result.median.stable:
         return Stability.NOT_STABLE
     return (
-        Stability.STABLE
-        if judgement.is_stable_throughout and is_compliance_known(table, assembly)
-        else Stability.DOUBTFUL
+        Stability.STABLE if result.is_stable_throughout and is_compliance_known(table, assembly) else Stability.DOUBTFUL
     )
 
 
@@ -231,20 +229,20 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
     return None
 
 
-def _decisive_cause(table: ProgramTable, judgement: MonteCarloResult, assembly: Assembly) -> str:
+def _decisive_cause(table: ProgramTable, result: MonteCarloResult, assembly: Assembly) -> str:
     """Cause of the doubt that decides."""
     if assembly.questions:
         return "question"
-    if table.thin and assembly.is_complete and not np.any(judgement.chatters):
+    if table.thin and assembly.is_complete and not np.any(result.chatters):
         return "workpiece"
-    return find_decisive_cause(judgement, table.depth_mm / 1e3)
+    return find_decisive_cause(result, table.depth_mm / 1e3)
 
 
-def _chatter_risk(judgement: MonteCarloResult, depth: float, at_speed: SpindleAtSpeed) -> float:
+def _chatter_risk(result: MonteCarloResult, depth: float, at_speed: SpindleAtSpeed) -> float:
     """Chance of chatter at a depth (m) with the spindle turning: as learnt, or under plausible differences."""
     if at_speed.n_cuts:
-        return float(np.mean(judgement.chatters))
-    return float(np.mean(draw_rotating_samples(judgement.samples.with_lowest_cuts(0.0)).growth(depth)[1:] >= 0))
+        return float(np.mean(result.chatters))
+    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(depth)[1:] >= 0))
 
 
 def _verdict_remarks(

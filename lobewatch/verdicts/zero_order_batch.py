@@ -16,16 +16,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows
 from lobes.tooth_force import interval_forces, mean_force, mean_regeneration, rotate_to_machine
+from lobewatch.arrays import Complexes, Floats
 
 FREQUENCIES_PER_WAVE = 16
 """Frequencies in which the regeneration of the longest delay turns once, at least."""
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Flags, Floats
 
 CUT_PIECE_LENGTH = 0.04
 """Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
@@ -120,7 +119,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     return kept or [longest]
 
 
-def _find_loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
+def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
     """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
 
     axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
@@ -132,7 +131,7 @@ def _find_loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
     return np.asarray(is_strong if is_clearer else is_loud)
 
 
-def _loudness_step(level: Floats, is_loud: NDArray[np.bool_]) -> float:
+def _loudness_step(level: Floats, is_loud: Flags) -> float:
     """By how much what is loud is louder than what is not, in the mean."""
     is_split = np.any(is_loud) and not np.all(is_loud)
     return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
@@ -215,7 +214,7 @@ def _loudness(power: Floats) -> Floats:
     return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
 
 
-def _find_stretches(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _find_stretches(loud: Flags) -> list[tuple[int, int]]:
     """First piece and the one after the last of each stretch."""
     edge = np.diff(np.concatenate(([0], loud.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import (
@@ -29,7 +29,6 @@ from lobewatch.cuts.chatter_detection.peak_classification import (
     is_undersampled,
 )
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_spectra,
@@ -291,7 +290,7 @@ class CutRecording(NamedTuple):
     """Radial depth over diameter (-)."""
     commanded_rpm: float
     """Spindle speed as it was set (rpm)."""
-    clipped: NDArray[np.bool_] | None = None
+    clipped: Flags | None = None
     """Overload of the sensor or its input, shape (n,); None: nowhere."""
     lost_scans: int = 0
     """Number of scans that are missing."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.spectrum import Floats, SpectralPeaks
+from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
 
 MAX_SIDEBAND_FAMILIES = 4
 """Largest number of frequencies that are no multiples, with their side bands."""
@@ -24,7 +24,7 @@ MAX_SPEED_CHANGE = 0.005
 class SidebandFamily:
     """Lines at sign * r + k f, f the frequency of the spindle."""
 
-    indices: NDArray[np.intp]
+    indices: Indices
     """Places of its lines among all, shape (n,)."""
     sign: Floats
     """Sign of r in each line, shape (n,); 0 where r is 0."""

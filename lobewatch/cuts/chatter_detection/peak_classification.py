@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices, Integers
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_power,
@@ -104,7 +103,7 @@ class PeaksByOrigin:
 
     comb: SpectralPeaks
     """Multiples of the frequency of the spindle, the first left out: it is there in air."""
-    tooth_order: NDArray[np.int64]
+    tooth_order: Integers
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
     air: SpectralPeaks
     """Lines that are there in air."""
@@ -114,7 +113,7 @@ class PeaksByOrigin:
     """Lines that are left: chatter, where there is any."""
 
 
-def is_in_air(lines: SpectralPeaks, air: Spectrum) -> NDArray[np.bool_]:
+def is_in_air(lines: SpectralPeaks, air: Spectrum) -> Flags:
     """Whether lines are there in air too."""
     return np.asarray(
         lines.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(lines.frequency, AIR_PEAK_TOLERANCE)
@@ -141,7 +140,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     return replace(air, power=power)
 
 
-def _bins_around(middle: Floats, reach: int, last: int) -> NDArray[np.intp]:
+def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
     """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
     places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
     return np.asarray(np.clip(places, 0, last))
@@ -196,7 +195,7 @@ def _remove_wavering(
 
 def _is_near_folded(
     lines: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)

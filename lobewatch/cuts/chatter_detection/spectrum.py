@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Flags, Floats, Indices
 
 
 def fold_frequency(frequency: Floats | float, rate: Floats | float) -> Floats:
@@ -77,7 +76,7 @@ class SpectralPeaks:
     clearness: Floats
     """Power over that of the noise, shape (n,)."""
 
-    def __getitem__(self, places: NDArray[np.bool_] | NDArray[np.intp]) -> SpectralPeaks:
+    def __getitem__(self, places: Flags | Indices) -> SpectralPeaks:
         """Some of them."""
         return SpectralPeaks(self.frequency[places], self.amplitude[places], self.clearness[places])
 

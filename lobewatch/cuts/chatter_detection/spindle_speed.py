@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
 from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_spectra,
@@ -163,7 +162,7 @@ def _spaced_share(lines: SpectralPeaks, frequency: float, teeth: int, bin_: floa
     return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
 
 
-def _vote_peaks(votes: Floats) -> NDArray[np.intp]:
+def _vote_peaks(votes: Floats) -> Indices:
     """Where there are more votes than beside, the most first."""
     places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, VOTE_PEAK_WIDTH) == votes) & (votes > 0))
     return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]

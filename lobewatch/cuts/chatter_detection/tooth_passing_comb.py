@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     find_peaks,
@@ -45,7 +44,7 @@ class Comb(NamedTuple):
 
     frequency: float
     """Frequency (Hz)."""
-    is_member: NDArray[np.bool_]
+    is_member: Flags
     """Which lines are multiples, shape (n,)."""
     order: Floats
     """Order of each, shape (n,)."""

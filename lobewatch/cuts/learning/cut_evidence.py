@@ -45,8 +45,8 @@ def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerE
     common = math.hypot(
         DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
     )
-    middle, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
-    return PowerEvidence(power.tangential / cut.tangential / middle, common, math.hypot(POWER_READING_SPREAD, scatter))
+    median, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
+    return PowerEvidence(power.tangential / cut.tangential / median, common, math.hypot(POWER_READING_SPREAD, scatter))
 
 
 AGED_FREQUENCY_CHANGE = 0.02
@@ -117,7 +117,7 @@ REJECTED_DEPTH_TOLERANCE = 0.10
 
 
 def is_setting_taken(
-    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence] = ()
+    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence] = ()
 ) -> bool:
     """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since.
 
@@ -126,15 +126,15 @@ def is_setting_taken(
     return any(
         cut.has_chatter
         and abs(math.log(speed_rpm / cut.speed_rpm)) < TAKEN_SPEED_TOLERANCE
-        and depth > (1 - (REJECTED_DEPTH_TOLERANCE if cut in doubted else TAKEN_DEPTH_TOLERANCE)) * cut.depth
+        and depth > (1 - (REJECTED_DEPTH_TOLERANCE if cut in rejected else TAKEN_DEPTH_TOLERANCE)) * cut.depth
         and not any(cut.is_repeat_of(later) and not later.has_chatter for later in cuts[place + 1 :])
         for place, cut in enumerate(cuts)
     )
 
 
-def find_cut_to_repeat(cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence]) -> CutEvidence | None:
+def find_cut_to_repeat(cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence]) -> CutEvidence | None:
     """The first cut that is not believed and was made once only; None where there is none."""
     for cut in cuts:
-        if cut in doubted and sum(cut.is_repeat_of(other) for other in cuts) == 1:
+        if cut in rejected and sum(cut.is_repeat_of(other) for other in cuts) == 1:
             return cut
     return None

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import MillingRows, build_milling_system, count_pieces, rows_at_speeds
 from lobes.floquet import largest_multipliers
 from lobes.floquet.stability_boundary import loudest_chatter_frequency
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
@@ -40,8 +40,6 @@ FLIP_ANGLE_TOLERANCE = 1e-3
 MAX_LOG_EXCESS = 5.0
 """Largest logarithm of depth over limit that counts, either way: a hundred times `EDGE`."""
 
-Floats = NDArray[np.float64]
-
 
 class CutPrediction(NamedTuple):
     """What each spindle would do in a cut, shape (r,) each."""
@@ -52,7 +50,7 @@ class CutPrediction(NamedTuple):
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
     limit_frequency: Floats
     """Folded frequency at the limit of its speed, by zero order (Hz); may be NaN where the cut says nothing of any."""
-    is_flip: NDArray[np.bool_]
+    is_flip: Flags
     """Whether that is of period two."""
 
     @property
@@ -74,10 +72,10 @@ class CutPrediction(NamedTuple):
         return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
 
 
-def predict_cut(cut: CutEvidence, draws: SpindleSamples) -> CutPrediction:
+def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
     """What draws would do in the worst of the directions of feed of a cut, at its own depth."""
-    rows = draws.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
-    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
+    rows = samples.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
+    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * samples.at_rest.speed_rpm
     rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
     predict = _predict_by_zero_order if is_force_constant(cut.cut) else _predict_by_multipliers
     fed = [predict(rows.with_feed_angle(angle), cut) for angle in cut.feed_angles]

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD
@@ -30,7 +30,6 @@ ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
 """Least and largest ratio of true limit to zero order that is believed; chosen."""
 
 TipModes = Sequence[Mode] | None
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ class LimitCharts:
     """Limits in the worst direction of feed, as deep as is allowed (m), shape (r, s)."""
     frequencies: Floats
     """Chatter frequencies at them, folded by how often the cut repeats (Hz), shape (r, s)."""
-    depth_order: NDArray[np.intp]
+    depth_order: Indices
     """Draws of each speed by their limits, the deepest first, shape (r, s)."""
     typical_frequency: float
     """A natural frequency (Hz)."""
@@ -124,9 +123,9 @@ class LimitCharts:
     """Speed times the deepest depth that can be set and is stable (rpm m) for each of them, shape (r, s)."""
 
     @classmethod
-    def of(cls, draws: SpindleSamples, grid: CutGrid) -> LimitCharts:
+    def of(cls, samples: SpindleSamples, grid: CutGrid) -> LimitCharts:
         """Limits of draws at speed."""
-        rows = replace(draws.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
+        rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
         fed = [
             ZeroOrderBatch.of(rows.with_feed_angle(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles
@@ -152,7 +151,7 @@ class LimitCharts:
                 best = np.maximum(best, np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth))
         return best
 
-    def is_label_wrong(self, cut: CutEvidence) -> NDArray[np.bool_]:
+    def is_label_wrong(self, cut: CutEvidence) -> Flags:
         """Whether the word of a cut is wrong in each draw, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
         excess = np.log(cut.depth / self.limits[:, row])
@@ -209,7 +208,7 @@ class LimitCharts:
         after = chance * self._next_gain(stable / np.sum(stable), np.maximum(best, chips))
         return gain + after + (1 - chance) * self._gain_after_chatter(row, ~stable, best)
 
-    def _gain_after_chatter(self, row: int, chatters: NDArray[np.bool_], best: float | Floats) -> float:
+    def _gain_after_chatter(self, row: int, chatters: Flags, best: float | Floats) -> float:
         """Gain of the next cut, over frequencies that may be heard."""
         places = np.flatnonzero(chatters)
         if not places.size:

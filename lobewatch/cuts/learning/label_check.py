@@ -90,27 +90,27 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
     )
 
 
-def find_inconsistent_cuts(learnt: Posterior) -> tuple[InconsistentCut, ...]:
+def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
     """Cuts that are not believed, of those that were learnt from: each counts as its chance to be right says."""
-    few = learnt.resample(N_CHECK_SAMPLES)
-    doubted = (find_contradiction(few.predict(cut)) for cut in learnt.cuts)
-    return tuple(doubt for doubt in doubted if doubt is not None)
+    few = posterior.resample(N_CHECK_SAMPLES)
+    rejected = (find_contradiction(few.predict(cut)) for cut in posterior.cuts)
+    return tuple(uncertainty for uncertainty in rejected if uncertainty is not None)
 
 
 def inconsistent_cut_remarks(
-    learnt: Posterior, contradicting: Sequence[InconsistentCut], about: str
+    posterior: Posterior, contradicting: Sequence[InconsistentCut], about: str
 ) -> Iterator[Remark]:
     """What was left out, and where the spindle is not what it was tapped as; about: the program."""
     yield from map(_inconsistent_cut_remark, contradicting)
-    if learnt.is_frequency_unusual:
+    if posterior.is_frequency_unusual:
         between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
         text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 
-def _repeats_of(cut: CutEvidence, learnt: Posterior) -> list[CutEvidence]:
+def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
     """The same cut as it was made at other times."""
-    return [other for other in learnt.cuts if other is not cut and cut.is_repeat_of(other)]
+    return [other for other in posterior.cuts if other is not cut and cut.is_repeat_of(other)]
 
 
 def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import (
     CutPrediction,
@@ -39,8 +39,6 @@ USUAL_FREQUENCY_INTERVAL = (0.945, 1.025)
 """Ends between which 95 % of natural frequencies at speed lie, over those at rest: `priors.FREQUENCY`."""
 INTERVAL_LEVEL = 0.95
 """Share of the weight that an interval holds."""
-
-Floats = NDArray[np.float64]
 
 
 class Interval(NamedTuple):
@@ -119,9 +117,9 @@ class Posterior:
     def predict(self, cut: CutEvidence) -> NewEvidence:
         """A cut, and what it would sound like on the spindles that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
-        draws = self.samples[likely].with_materials(cut.material + 1, self.seed)
-        before = replace(self, samples=draws, log_weight=self.log_weight[likely])
-        return NewEvidence(before, cut, predict_cut(cut, draws))
+        samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
+        before = replace(self, samples=samples, log_weight=self.log_weight[likely])
+        return NewEvidence(before, cut, predict_cut(cut, samples))
 
     def draw(self, count: int) -> SpindleSamples:
         """Draws of equal weight."""
@@ -150,25 +148,27 @@ class NewEvidence:
         log_weight = self.prior.log_weight + _cut_log_likelihood(
             self.cut, self.prior.samples, self.prediction, self.prior.cuts
         )
-        learnt = replace(self.prior, log_weight=log_weight, cuts=(*self.prior.cuts, self.cut))
-        return _refresh(learnt) if learnt.effective_size < MIN_EFFECTIVE_SAMPLES else learnt
+        posterior = replace(self.prior, log_weight=log_weight, cuts=(*self.prior.cuts, self.cut))
+        return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
-def build_prior(middle: MillingRows, doubt: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
+def build_prior(
+    median: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0
+) -> Posterior:
     """What is known before the first cut.
 
     middle: the spindle at rest in the middle of the doubt (a row).
     """
-    return Posterior(sample_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(median, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(
-    cut: CutEvidence, draws: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
+    cut: CutEvidence, samples: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
 ) -> Floats:
     """Logarithm of the likelihood of one cut after those before it; the word of an old one counts less, the more the
     frequency has moved since."""
     word = log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    return cut.weight * word + power_log_likelihood(cut, draws.force_factors(cut.material), before)
+    return cut.weight * word + power_log_likelihood(cut, samples.force_factors(cut.material), before)
 
 
 def _normalize_weights(log_weight: Floats) -> Floats:
@@ -176,43 +176,43 @@ def _normalize_weights(log_weight: Floats) -> Floats:
     return np.asarray(weights / np.sum(weights))
 
 
-def _refresh(learnt: Posterior) -> Posterior:
+def _refresh(posterior: Posterior) -> Posterior:
     """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
-    weights, draws, cuts = learnt.weights, learnt.samples, learnt.cuts
-    random = np.random.default_rng((learnt.seed, 3, len(cuts)))
-    spread = np.cov(draws.normal.T, aweights=weights) + ADDED_VARIANCE * np.eye(draws.normal.shape[1])
+    weights, samples, cuts = posterior.weights, posterior.samples, posterior.cuts
+    random = np.random.default_rng((posterior.seed, 3, len(cuts)))
+    spread = np.cov(samples.normal.T, aweights=weights) + ADDED_VARIANCE * np.eye(samples.normal.shape[1])
     root = np.linalg.cholesky(spread) * MARKOV_STEP_SHARE
     chosen, copies = np.unique(_resample_indices(weights, N_REFRESHED_SAMPLES, random), return_inverse=True)
-    value = _joint_log_density(draws[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
-    draws = draws[chosen[copies]]
+    value = _joint_log_density(samples[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
+    samples = samples[chosen[copies]]
     for _ in range(N_MARKOV_MOVES):
-        step = random.standard_normal(draws.normal.shape) @ root.T
-        moved = replace(draws, normal=draws.normal + step)
-        least = value + np.log(random.uniform(size=len(draws)))
+        step = random.standard_normal(samples.normal.shape) @ root.T
+        moved = replace(samples, normal=samples.normal + step)
+        least = value + np.log(random.uniform(size=len(samples)))
         moved_value = _joint_log_density(moved, cuts, least)
         taken = moved_value > least
-        normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
-        draws, value = replace(draws, normal=normal), np.where(taken, moved_value, value)
-    return replace(learnt, samples=draws, log_weight=np.zeros(len(draws)), n_refreshed=learnt.n_refreshed + 1)
+        normal = np.where(taken[:, np.newaxis], moved.normal, samples.normal)
+        samples, value = replace(samples, normal=normal), np.where(taken, moved_value, value)
+    return replace(posterior, samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
 
 
-def _joint_log_density(draws: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
+def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
 
     A draw that cannot come to more any more is not asked about further cuts.
     """
-    value: Floats = -np.sum(draws.normal**2, axis=1) / 2
+    value: Floats = -np.sum(samples.normal**2, axis=1) / 2
     hope = [cut.weight * max_log_likelihood(cut) for cut in cuts]
     for k, cut in enumerate(cuts):
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            left = draws[asked]
+            left = samples[asked]
             value[asked] += _cut_log_likelihood(cut, left, predict_cut(cut, left), cuts[:k])
     return value
 
 
-def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> NDArray[np.intp]:
+def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> Indices:
     """Places drawn by weight, systematically: each as often as its weight says, but for one."""
     at = (np.arange(count) + random.uniform()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), at), weights.size - 1)

@@ -13,9 +13,9 @@ from functools import cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts.program_samples import (
     ROTATING_DAMPING_FACTOR,
     ROTATING_FORCE_SPREAD,
@@ -42,8 +42,6 @@ each material."""
 MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS = 18, 3601
 """End (standard deviations) and number of points of the table that `_quantiles` makes of the mixture."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class SpindleSamples:
@@ -60,7 +58,7 @@ class SpindleSamples:
         """Number of draws."""
         return len(self.normal)
 
-    def __getitem__(self, places: NDArray[np.intp] | slice) -> SpindleSamples:
+    def __getitem__(self, places: Indices | slice) -> SpindleSamples:
         """Some of them."""
         return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
@@ -91,9 +89,9 @@ class SpindleSamples:
 
     def force_factors(self, material: int) -> Floats:
         """Factors of Kt of a material, shape (r,)."""
-        first, doubted = self._material_index(material), self.uncertainty.tangential
+        first, rejected = self._material_index(material), self.uncertainty.tangential
         at_speed, normal = self.normal[:, first : first + 2].T
-        force = doubted.low + (doubted.high - doubted.low) * scipy.special.ndtr(normal)
+        force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
         return np.asarray(
             ROTATING_FORCE_PRIOR[0] * np.maximum(1 + ROTATING_FORCE_PRIOR[1] * at_speed, MIN_PRIOR_FACTOR) * force
         )
@@ -132,8 +130,8 @@ class SpindleSamples:
         first = self.at_rest.direction.size
         normal = self.normal[:, first : first + NUMBERS_PER_SPINDLE].reshape(-1, 2, 2)
         parts = (
-            middle * np.maximum(1 + spread * normal[..., place], MIN_PRIOR_FACTOR)
-            for place, (middle, spread) in enumerate((ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR))
+            median * np.maximum(1 + spread * normal[..., place], MIN_PRIOR_FACTOR)
+            for place, (median, spread) in enumerate((ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR))
         )
         return np.stack(tuple(parts), axis=-1)
 
@@ -144,13 +142,13 @@ class SpindleSamples:
         return self.force_factors(material), np.maximum(ratio, 0.0)
 
 
-def sample_prior(middle: MillingRows, doubt: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
+def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
     """Draws from the prior around a spindle at rest (a row), the same for a seed."""
-    at_rest = doubt.sample(replace(middle, speed_rpm=np.ones(1)), count, seed, without="coefficients")
+    at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     normal = np.random.default_rng((seed, 2)).standard_normal(
-        (count, _count_spindle_numbers(middle) + NUMBERS_PER_MATERIAL)
+        (count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL)
     )
-    return SpindleSamples(normal, at_rest, doubt)
+    return SpindleSamples(normal, at_rest, uncertainty)
 
 
 def _count_spindle_numbers(rows: MillingRows) -> int:
@@ -158,18 +156,18 @@ def _count_spindle_numbers(rows: MillingRows) -> int:
     return rows.direction.size + NUMBERS_PER_SPINDLE
 
 
-def _force_ratio_factors(share: Floats, doubted: FactorRange, middle: float) -> Floats:
+def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:
     """Factors on a ratio Kr/Kt below which shares of the prior lie: within its doubt, or anything from 0 to 1.
 
     Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as doubted.
     """
-    if middle <= 0:
-        return np.asarray(doubted.low + (doubted.high - doubted.low) * share)
-    ends = np.sort([doubted.low, doubted.high, 0.0, 1 / middle])
-    width = max(doubted.high - doubted.low, 1e-9)
+    if median <= 0:
+        return np.asarray(rejected.low + (rejected.high - rejected.low) * share)
+    ends = np.sort([rejected.low, rejected.high, 0.0, 1 / median])
+    width = max(rejected.high - rejected.low, 1e-9)
     below = (1 - OPEN_FORCE_RATIO_SHARE) * np.clip(
-        (ends - doubted.low) / width, 0, 1
-    ) + OPEN_FORCE_RATIO_SHARE * np.clip(ends * middle, 0, 1)
+        (ends - rejected.low) / width, 0, 1
+    ) + OPEN_FORCE_RATIO_SHARE * np.clip(ends * median, 0, 1)
     return np.asarray(np.interp(share, below, ends))
 
 

@@ -80,30 +80,30 @@ def learn_program(
     start = build_prior(
         build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
     )
-    learnt, odd_powers = start, []
+    posterior, odd_powers = start, []
     for cut in collect_tool_evidence(cuts, table, assembly, machine):
-        evidence = learnt.predict(cut)
+        evidence = posterior.predict(cut)
         if is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
             evidence = replace(evidence, cut=replace(cut, power=None))
-        learnt = evidence.update()
+        posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
-    own_cuts = tuple(cut for cut in learnt.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    return LearningResult(table, start, learnt, (*find_inconsistent_cuts(learnt), *odd_powers), own_cuts)
+    own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
+    return LearningResult(table, start, posterior, (*find_inconsistent_cuts(posterior), *odd_powers), own_cuts)
 
 
 def find_next_cut(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
 ) -> NextCut:
     """The next test cut of a program of which so many shall be made at most."""
-    lesson = learn_program(table, assembly, machine, cuts)
-    left = max(most - len(lesson.own_cuts), 0)
+    learning = learn_program(table, assembly, machine, cuts)
+    left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
     if not left or reach.is_empty:
-        return NextCut(lesson, None, left, reach)
+        return NextCut(learning, None, left, reach)
     grid = build_cut_grid(table, assembly, machine)
-    cut = suggest_cut(lesson.posterior, grid, lesson.own_cuts, left, lesson.rejected_cuts, table.depth_mm / 1e3)
-    return NextCut(lesson, cut, left, reach)
+    cut = suggest_cut(learning.posterior, grid, learning.own_cuts, left, learning.rejected_cuts, table.depth_mm / 1e3)
+    return NextCut(learning, cut, left, reach)
 
 
 def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
 from lobes import StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
 from lobewatch.cuts.learning.posterior import Posterior
@@ -27,15 +27,13 @@ from lobewatch.verdicts.verdict import Verdict, evaluate_program
 INTERVAL_QUANTILES = (0.025, 0.975)
 """Quantiles that 95 % of draws lie between."""
 
-Floats = NDArray[np.float64]
-
 
 def evaluate_at_speed(
     table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
 ) -> Verdict:
     """The verdict on a program, or why its tool is not known; at speed as far as cuts have taught, else at rest."""
-    learnt = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
-    verdict = evaluate_program(table, tool, machine, learnt)
+    posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
+    verdict = evaluate_program(table, tool, machine, posterior)
     if isinstance(tool, DataError) or tool.directions or not tool.without_stiffness:
         return verdict
     return apply_test_cuts(verdict, tool, machine, cuts)
@@ -47,34 +45,36 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Seque
         return NO_TEST_CUTS
     if not any(cut.tool == table.tool and cut.is_usable for cut in cuts):
         return NO_TEST_CUTS
-    lesson = learn_program(table, tool, machine, cuts)
-    remarks = tuple(inconsistent_cut_remarks(lesson.posterior, lesson.inconsistent_cuts, table.name))
-    return _build_spindle(lesson, tool, machine, remarks) if lesson.accepted_cuts else SpindleAtSpeed(remarks=remarks)
+    learning = learn_program(table, tool, machine, cuts)
+    remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
+    return (
+        _build_spindle(learning, tool, machine, remarks) if learning.accepted_cuts else SpindleAtSpeed(remarks=remarks)
+    )
 
 
 def _build_spindle(
-    lesson: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
+    learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
 ) -> SpindleAtSpeed:
     """The middle of what a lesson has left, and the draws around it."""
-    at_rest, draws = (
-        build_median_row(build_program(lesson.program, machine), tool),
-        lesson.posterior.draw(N_PROGRAM_SAMPLES),
+    at_rest, samples = (
+        build_median_row(build_program(learning.program, machine), tool),
+        learning.posterior.draw(N_PROGRAM_SAMPLES),
     )
-    rows = draws.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
+    rows = samples.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
     parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
-    middle, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
-    force, direction = (draws.ratios()[name] for name in ("tangential", "ratio"))
+    median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
+    force, direction = (samples.ratios()[name] for name in ("tangential", "ratio"))
     push, ratio = float(np.mean(force)), float(np.mean(direction))
     left = LearnedSamples(
-        frequency=parts[0] / middle[0],
-        damping_ratio=parts[1] / middle[1],
-        stiffness=parts[2] / middle[2],
+        frequency=parts[0] / median[0],
+        damping_ratio=parts[1] / median[1],
+        stiffness=parts[2] / median[2],
         phase_change=phases,
         tangential=force / np.mean(force),
         ratio=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
     )
     return SpindleAtSpeed(
-        n_cuts=len(lesson.accepted_cuts),
+        n_cuts=len(learning.accepted_cuts),
         remarks=remarks,
         uncertainty=Uncertainty(
             modes={TEST_CUT_CAUSE: _half_widths(parts, phases)},
@@ -85,11 +85,11 @@ def _build_spindle(
             axes=tool.principal_directions,
             learned=left,
         ),
-        factors=np.stack(middle, axis=1),
+        factors=np.stack(median, axis=1),
         tangential=float(at_rest.tangential[0]) * push / 1e6,
         radial=float(at_rest.radial[0]) * push * ratio / 1e6,
-        prior_ranges=_factor_ranges(lesson.prior),
-        posterior_ranges=_factor_ranges(lesson.posterior),
+        prior_ranges=_factor_ranges(learning.prior),
+        posterior_ranges=_factor_ranges(learning.posterior),
     )
 
 

@@ -11,14 +11,13 @@ import numpy as np
 from lobes import Cut, MillingRows, Program, ProgramLimit, StabilityLobes
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Flags, Floats
-from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.lobe_chart import find_cut_table
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import (
     ProgramSamples,
     build_median_row,
-    build_program,
-    cutting_conditions_of,
     draw_samples,
     find_worst_limit,
 )
@@ -159,24 +158,15 @@ class SampledProgram(NamedTuple):
     """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
 
 
-def run_monte_carlo(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed
-) -> MonteCarloResult:
-    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
-    return evaluate_samples(sample_program(table, assembly, machine, at_speed))
+def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
+    """Evaluate a program on all its samples by semi-discretization."""
+    return evaluate_samples(sample_program(case))
 
 
-def sample_program(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
-) -> SampledProgram:
-    """A program with the coefficients that were learnt; either: milled up and down, the worse counts."""
-    program, spindle = build_program(table, machine), at_speed.scale_modes(assembly)
-    cuts = cutting_conditions_of(table, machine, spindle, either)
-    median, axes, across = find_worst_limit(program, spindle, cuts)
-    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, table, machine)
-    return SampledProgram(
-        program.depth, median, draw_samples(program, median, cuts, spindle, uncertainty, axes), across
-    )
+def sample_program(case: ProgramCase) -> SampledProgram:
+    """Find the median limit of a program and draw its samples."""
+    median, axes, axes_ratio = find_worst_limit(case)
+    return SampledProgram(case.depth, median, draw_samples(case, median, axes), axes_ratio)
 
 
 def evaluate_samples(program: SampledProgram) -> MonteCarloResult:

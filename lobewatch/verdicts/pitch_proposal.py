@@ -20,6 +20,7 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.safe_depth_estimates import find_deepest_stable
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
@@ -94,12 +95,15 @@ def propose_pitch(
     DataError where the cut cannot be judged, ValueError for less than two teeth.
     """
     equal = equal_pitch(table.teeth)
-    verdict = evaluate_program(_with_pitch(table, equal), assembly, machine, at_speed)
+    verdict = evaluate_program(msgspec.structs.replace(table, pitch_deg=equal.pitch_deg), assembly, machine, at_speed)
     if verdict.stability is Stability.UNKNOWN or verdict.samples is None:
         raise DataError("; ".join(str(remark) for remark in verdict.remarks))
-    table = at_speed.apply_coefficients(table)
-    limits, half_wave = _pitch_limits(verdict.samples, table), half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
-    search = PitchSearch(table, assembly, machine, at_speed, verdict.samples, limits)
+    case = ProgramCase(at_speed.apply_coefficients(table), assembly, machine, at_speed)
+    limits, half_wave = (
+        _pitch_limits(verdict.samples, case.depth),
+        half_wave_deg(table.speed_rpm, verdict.chatter_frequency),
+    )
+    search = PitchSearch(case, verdict.samples, limits)
     unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
     if present := machine.build_cut(table).pitch:
         pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
@@ -117,14 +121,8 @@ def propose_pitch(
 class PitchSearch:
     """Looking for pitches of one cut."""
 
-    table: ProgramTable
-    """Cut, with the coefficients that were learnt; its own pitch does not count."""
-    assembly: Assembly
-    """Tool as tapped."""
-    machine: Machine
-    """Machine."""
-    at_speed: SpindleAtSpeed
-    """Spindle as test cuts have taught it."""
+    case: ProgramCase
+    """Cut and tool; the pitch of the cut does not count."""
     samples: ProgramSamples
     """Draws of the cut with equal pitch."""
     equal_limits: Floats
@@ -132,7 +130,7 @@ class PitchSearch:
 
     def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
         """The pattern of each kind with the highest low end of its limit, as far as few draws tell before the judge."""
-        kinds = itertools.groupby(pitch_patterns(self.table.teeth, half_wave), key=lambda pattern: pattern.name)
+        kinds = itertools.groupby(pitch_patterns(self.case.table.teeth, half_wave), key=lambda pattern: pattern.name)
         return [self._find_best(list(patterns)) for _, patterns in kinds]
 
     def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
@@ -161,25 +159,20 @@ class PitchSearch:
         speeds = few.rows.speed_rpm[:, np.newaxis]
         mean = min(float(np.min(ZeroOrderBatch.of(few.rows.with_cut(cut)).limits(speeds)[0])) for cut in few.cuts)
         return find_deepest_stable(
-            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.table.depth_mm / 1e3)
+            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.case.table.depth_mm / 1e3)
         )
 
     def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
         """Pitches by the judge, and the limit of each draw (m), the middle first."""
-        table = _with_pitch(self.table, pattern)
-        result = run_monte_carlo(table, self.assembly, self.machine, self.at_speed)
+        case = self.case.with_changes(pitch_deg=pattern.pitch_deg)
+        result = run_monte_carlo(case)
         band = result.median.limit, result.low, result.high
-        word, limits = classify_stability(table, result, self.assembly), _pitch_limits(result.samples, table)
+        word, limits = classify_stability(case, result), _pitch_limits(result.samples, case.depth)
         return _build_evaluation(pattern, word, band, limits, self.equal_limits), limits
 
 
-def _with_pitch(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
-    return msgspec.structs.replace(table, pitch_deg=pattern.pitch_deg)
-
-
-def _pitch_limits(samples: ProgramSamples, table: ProgramTable) -> Floats:
+def _pitch_limits(samples: ProgramSamples, depth: float) -> Floats:
     """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
-    depth = table.depth_mm / 1e3
     limits = refine_sample_limits(samples, find_sample_limits(samples, depth))
     limits[0] = samples.limits[0]
     return np.minimum(limits, MAX_PROGRAM_DEPTH_RATIO * depth)

@@ -11,9 +11,10 @@ import numpy as np
 from acquisition import Remark
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
-from lobewatch.verdicts.program_samples import FEED_ANGLE_STEP, N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.uncertainty_causes import UNCERTAINTY_CAUSES, UNTAPPED
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -95,15 +96,16 @@ MIN_CROSS_LIMIT_RATIO = 1.04
 """Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
 
 
-def assumption_remarks(table: ProgramTable, machine: Machine, result: MonteCarloResult) -> Iterator[Remark]:
+def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[Remark]:
     """Remarks on what is assumed because the program does not say it."""
+    table = case.table
     if (
         table.immersion < NARROW_CUT_IMMERSION
         and table.corner_radius_mm is None
         and not isinstance(table.radial_depth_mm, tuple)
     ):
-        yield _corner_remark(table, machine, result)
-    if machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
+        yield _corner_remark(case, result)
+    if case.machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
         yield Remark(
             "helix-not-written",
             table.name,
@@ -117,14 +119,15 @@ def assumption_remarks(table: ProgramTable, machine: Machine, result: MonteCarlo
             table.name,
             "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
             f"its limit by up to {100 * (result.axes_ratio - 1):.0f} %",
-            "tap --direction xy: hit in x, sensor in y",
+            "tap TapTest.direction xy: hit in x, sensor in y",
         )
 
 
-def _corner_remark(table: ProgramTable, machine: Machine, result: MonteCarloResult) -> Remark:
+def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
+    table = case.table
     radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
     inside, radial = table.corner_immersion(radius), table.radial_mm[1]
-    limit = _limit_at_immersion(inside, table, machine, result.samples)
+    limit = _limit_at_immersion(inside, case, result.samples)
     share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
     return Remark(
         "one-engagement",
@@ -136,11 +139,11 @@ def _corner_remark(table: ProgramTable, machine: Machine, result: MonteCarloResu
     )
 
 
-def _limit_at_immersion(immersion: float, table: ProgramTable, machine: Machine, samples: ProgramSamples) -> float:
+def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSamples) -> float:
     """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
-    cut, median = replace(machine.build_cut(table), immersion=immersion), samples.rows[np.array([0])]
+    cut, median = replace(case.program.cut, immersion=immersion), samples.rows[np.array([0])]
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
-    speed = np.array([table.speed_rpm])
+    speed = np.array([case.table.speed_rpm])
     return min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
 
 
@@ -154,8 +157,8 @@ def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
     Where none of them chatters a direction that was not tapped is all that is left open.
     """
     samples, uncertainty = result.samples, result.samples.uncertainty
-    if "untapped" in uncertainty.modes or not np.any(result.chatters):
-        return "untapped"
+    if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
+        return UNTAPPED.name
     places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
     for cause in uncertainty.causes:
@@ -164,40 +167,19 @@ def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
     return max(shares, key=lambda cause: shares[cause])
 
 
-def uncertainty_advice(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
-    """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else.
-
-    cuts: number of test cuts that have taught of it.
-    """
-    text, cure = {
-        "coefficients": (
-            f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
-            "measure them" if table.material else "measure them, or name the material",
-        ),
-        "speed": ("the spindle speed decides", "run it in the middle of a window of speeds"),
-        "clamping": (
-            "the scatter from tap test to tap test decides",
-            "tap again: from 8 tests on the scatter of this very tool counts",
-        ),
-        "tap": ("the error of the tap test decides", "tap again with more hits"),
-        "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
-        "wear": (
-            f"wear decides: chatters above Kt {tangential / 1e6:.0f} N/mm2",
-            'run it with new edges and write wear = "new"',
-        ),
-        "workpiece": (
-            "the wall that is cut is thin: it gives way, and its modes are not known",
-            "support it and take thin = true out, or find the depth by test cuts",
-        ),
-        "cuts": (
-            f"the spindle at speed decides, as {cuts} test cuts have left it open",
-            f"make the next test cut: lobewatch suggest names it for {table.name!r}",
-        ),
-        "cross": ("the axes of the modes decide, which taps in x and in y leave open", "tap --direction xy"),
-        "question": (
-            f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
-            "answer the question, or tap again",
-        ),
-        "untapped": assembly.missing_direction,
-    }[cause]
-    return Remark("doubt-decides", table.name, text, cure)
+def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) -> Remark:
+    """Name the decisive cause of uncertainty, and what would reduce it."""
+    table, assembly, record = case.table, case.assembly, UNCERTAINTY_CAUSES[cause]
+    missing, missing_remedy = assembly.missing_direction
+    tangential = result.median.limit / case.depth * case.program.cut.tangential
+    values = {
+        "kt": f"{tangential / 1e6:.0f}",
+        "tool": repr(table.tool),
+        "program": repr(table.name),
+        "n_cuts": case.at_speed.n_cuts,
+        "coefficients_remedy": "measure them" if table.material else "measure them, or name the material",
+        "questions": ", ".join(dict.fromkeys(question.code for question in assembly.questions)),
+        "missing": missing,
+        "missing_remedy": missing_remedy,
+    }
+    return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

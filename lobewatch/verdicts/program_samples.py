@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
@@ -12,7 +10,6 @@ import numpy as np
 
 from lobes import (
     Cut,
-    Direction,
     MillingRows,
     Program,
     ProgramLimit,
@@ -26,54 +23,9 @@ from lobes import (
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engagement
 from lobewatch.arrays import Flags, Floats, Indices
-from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.uncertainty import Uncertainty
-
-MAX_OBLIQUE_FEED_IMMERSION = 0.5
-"""Radial depth over diameter below which a cut in both directions is worst at angles between x and y, always ..."""
-EQUAL_DIRECTION_TOLERANCES = (0.02, 0.1, 0.1)
-"""... and from which on it is only where f_n, zeta or K in x and y differ by more than this, relatively, or modes lie
-askew. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
-MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
-"""Directions that a cut may be milled in; a slot is both at once."""
-FEED_ANGLE_STEP = math.pi / 12
-"""Step of the angles between x and y (rad)."""
-
-
-def cutting_conditions_of(
-    table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
-) -> tuple[Cut, ...]:
-    """Cuts that a program makes on its way, in no order; either: milled up and down, whatever the table says.
-
-    In a corner the feed turns, whatever axis it follows on the straight.
-    """
-    differ = not are_directions_equal(spindle.x, spindle.y) or spindle.principal_directions.sign_patterns[0] is not None
-    return tuple(
-        replace(cut, feed_angle=angle, direction=direction)
-        for cut in machine.engaged_cuts(table)
-        for direction in (MILLING_DIRECTIONS if either and cut.immersion < 1 else (cut.direction,))
-        for angle in _feed_angles_of(table, cut.immersion, differ)
-    )
-
-
-def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:
-    """Directions of feed as angles from x (rad): half a turn apart they are alike."""
-    if table.feed != "both" and table.corner_radius_mm is None:
-        return (FEED_ANGLES[table.feed],)
-    if immersion < MAX_OBLIQUE_FEED_IMMERSION or differ:
-        return tuple(i * FEED_ANGLE_STEP for i in range(round(math.pi / FEED_ANGLE_STEP)))
-    return tuple(FEED_ANGLES.values())
-
-
-def are_directions_equal(x: TipModes, y: TipModes) -> bool:
-    """Whether the modes of both directions are the same, as those of a round spindle or a direction taken for both."""
-    if x is None or y is None or len(x) != len(y):
-        return False
-    numbers = np.array([[(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in side] for side in (x, y)])
-    return bool(np.all(np.abs(numbers[1] / numbers[0] - 1) <= EQUAL_DIRECTION_TOLERANCES))
-
 
 N_PROGRAM_SAMPLES = 300
 """Number of draws: as many stable ones say, with 95 % confidence, that no more than 1 % of the doubt chatters."""
@@ -198,11 +150,6 @@ class ProgramSamples:
         return replace(self, rows=changed)
 
 
-def build_program(table: ProgramTable, machine: Machine) -> Program:
-    """A program in SI units."""
-    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-
-
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
     """The program without any doubt, the feed along x; axes: of its modes (n, 2), None: the first that may be."""
     vectors = assembly.principal_directions.sign_patterns[0] if axes is None else axes
@@ -222,52 +169,47 @@ class WorstLimit(NamedTuple):
     """The highest limit over the lowest: over the open signs, and with modes along x and y; 1 where nothing is open."""
 
 
-def find_worst_limit(program: Program, assembly: Assembly, cuts: Sequence[Cut]) -> WorstLimit:
-    """The lowest limit of the cuts that a program makes on its way, over what is open of the signs of the axes."""
-    axes = assembly.principal_directions
+def find_worst_limit(case: ProgramCase) -> WorstLimit:
+    """Find the lowest limit over all cuts of a program and all open signs of the principal directions."""
+    spindle, axes = case.spindle, case.spindle.principal_directions
     patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
-    limits = [program_limit(program, assembly.x, assembly.y, cuts, vectors) for vectors in patterns]
+    limits = [program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
     worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    deepest = MAX_PROGRAM_DEPTH_RATIO * program.depth
+    deepest = MAX_PROGRAM_DEPTH_RATIO * case.depth
     depths = [min(limit.limit, deepest) for limit in limits]
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
 
 
-def find_likely_axes(
-    program: Program, assembly: Assembly, cuts: Sequence[Cut], uncertainty: Uncertainty
-) -> Floats | None:
-    """Axes that are likely to have the lowest limit: those in which the program grows most at its depth."""
-    patterns = assembly.principal_directions.sign_patterns
+def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:
+    """Find the principal directions in which a program grows most at its depth."""
+    patterns = case.spindle.principal_directions.sign_patterns
     if len(patterns) == 1:
         return patterns[0]
-    rows = reduce(join_rows, (build_median_row(program, assembly, axes) for axes in patterns))
-    middles = ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, uncertainty)
-    return patterns[int(np.argmax(middles.growth(program.depth)))]
+    rows = reduce(join_rows, (build_median_row(program, case.spindle, axes) for axes in patterns))
+    return patterns[int(np.argmax(_unlimited_samples(case, rows).growth(program.depth)))]
 
 
-def draw_likely_samples(
-    program: Program, cuts: Sequence[Cut], assembly: Assembly, uncertainty: Uncertainty
-) -> ProgramSamples:
-    """The draws of a program whose limit nobody knows yet, with `find_likely_axes`, its cuts in no order."""
-    median = build_median_row(program, assembly, find_likely_axes(program, assembly, cuts, uncertainty))
-    rows = join_rows(median, uncertainty.sample(median, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, uncertainty)
+def _unlimited_samples(case: ProgramCase, rows: MillingRows) -> ProgramSamples:
+    """Samples of a program with unknown limits."""
+    return ProgramSamples(rows, case.cuts, np.full(len(case.cuts), np.inf), 1, case.uncertainty)
 
 
-def draw_samples(
-    program: Program,
-    limit: ProgramLimit,
-    cuts: Sequence[Cut],
-    assembly: Assembly,
-    uncertainty: Uncertainty,
-    axes: Floats | None = None,
-) -> ProgramSamples:
-    """The draws of a program; limit: that in the middle of the doubt, with modes along axes (n, 2)."""
-    median, limits = build_median_row(program, assembly, axes), np.array(limit.limits)
+def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
+    """Draw the samples of a program with unknown limits, in the principal directions that are likely the worst.
+
+    program: the case at another speed and depth, in SI units.
+    """
+    median = build_median_row(program, case.spindle, _find_likely_axes(case, program))
+    return _unlimited_samples(case, join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
+
+
+def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = None) -> ProgramSamples:
+    """Draw the samples of a program from its median limit, with modes along axes (n, 2)."""
+    median, limits = build_median_row(case.program, case.spindle, axes), np.array(limit.limits)
     order = np.argsort(limits)
-    finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * program.depth)[0]), 1)
-    rows = join_rows(median, uncertainty.sample(median, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts[place] for place in order), limits[order], finer, uncertainty)
+    finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)
+    rows = join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES))
+    return ProgramSamples(rows, tuple(case.cuts[place] for place in order), limits[order], finer, case.uncertainty)
 
 
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:

@@ -17,6 +17,7 @@ from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_remarks import missing_tool_remarks
 from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
@@ -50,7 +51,7 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if verdict.is_stable else ()
     if verdict.stability is Stability.STABLE or not is_compliance_known(verdict.program, tool):
         return Advice(tolerable_drop=decay, remarks=remarks)
-    search, program = SettingSearch(verdict.program, tool, machine, verdict.at_speed), verdict.program
+    search, program = SettingSearch(ProgramCase(verdict.program, tool, machine, verdict.at_speed)), verdict.program
     remarks = (*remarks, *missing_tool_remarks(program, search.cut_range.limits))
     elsewhere = search.nearest_window(program.depth_mm, program.speed_rpm)
     if elsewhere is not None:
@@ -69,7 +70,7 @@ def find_stable_pockets(
     if not is_compliance_known(table, assembly):
         return []
     program = build_cut_program(at_speed.apply_coefficients(table), assembly.tool, machine)
-    return SettingSearch(program, assembly, machine, at_speed).pockets(count)
+    return SettingSearch(ProgramCase(program, assembly, machine, at_speed)).pockets(count)
 
 
 def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
@@ -159,7 +160,7 @@ def recommend(
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
     if too_fast := _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=too_fast[0], remedies=too_fast[1:])
-    search = SettingSearch(at_speed.apply_coefficients(table), tool, machine, at_speed, either)
+    search = SettingSearch(ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed, either))
     if is_set and present_rpm is not None:
         setting = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     else:
@@ -197,20 +198,20 @@ def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
     """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
-    result = search.results[setting.speed_rpm, setting.depth_mm]
+    case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
     at = {
         "speed_rpm": setting.speed_rpm,
         "depth_mm": setting.depth_mm,
         "direction": result.samples.cuts[0].direction,
     }
     program = msgspec.structs.replace(table, **at)
-    verdict = evaluate_program(program, search.assembly, search.machine, search.at_speed, result)
+    verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
-        return Recommendation(table, search.any_direction, reason=reason, alternatives=others)
+        return Recommendation(table, search.case.any_direction, reason=reason, alternatives=others)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
     return Recommendation(
-        program, search.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
+        program, search.case.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
     )
 
 
@@ -249,7 +250,7 @@ def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, 
     """What would make it safe: what settles the doubt first, where that alone stands in the way."""
     likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])
-    probe = msgspec.structs.replace(search.table, speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)
-    verdict = evaluate_program(probe, search.assembly, search.machine, search.at_speed)
+    probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)
+    verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))
+    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))

@@ -21,10 +21,14 @@ from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, sweep_extremes
-from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR as ROOM
-from lobewatch.verdicts.uncertainty import Uncertainty
+from lobewatch.verdicts.setting_robustness import (
+    MIN_DEPTH_MARGIN,
+    ROBUST_DEPTH_FACTOR,
+    ROBUST_SPEED_FACTOR,
+    sweep_extremes,
+)
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
@@ -85,26 +89,20 @@ class CriticalSamples:
 
 
 def select_critical_samples(
-    program: Program,
-    cuts: Sequence[Cut],
-    spindle: Assembly,
-    uncertainty: Uncertainty,
-    drop: float,
-    stiffness_at: StiffnessAt,
-    spare: float,
+    case: ProgramCase, program: Program, drop: float, stiffness_at: StiffnessAt
 ) -> CriticalSamples:
-    """Those of a program (SI), with all cuts on its way, at its speed; its depth is what is likely.
+    """Select the samples that are likely the first to chatter, now or after a frequency drop.
 
-    spare: depth to spare in the middle of the doubt, relative.
+    program: the case at one speed and the depth that is likely safe.
     """
-    samples_all = draw_likely_samples(program, cuts, spindle, uncertainty)
-    order = np.argsort(-samples_all.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
-    samples_all = replace(samples_all, cuts=tuple(cuts[place] for place in order), limits=samples_all.limits[order])
-    aged = sweep_extremes(samples_all, drop, stiffness_at)
+    likely = draw_likely_samples(case, program)
+    order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
+    aged = sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
-    median = samples_all.rows[np.zeros(1, dtype=np.intp)]
-    push = (1 + spare) / ROBUST_DEPTH_FACTOR
+    median = likely.rows[np.zeros(1, dtype=np.intp)]
+    push = (1 + MIN_DEPTH_MARGIN) / ROBUST_DEPTH_FACTOR
     median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     first = np.concatenate(
         (np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES], [grown.size])
@@ -187,22 +185,21 @@ class LikelyDepths:
         return between.size < 2 or bool(np.min(between) >= POCKET_VALLEY_SHARE * min(between[0], between[-1]))
 
 
-def estimate_likely_depths(
-    reach: CutRange, cuts: Sequence[Cut], spindle: Assembly, uncertainty: Uncertainty, drop: float, spare: float
-) -> LikelyDepths:
+def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> LikelyDepths:
     """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
 
     cuts: all that the program makes on its way; spare: depth to spare in the middle of the doubt at least.
     """
+    cuts, spindle, uncertainty = case.cuts, case.spindle, case.uncertainty
     number = max(int(math.log(reach.high_rpm / reach.low_rpm) / LIKELY_SPEED_STEP), 1)
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
     by_cut = (
         np.array([lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts])
         * 1e3
     )
-    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + spare)
+    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    beside = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROOM)
+    beside = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
     steps, ahead = math.ceil((beside + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:

@@ -42,6 +42,8 @@ ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
 """Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
 ROBUST_DEPTH_FACTOR = 1.05
 """Factor of the depth up to which it must be ..."""
+MIN_DEPTH_MARGIN = 0.20
+"""Depth that a recommended setting has to spare in the middle of the doubt."""
 MIN_ROBUST_DROP = 0.01
 """... and fall of the frequency that it must stand at least."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)

@@ -13,17 +13,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import msgspec
 import numpy as np
 
-from lobes import Cut, Program
+from lobes import Program
 from lobewatch.arrays import Floats
-from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
 from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
 from lobewatch.verdicts.safe_depth_estimates import (
     CriticalSamples,
     LikelyDepths,
@@ -32,6 +30,7 @@ from lobewatch.verdicts.safe_depth_estimates import (
     select_critical_samples,
 )
 from lobewatch.verdicts.setting_robustness import (
+    MIN_DEPTH_MARGIN,
     ROBUST_DEPTH_FACTOR,
     ROBUST_SPEED_FACTOR,
     Setting,
@@ -40,11 +39,7 @@ from lobewatch.verdicts.setting_robustness import (
     find_speed_window,
     sweep_neighborhood,
 )
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty import Uncertainty, uncertainty_of
 
-MIN_DEPTH_MARGIN = 0.20
-"""Depth that a recommended setting has to spare in the middle of the doubt."""
 MAX_DEPTH_MARGIN = 20.0
 """Depth to spare that stands for more too, and for no limit: no deeper is looked."""
 MAX_SEARCHED_SPEEDS = 12
@@ -81,16 +76,8 @@ SharesBySpeed = dict[float, float]
 class SettingSearch:
     """Looking for settings of one cut with a tool that is surely known."""
 
-    table: ProgramTable
-    """Cut, with the coefficients that were learnt; its own speed and depth do not count."""
-    assembly: Assembly
-    """Tool as tapped."""
-    machine: Machine
-    """Machine, with its speeds, its drive and its tap interval."""
-    at_speed: SpindleAtSpeed = NO_TEST_CUTS
-    """Spindle as test cuts have taught it."""
-    any_direction: bool = False
-    """Direction left open: milled up or down, the worse counts."""
+    case: ProgramCase
+    """Program and tool; the speed and depth of the program do not count."""
     critical: dict[float, CriticalSamples] = field(default_factory=dict)
     """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
@@ -99,41 +86,24 @@ class SettingSearch:
     """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
-    def spindle(self) -> Assembly:
-        """The tool in the middle of what was learnt."""
-        return self.at_speed.scale_modes(self.assembly)
-
-    @cached_property
     def cut_range(self) -> CutRange:
         """Speeds and depths that may be recommended."""
-        return CutRange.of(self.machine, self.table)
-
-    @cached_property
-    def cuts(self) -> tuple[Cut, ...]:
-        """Cuts that it makes on its way."""
-        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
+        return CutRange.of(self.case.machine, self.case.table)
 
     @cached_property
     def needed_drop(self) -> float:
         """Fall of the frequency that a setting must stand, relative."""
-        return find_needed_drop(self.assembly, self.machine)
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """What is not known."""
-        return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
+        return find_needed_drop(self.case.assembly, self.case.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
         """Stiffness over that of now by the fall of the frequency."""
-        return model_softening(self.assembly)[0]
+        return model_softening(self.case.assembly)[0]
 
     @cached_property
     def likely_depths(self) -> LikelyDepths:
         """Where to look."""
-        return estimate_likely_depths(
-            self.cut_range, self.cuts, self.spindle, self.uncertainty, self.needed_drop, MIN_DEPTH_MARGIN
-        )
+        return estimate_likely_depths(self.case, self.cut_range, self.needed_drop)
 
     @cached_property
     def best(self) -> Setting | None:
@@ -269,9 +239,8 @@ class SettingSearch:
         if speed in self.critical:
             return self.critical[speed]
         likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
-        program = Program(self.machine.build_cut(self.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
-        spindle = self.spindle, self.uncertainty, self.needed_drop, self.stiffness_at
-        return select_critical_samples(program, self.cuts, *spindle, MIN_DEPTH_MARGIN)
+        program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
+        return select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
         """The deepest setting up to a depth (mm)."""
@@ -286,9 +255,9 @@ class SettingSearch:
 
     def verify(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
-        table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
+        depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
-        program = sample_program(table, self.assembly, self.machine, self.at_speed, self.any_direction)
+        program = sample_program(self.case.at(speed, depth_mm))
         limit = program.median.limit
         if limit < depth * (1 + MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)

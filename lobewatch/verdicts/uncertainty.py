@@ -18,6 +18,18 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, Uncerta
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import PrincipalDirections
 from lobewatch.tool.tap_series import Scatter
+from lobewatch.verdicts.uncertainty_causes import (
+    CLAMPING,
+    COEFFICIENTS,
+    CROSS,
+    PREDICTION,
+    SPEED,
+    TAP_TEST,
+    TEST_CUTS,
+    UNCERTAINTY_CAUSES,
+    UNTAPPED,
+    WEAR,
+)
 from modal import Mode
 
 DEFAULT_TAP_SCATTER = Scatter(0.003, 0.10, 0.03)
@@ -28,10 +40,6 @@ MAX_MODE_PHASE = np.radians(89)
 """... and largest phase (rad)."""
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
-CROSS_CAUSE = "cross"
-"""Cause of the doubt of the axes of modes: what direct taps leave open."""
-TEST_CUT_CAUSE = "cuts"
-"""Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
 
 class FactorRange(NamedTuple):
@@ -63,9 +71,9 @@ class LearnedSamples:
     def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
         """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
         take = np.arange(count) % len(self.tangential)
-        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUT_CAUSE)
+        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUTS.name)
         force, direction = (
-            1 + (factor[take] - 1) * (without != "coefficients") for factor in (self.tangential, self.ratio)
+            1 + (factor[take] - 1) * (without != COEFFICIENTS.name) for factor in (self.tangential, self.ratio)
         )
         return replace(
             rows,
@@ -102,11 +110,16 @@ class Uncertainty:
     learned: LearnedSamples | None = None
     """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
+    def __post_init__(self) -> None:
+        """Refuse causes without a record in `UNCERTAINTY_CAUSES`."""
+        if unknown := self.modes.keys() - UNCERTAINTY_CAUSES.keys():
+            raise ValueError(f"unknown causes of uncertainty: {', '.join(sorted(unknown))}")
+
     @property
     def causes(self) -> tuple[str, ...]:
         """Names of all that it comes from."""
-        across = [CROSS_CAUSE] if self.axes is not None and self.axes.are_uncertain else []
-        return (*self.modes, *across, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
+        across = [CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
+        return (*self.modes, *across, SPEED.name, COEFFICIENTS.name, *([WEAR.name] if self.wear > 1 else []))
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
@@ -114,7 +127,7 @@ class Uncertainty:
         without: a cause that is taken as known.
         """
         rows = self._sample_new_edges(median, count, seed, without)
-        if self.wear == 1 or without == "wear":
+        if self.wear == 1 or without == WEAR.name:
             return rows
         worn = np.empty(count)
         worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
@@ -123,7 +136,7 @@ class Uncertainty:
     def _sample_new_edges(self, median: MillingRows, count: int, seed: int, without: str) -> MillingRows:
         if self.learned is not None:
             rows = self.learned.build_rows(median, count, without)
-            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
+            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != SPEED.name)
             return self._with_sampled_axes(
                 replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
             )
@@ -136,11 +149,11 @@ class Uncertainty:
             if cause != without:
                 factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
                 turned += moved[..., 3]
-        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != "speed")
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != SPEED.name)
         tangential, ratio = (
             span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._coefficient_ranges
         )
-        if without == "coefficients":
+        if without == COEFFICIENTS.name:
             tangential, ratio = np.ones((2, count))
         rows = median[np.zeros(count, dtype=np.intp)]
         samples_all = replace(
@@ -157,13 +170,13 @@ class Uncertainty:
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
         """With axes drawn from what is open of them."""
-        if self.axes is None or not self.axes.are_uncertain or without == CROSS_CAUSE:
+        if self.axes is None or not self.axes.are_uncertain or without == CROSS.name:
             return rows
         return replace(rows, vector=self.axes.sample(len(rows), seed))
 
     def _correlated(self, cause: str, uniform: Floats) -> Floats:
         """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
-        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == "tap" else uniform
+        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == TAP_TEST.name else uniform
 
     @property
     def _coefficient_ranges(self) -> tuple[FactorRange, FactorRange]:
@@ -198,15 +211,15 @@ def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, 
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        widths = {"prediction": np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
+        widths = {PREDICTION.name: np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = [np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides]
         clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
-        widths = {"tap": np.array([_tap_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
+        widths = {TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)]), CLAMPING.name: np.vstack(clamping)}
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
-        widths["untapped"] = absent
+        widths[UNTAPPED.name] = absent
         absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
     return widths
 

@@ -16,6 +16,7 @@ from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_remarks import (
     assumption_remarks,
     find_decisive_cause,
@@ -25,6 +26,7 @@ from lobewatch.verdicts.program_remarks import (
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.uncertainty_causes import QUESTION, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -161,30 +163,34 @@ def evaluate_program(
     on_model = tool.predicted or machine.tap.position_mm > 0
     if asked := find_program_questions(machine, table, on_model):
         return _unknown_verdict(table, tuple(doubted.remark for doubted in asked), tool)
-    table = at_speed.apply_coefficients(table)
-    result, depth = result or run_monte_carlo(table, tool, machine, at_speed), table.depth_mm / 1e3
-    median, word, cause = result.median, classify_stability(table, result, tool), ""
-    remarks = [*_verdict_remarks(table, tool, at_speed, machine), *assumption_remarks(table, machine, result)]
-    if word is Stability.DOUBTFUL:
-        cause = _decisive_cause(table, result, tool)
-        tangential = median.limit / depth * machine.build_cut(table).tangential
-        remarks.append(uncertainty_advice(cause, table, tangential, tool, at_speed.n_cuts))
+    case = ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed)
+    return _build_verdict(case, result or run_monte_carlo(case))
+
+
+def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
+    """Build the verdict on a program from its Monte Carlo result."""
+    median, stability, cause = result.median, classify_stability(case, result), ""
+    remarks = [*_verdict_remarks(case), *assumption_remarks(case, result)]
+    if stability is Stability.DOUBTFUL:
+        cause = _find_decisive_cause(case, result)
+        remarks.append(uncertainty_advice(cause, case, result))
+    drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
     return Verdict(
-        program=table,
-        stability=word,
-        assembly=tool,
-        at_speed=at_speed,
+        program=case.table,
+        stability=stability,
+        assembly=case.assembly,
+        at_speed=case.at_speed,
         limit=median.limit,
         limit_low=min(result.low, median.limit),
         limit_high=max(result.high, median.limit),
-        chatter_risk=_chatter_risk(result, depth, at_speed),
+        chatter_risk=_estimate_chatter_risk(case, result),
         decisive_cause=cause,
         chatter_frequency=median.chatter_frequency,
         kind=median.kind,
         feed_angle=median.feed_angle,
         method=median.method,
         detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
-        drive_limit=float(drive_depth_limit(machine, table, np.array([table.speed_rpm]))[0]),
+        drive_limit=float(drive_limit[0]),
         samples=result.samples,
         remarks=tuple(remarks),
     )
@@ -202,13 +208,12 @@ def _unknown_verdict(
     return Verdict(table, Stability.UNKNOWN, assembly, remarks=(remark, *further))
 
 
-def classify_stability(table: ProgramTable, result: MonteCarloResult, assembly: Assembly) -> Stability:
-    """The word on a program with a tool that was judged."""
+def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability:
+    """Classify the stability of a program from its Monte Carlo result."""
     if not result.median.stable:
         return Stability.NOT_STABLE
-    return (
-        Stability.STABLE if result.is_stable_throughout and is_compliance_known(table, assembly) else Stability.DOUBTFUL
-    )
+    is_stable = result.is_stable_throughout and is_compliance_known(case.table, case.assembly)
+    return Stability.STABLE if is_stable else Stability.DOUBTFUL
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
@@ -229,28 +234,27 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
     return None
 
 
-def _decisive_cause(table: ProgramTable, result: MonteCarloResult, assembly: Assembly) -> str:
-    """Cause of the doubt that decides."""
-    if assembly.questions:
-        return "question"
-    if table.thin and assembly.is_complete and not np.any(result.chatters):
-        return "workpiece"
-    return find_decisive_cause(result, table.depth_mm / 1e3)
+def _find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
+    """Return the name of the cause of uncertainty that decides a doubtful verdict."""
+    if case.assembly.questions:
+        return QUESTION.name
+    if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
+        return WORKPIECE.name
+    return find_decisive_cause(result, case.depth)
 
 
-def _chatter_risk(result: MonteCarloResult, depth: float, at_speed: SpindleAtSpeed) -> float:
-    """Chance of chatter at a depth (m) with the spindle turning: as learnt, or under plausible differences."""
-    if at_speed.n_cuts:
+def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:
+    """Estimate the chatter risk with the spindle rotating: as learned, or with plausible differences."""
+    if case.at_speed.n_cuts:
         return float(np.mean(result.chatters))
-    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(depth)[1:] >= 0))
+    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(case.depth)[1:] >= 0))
 
 
-def _verdict_remarks(
-    table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, machine: Machine
-) -> Iterator[Remark]:
-    yield from (remark for remark in assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
-    yield from at_speed.remarks
-    yield from assembly.questions
+def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
+    machine, table = case.machine, case.table
+    yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
+    yield from case.at_speed.remarks
+    yield from case.assembly.questions
     yield from tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -24,7 +24,8 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import find_by_name
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency
-from lobewatch.verdicts.program_samples import build_median_row, build_program
+from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import uncertainty_of
 
 

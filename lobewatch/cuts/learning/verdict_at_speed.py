@@ -19,9 +19,11 @@ from lobewatch.machine import CutTable, Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row, build_program
+from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty import TEST_CUT_CAUSE, FactorRange, LearnedSamples, Uncertainty
+from lobewatch.verdicts.uncertainty import FactorRange, LearnedSamples, Uncertainty
+from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program
 
 INTERVAL_QUANTILES = (0.025, 0.975)
@@ -77,7 +79,7 @@ def _build_spindle(
         n_cuts=len(learning.accepted_cuts),
         remarks=remarks,
         uncertainty=Uncertainty(
-            modes={TEST_CUT_CAUSE: _half_widths(parts, phases)},
+            modes={TEST_CUTS.name: _half_widths(parts, phases)},
             tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
             speed=machine.doubt.speed_percent / 100,
             tangential=_factor_range(force),

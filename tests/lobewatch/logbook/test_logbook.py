@@ -39,7 +39,7 @@ from lobewatch.show.report.report import render_report
 from lobewatch.tap.session import build_outcome
 from lobewatch.tool.lobe_chart import DynamicsSource, LobeMethod
 from lobewatch.verdicts import Advice, Stability, Verdict
-from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.program_case import build_program
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode, synthesize_frf
 

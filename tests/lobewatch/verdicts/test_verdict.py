@@ -12,7 +12,7 @@ from dsm import calibrate
 from lobes import Program, program_limit
 from lobewatch.verdicts import Stability
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
-from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.program_case import build_program
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""

@@ -9,7 +9,7 @@ import pytest
 
 from lobes import program_limit
 from lobewatch.verdicts import Stability
-from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import build_program, cutting_conditions_of
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets
 from lobewatch.verdicts.verdict import evaluate_program
 

@@ -119,7 +119,7 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
             table.name,
             "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
             f"its limit by up to {100 * (result.axes_ratio - 1):.0f} %",
-            "tap TapTest.direction xy: hit in x, sensor in y",
+            "tap Circumstances.direction xy: hit in x, sensor in y",
         )
 
 

@@ -154,7 +154,7 @@ def recommend(
     present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
     """
     if isinstance(tool, DataError):
-        tap = f"tap it: lobewatch tap MACHINE --tool {shlex.quote(table.tool)}"
+        tap = f"tap it: TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
     if gap := _find_gap(table, tool, machine):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])

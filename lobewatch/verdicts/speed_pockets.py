@@ -102,4 +102,4 @@ def speed_pocket_remarks(table: CutTable, name: str, assembly: Assembly, machine
     if not best:
         return ()
     text = f"pockets by frequency and damping: {format_pockets(best)}; how deep, test cuts tell"
-    return (Remark(SPEEDS_ONLY_CODE, name, text, "lobewatch suggest leads to a depth in five test cuts"),)
+    return (Remark(SPEEDS_ONLY_CODE, name, text, "pocket_depth.find_pocket_depths leads to a depth in five test cuts"),)

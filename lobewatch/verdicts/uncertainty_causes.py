@@ -39,7 +39,7 @@ TEST_CUTS = UncertaintyCause(
     label="left open by test cuts",
 )
 CROSS = UncertaintyCause(
-    "cross", "the axes of the modes decide, which taps in x and in y leave open", "tap TapTest.direction xy"
+    "cross", "the axes of the modes decide, which taps in x and in y leave open", "tap Circumstances.direction xy"
 )
 SPEED = UncertaintyCause("speed", "the spindle speed decides", "run it in the middle of a window of speeds")
 COEFFICIENTS = UncertaintyCause(

@@ -11,6 +11,18 @@ from collections.abc import Mapping
 
 OPTION_NAMES: Mapping[str, str] = {
     "Description.unit": "--unit",
+    # lobewatch.verdicts, cuts, monitoring
+    "Circumstances.direction": "--direction",
+    "Circumstances.tool": "--tool",
+    "Conditions.reclamped": "--reclamped",
+    "Logbook.verdicts": "lobewatch check",
+    "TapSession.run": "lobewatch tap",
+    "add_event.new_baseline": "--new-baseline",
+    "folder_updates.add_event": "lobewatch event",
+    "folder_updates.exclude_entry": "lobewatch exclude",
+    "operator_entries.acknowledge_alarms": "lobewatch ack",
+    "pocket_depth.find_pocket_depths": "lobewatch suggest",
+    "program_learning.find_next_cut": "lobewatch suggest",
 }
 """Option or command for each field or function that a message names."""
 

@@ -85,8 +85,7 @@ class ChangeMonitor:
 
     @property
     def scores(self) -> Floats:
-        """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape
-        (n,); NaN before the 9th, before the 5th where something is known of the scatter beforehand."""
+        """Score of each point, a normal quantile, shape (n,); NaN before the first scored point."""
         return self.change.score
 
     @cached_property
@@ -101,17 +100,17 @@ class ChangeMonitor:
         return next(self.alarms_from(0), None)
 
     def alarms_from(self, first: int) -> Iterator[int]:
-        """Points from one on that are sure of a change as the ones before them were."""
+        """Return the points from one on that are sure of a change, as the ones before them are."""
         begin = max(first, 1)
         return (begin + int(i) for i in np.flatnonzero(self.is_sure[begin:] & self.is_sure[begin - 1 : -1]))
 
     def change_at(self, alarm: int) -> SeriesChange:
-        """The change that a point is sure of: kind and beginning as it sees them, size by all points."""
+        """Return the change that a point is sure of: kind and beginning as of then, size by all points."""
         return _fit_change(self.level_model, self.change, alarm, self.sign)
 
 
 def find_newest_change(y: Floats) -> SeriesChange | None:
-    """The fall, or with a negative size the rise, that the last two points (n,) are both sure of; None without one."""
+    """Find the drop, or with a negative size the rise, that the last two points (n,) are sure of, or None."""
     if y.size <= MIN_MONITORED_POINTS:
         return None
     base = build_level_model(Readings(y))
@@ -123,12 +122,12 @@ def find_newest_change(y: Floats) -> SeriesChange | None:
 
 
 def monitor_drops(readings: Readings) -> ChangeMonitor:
-    """Judge a series point after point: whether it falls."""
+    """Monitor a series for drops, point by point."""
     return monitor_drops_and_rises(readings)[0]
 
 
 def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMonitor]:
-    """Judge a series likewise, and its mirror image: whether it rises.
+    """Monitor a series for drops, and its mirror image for rises.
 
     What the mean of both directions did is looked at beside what the one did alone.
     """
@@ -143,7 +142,7 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
 
 
 def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
-    """The likeliest fall, and the likeliest rise, up to each point."""
+    """Find the likeliest drop and rise up to each point."""
     first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
     last = np.arange(first - 1, base.y.size)
     falls, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
@@ -161,7 +160,7 @@ def _merge_directions(
     together: LikeliestChange,
     shared: Indices,
 ) -> LikeliestChange:
-    """The surer of what a series did alone and what the mean of both directions did, where the series did that too.
+    """Merge the change of one direction with that of the mean of both, whichever is surer.
 
     shared: points of the series that the mean has. Who looks twice is told of chance twice as often.
     """
@@ -178,7 +177,7 @@ def _merge_directions(
 
 
 def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestChange, LikeliestChange]:
-    """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
+    """Find the likeliest drop and rise up to each of these consecutive points."""
     blocks = [
         _find_largest_changes(base, last[begin : begin + SCORE_BLOCK_ROWS] + 1)
         for begin in range(0, last.size, SCORE_BLOCK_ROWS)
@@ -189,7 +188,7 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
 
 
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
-    """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
+    """Find where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): drops, rises."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
     points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
     for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
@@ -204,7 +203,7 @@ def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats
 
 
 def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
-    """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
+    """Choose the likelier of a step and a slope in the first n (r,) points."""
     t = [base.t_statistic(lean, n) for lean in leans]
     scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
@@ -212,7 +211,7 @@ def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floa
 
 
 def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:
-    """The change up to one of the points, fitted to the whole series; at: index of that point."""
+    """Fit the change up to one of the points to the whole series; at: index of that point."""
     kind: ChangeKind = "step" if change.is_step[at] else "slope"
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
@@ -259,7 +258,7 @@ class Detection:
 
 
 def detect_changes(readings: Readings) -> Detection:
-    """What is to be seen of a series."""
+    """Detect all drops, and the newest rise, in a series."""
     count = readings.y.size
     scores, falls, rise = np.full(count, np.nan), list[DetectedDrop](), None
     begin = judged = 0
@@ -276,7 +275,7 @@ def detect_changes(readings: Readings) -> Detection:
 
 
 def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
-    """Falls that a watch from one point on raises an alarm for between two others."""
+    """Find the drops that a monitor triggers an alarm for between two points."""
     raised = next(watch.alarms_from(first - begin), None)
     while raised is not None and begin + raised < end:
         closed = _find_closing_point(watch, raised)
@@ -287,7 +286,7 @@ def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Itera
 
 
 def _find_closing_point(watch: ChangeMonitor, raised: int) -> int | None:
-    """Point that closes an alarm."""
+    """Find the point that closes an alarm."""
     calm = 0
     for point in range(raised + 1, watch.scores.size):
         calm = 0 if watch.is_sure[point] else calm + 1

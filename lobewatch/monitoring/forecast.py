@@ -107,14 +107,13 @@ class Forecast:
         return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
-        """Probability that the series is below a level (one, or one a date; with its standard error) at the dates,
-        shape (d,)."""
+        """Return the probability of being below a level (one, or one a date) at the dates, shape (d,)."""
         away = level - self.mean
         away /= np.hypot(self.error, error) if error else self.error
         return np.asarray(self.weight @ _student_cdf(self.freedom, away))
 
     def crossing_dates(self, level: float, error: float = 0.0) -> DateRange:
-        """Dates at which a level (with its standard error) is reached."""
+        """Return the dates at which a level (with its standard error) is reached."""
         chance = np.maximum.accumulate(self.probability(level, error))
         return DateRange(*(self._first(chance, quantile) for quantile in CROSSING_QUANTILES))
 
@@ -125,7 +124,7 @@ class Forecast:
         return float(np.interp(quantile, chance[above - 1 : above + 1], self.dates[above - 1 : above + 1]))
 
     def quantile_line(self, quantile: float) -> Floats:
-        """Level below which the series is with a probability at the dates, shape (d,)."""
+        """Return the quantile of the series at the dates, shape (d,)."""
         low, high = (
             (self.mean - FAN_STANDARD_ERRORS * self.error).min(axis=0),
             (self.mean + FAN_STANDARD_ERRORS * self.error).max(axis=0),
@@ -138,7 +137,7 @@ class Forecast:
 
 
 def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
-    """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
+    """Forecast a series y (n,) over its increasing dates (n,) to a date, at most twice its own span ahead.
 
     temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
     """
@@ -184,7 +183,7 @@ class PastFit:
 
 
 def fit_past(dates: Floats, readings: Readings) -> PastFit:
-    """Fit all shapes to a series over its dates (n,), increasing; ValueError as that of `forecast_series`."""
+    """Fit all shapes to a series over its increasing dates (n,)."""
     at, y = dates - dates[:1].sum(), readings.y
     if y.size < MIN_FORECAST_POINTS or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {MIN_FORECAST_POINTS}")
@@ -208,12 +207,12 @@ def _point_spread(families: Sequence[ShapeFits]) -> float:
 
 
 def _average_neighbors(values: Floats) -> Floats:
-    """Means of neighbours where there are many."""
+    """Average neighbors where there are many."""
     return np.array([part.mean() for part in np.array_split(values, min(values.size, MAX_FITTED_POINTS))])
 
 
 def _average_readings(readings: Readings) -> Readings:
-    """The same of the means; who held the hammer counts where each is one point."""
+    """Average readings; operators count only where each reading is one point."""
     if readings.y.size <= MAX_FITTED_POINTS:
         return readings
     temperature = None if readings.temperature is None else _average_neighbors(readings.temperature)
@@ -221,7 +220,7 @@ def _average_readings(readings: Readings) -> Readings:
 
 
 def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ...], Floats]:
-    """The families without those of their shapes that together weigh next to nothing, and the weights of the others."""
+    """Drop the shapes that together have next to no weight, and return the weights of the others."""
     log = np.concatenate([family.evidence for family in families])
     weight = np.exp(log - log.max())
     order = np.argsort(weight)
@@ -233,7 +232,7 @@ def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ..
 
 
 def _student_cdf(freedom: Floats, t: Floats) -> Floats:
-    """Distribution of Student's t (j, d) of degrees of freedom (j,): 0 and 1 where nobody asks for more."""
+    """Return the distribution of Student's t (j, d) with degrees of freedom (j,)."""
     freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
     share, near = (
         (t > 0).astype(np.float64),
@@ -244,7 +243,7 @@ def _student_cdf(freedom: Floats, t: Floats) -> Floats:
 
 
 def _mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
-    """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    """Return a quantile of a mixture of Student's t; an error of 0 is a value that is certain."""
     reach = scipy.special.stdtrit(freedom, 1 - NEGLIGIBLE_PROBABILITY) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())
     for _ in range(QUANTILE_HALVINGS):

@@ -183,7 +183,7 @@ class MachineStatus:
         return is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
-        """The standing of one series; None where there is none."""
+        """Return the status of one series, or None."""
         fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
         return next(fits, None)
 
@@ -197,7 +197,7 @@ def assess_status(
     acknowledgements: Sequence[Acknowledgement] = (),
     scatter: FleetScatter | None = None,
 ) -> MachineStatus:
-    """The standing at a time; the last row holds the word on every program.
+    """Assess the status of a machine at a time; the last row has the verdict on every program.
 
     path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first; scatter:
     what other machines told of it.
@@ -240,7 +240,7 @@ def _build_status(
     left: float | None = None,
     alarms: Sequence[Alarm] = (),
 ) -> MachineStatus:
-    """The standing with these reasons; well: the next step where none says another."""
+    """Build the status from its remarks; well: next step where no remark has one."""
     ordered = sort_by_severity(remarks)
     said = add_acknowledgements(ordered, alarms, now)
     return MachineStatus(
@@ -295,7 +295,7 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
-    """The alarm of a program that is not stable: raised by the first of the newest tap tests that all say so."""
+    """Build the alarm of a program that is not stable, triggered by the first of the tap tests that all say so."""
     first = rows[-1]
     for row in reversed(rows):
         ruling = (row.verdicts or {}).get(remark.about)

@@ -96,14 +96,14 @@ class ValueHistory:
         return self.change_at(self.rows[-1])
 
     def change_at(self, row: HistoryRow) -> Estimate:
-        """Change (%) from the start to a row; unknown where that does not know the value."""
+        """Return the change (%) from the start to a row; unknown if the row has no value."""
         value: Estimate = getattr(row, self.name)
         if not value.is_known:
             return UNKNOWN_ESTIMATE
         return Estimate(0.0, 0.0) if self.start == value else value.change_since(self.start)
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
-        """The change that the newest points are sure of, whatever the temperature, and its time; None without one."""
+        """Find the change that the newest points are sure of, and its time, or None."""
         rows, numbers = self._positive
         reclamped = [row.conditions.reclamped for row in rows]
         times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
@@ -147,7 +147,7 @@ class SeriesHistory:
         return Estimate(-change.value + 0.0, change.std)
 
     def first_below(self, percent: float) -> HistoryRow | None:
-        """The first of the newest tap tests that all show a fall of so much (%); None where the newest does not."""
+        """Find the first of the newest tap tests that all show a drop of this much (%), or None."""
         first = None
         for row in reversed(self.frequency.known_rows):
             if -self.frequency.change_at(row).value < percent and (first is not None or not row.questions):
@@ -167,7 +167,7 @@ class SeriesHistory:
 def build_series_history(
     rows: Iterable[HistoryRow], beside: Iterable[HistoryRow] = (), scatter: SeriesScatterPrior = NO_SERIES_PRIOR
 ) -> SeriesHistory:
-    """The history of a series from its rows, oldest first, one at least.
+    """Build the history of a series from its rows, oldest first, one at least.
 
     beside: rows of the same tool in the other direction; scatter: what is known of that of the frequency beforehand.
     """
@@ -189,7 +189,7 @@ def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHisto
 
 
 def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
-    """The preload left in the bearings of a machine, from the change of their stiffness; see dsm.preload_left.
+    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.preload_left.
 
     None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it open,
     or where one of the calibrated bearings has rollers.
@@ -205,7 +205,7 @@ def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreloa
 
 
 def _is_preload_open(row: HistoryRow, machine: Machine) -> bool:
-    """Whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
+    """Return whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
     frequency, std = row.frequency
     try:
         model = machine.model(row.tool)

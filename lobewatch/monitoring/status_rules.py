@@ -170,41 +170,41 @@ def unreadable_remark(reason: str) -> Remark:
 
 
 def sort_by_severity(remarks: Iterable[CodedT]) -> tuple[CodedT, ...]:
-    """Reasons, or their alarms, in order of harm."""
+    """Sort remarks or alarms by severity."""
     order = list(STATUS_BY_CODE)
     return tuple(sorted(remarks, key=lambda remark: order.index(remark.code)))
 
 
 def worst_status(ordered: Sequence[Remark]) -> StatusLevel:
-    """Light of the worst reason."""
+    """Return the status of the most severe remark."""
     return STATUS_BY_CODE[ordered[0].code] if ordered else StatusLevel.GOOD
 
 
 def is_early_alarm(ordered: Sequence[Remark]) -> bool:
-    """Whether an alarm is of the watch alone: a fall that is sure, but short of every limit and of every program."""
+    """Return whether the only alarm is a detected drop short of every limit and program."""
     codes = {remark.code for remark in ordered}
     return worst_status(ordered) is StatusLevel.ALARM and codes.isdisjoint(LIMIT_CODES)
 
 
 def find_next_step(ordered: Sequence[Remark], well: str) -> str:
-    """Next step, one sentence; well: that where no reason says another."""
+    """Return the next step, one sentence; well: where no remark has one."""
     return ordered[0].cure if ordered and ordered[0].cure else well
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:
-    """Next step where nothing is wrong; newest: when it was tapped last."""
+    """Return the next step where nothing is wrong; newest: time of the last tap test."""
     return f"All is well: tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
 
 
 def count_days_left(newest: datetime, interval_days: float, now: datetime) -> float:
-    """Days until the next tap test is due; newest: when the last one was."""
+    """Return the days until the next tap test is due; newest: time of the last one."""
     return interval_days - (now - newest) / timedelta(days=1)
 
 
 def date_remarks(
     tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
 ) -> Iterator[Remark]:
-    """Remarks that the date alone gives: a test is overdue, or one of the future. path: of the folder, for commands."""
+    """Yield remarks by date: a test is overdue, or in the future; path: of the folder."""
     left = count_days_left(newest, interval_days, now)
     if left < 0:
         days = math.ceil(-left)
@@ -213,12 +213,12 @@ def date_remarks(
 
 
 def add_file_remedy(remark: Remark) -> Remark:
-    """A remark on a file, with a cure that can be the next step."""
+    """Add a remedy that can be the next step to a remark on a file."""
     return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
 
 
 def add_damage_remarks(ordered: tuple[Remark, ...], damage: Sequence[Remark]) -> tuple[Remark, ...]:
-    """The reasons with what else was found damaged in the folder."""
+    """Add the remarks on damaged files to those of the machine."""
     named = {(remark.code, remark.about) for remark in ordered}
     new = [add_file_remedy(remark) for remark in damage if (remark.code, remark.about) not in named]
     return sort_by_severity([*ordered, *new])

@@ -95,7 +95,7 @@ class Trend:
     """Day since 1970 that it is judged on."""
 
     def at_day(self, now: datetime) -> Trend:
-        """This trend as judged on another day."""
+        """Return this trend as of another day."""
         return replace(self, today=int(days_since_epoch(now)))
 
     @cached_property
@@ -142,7 +142,7 @@ class Trend:
         return self.past_fit is not None and not self.is_stale
 
     def forecast_level(self, percent: float, error: float = 0.0) -> ThresholdDates:
-        """When it falls to a level: 100 ln of the frequency there over that of its first test; error: of that."""
+        """Forecast when a level is reached: 100 ln of the frequency over that of its first test, with its error."""
         if self.forecast is None or self.is_stale:
             return NO_FORECAST
         dates = self.forecast.crossing_dates(percent, error)
@@ -186,7 +186,7 @@ def fit_trend(
     other: Sequence[TapValue] = (),
     known: SeriesScatterPrior = NO_SERIES_PRIOR,
 ) -> Trend:
-    """Judge a series, oldest first, one value at least.
+    """Fit the trend of a series, oldest first, with at least one value.
 
     now: its day tells whether that is too long ago to foretell anything; other: of the other direction, likewise;
     known: what is known of its scatter beforehand.
@@ -197,7 +197,7 @@ def fit_trend(
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
-    """The newest points of a series, oldest first."""
+    """Return the newest points of a series, oldest first."""
     times, values, _, temperatures, _, _, reclamped = zip(*series, strict=True)
     percents = PercentSeries(times, _log_percents(values), temperatures, reclamped)
     return tuple(_build_point(percents, series, span) for span in [*divide_into_points(percents)][-MAX_TREND_POINTS:])
@@ -214,14 +214,14 @@ def _build_point(percents: PercentSeries, series: Sequence[TapValue], span: TapR
 def list_newest_percents(
     times: Sequence[datetime], values: Sequence[float], reclamped: Sequence[bool]
 ) -> tuple[list[datetime], list[float]]:
-    """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
+    """Return times and percents of the newest points of a series without temperatures, oldest first."""
     series = PercentSeries(tuple(times), _log_percents(values), (math.nan,) * len(times), tuple(reclamped))
     spans = [*divide_into_points(series)][-MAX_TREND_POINTS:] if times else []
     return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
 
 
 def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
-    """Changes of values, 100 ln of each over the first."""
+    """Return 100 ln of each value over the first."""
     log, first = math.log, values[0] if values else 1.0
     return tuple([100 * log(value / first) for value in values])
 
@@ -239,7 +239,7 @@ def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], 
 
 
 def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) -> Iterator[float]:
-    """Percent of the other direction nearest in time to each point, NaN where there is none within a day."""
+    """Yield the percent of the other direction within a day of each point, else NaN."""
     times = [other.time for other in others]
     for point in points:
         at = bisect(times, point.time)
@@ -248,15 +248,15 @@ def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) 
 
 
 def point_days(points: Sequence[TrendPoint]) -> Floats:
-    """Days since 1970, shape (n,)."""
+    """Return the days since 1970 of points, shape (n,)."""
     return np.array([point.time.timestamp() for point in points]) / 86400
 
 
 def days_since_epoch(time: datetime) -> float:
-    """Days since 1970."""
+    """Return the days since 1970."""
     return time.timestamp() / 86400
 
 
 def date_of_days(days: float) -> datetime:
-    """Date of so many days since 1970."""
+    """Return the date of a number of days since 1970."""
     return datetime.fromtimestamp(86400 * days, UTC)

@@ -70,7 +70,7 @@ class TrendShape(NamedTuple):
 
 
 def list_single_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of one column that are tried; dates count from the first point on."""
+    """List all shapes of one column; dates count from the first point on."""
     return [
         TrendShape("none", 0.0),
         TrendShape("line", 0.0),
@@ -83,7 +83,7 @@ def list_single_shapes(at: Floats) -> list[TrendShape]:
 
 
 def list_pair_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of two columns that are tried."""
+    """List all shapes of two columns."""
     ramps, steps = [0.0, *at[1:-3].tolist()], at[2:-1].tolist()
     slopes = [TrendShape("slopes", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
     crashes = [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
@@ -91,14 +91,13 @@ def list_pair_shapes(at: Floats) -> list[TrendShape]:
 
 
 def list_triple_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of three columns that are tried."""
+    """List all shapes of three columns."""
     ramps = at[1:-3].tolist()
     return [TrendShape("breaks", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
 
 
 def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floats:
-    """Courses of shapes of one column over dates that count from the first point on, shape (j, 1, d); span: of the
-    series."""
+    """Build the columns of one-column shapes at dates from the first point on, shape (j, 1, d)."""
     starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
     columns, end = np.empty((len(shapes), at.size)), 0
     for kind, alike in groupby(shape.kind for shape in shapes):
@@ -121,7 +120,7 @@ def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floa
 
 
 def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
-    """Courses of shapes of two columns, shape (j, 2, d): that of the earlier date, that of the later one."""
+    """Build the columns of two-column shapes, shape (j, 2, d): the earlier date, the later one."""
     places = np.array([(shape.end, shape.start) for shape in shapes]).reshape(-1, 2, 1)
     columns = np.maximum(at - places, 0.0)
     is_crash = np.array([shape.kind == "crash" for shape in shapes], dtype=bool)
@@ -130,7 +129,7 @@ def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
 
 
 def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
-    """Courses of shapes of three columns, shape (j, 3, d): the line, and both dates."""
+    """Build the columns of three-column shapes, shape (j, 3, d): the line, and both dates."""
     line = np.broadcast_to(at, (len(shapes), 1, at.size))
     return np.concatenate([line, build_pair_columns(shapes, at)], axis=1)
 
@@ -168,38 +167,38 @@ class ShapeFits:
         return self.fits.rss / self.fits.freedom
 
     def select(self, numbers: Indices) -> Self:
-        """Some of the shapes alone."""
+        """Select some of the shapes."""
         shapes = tuple(self.shapes[j] for j in numbers)
         return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard error of each at dates, shape (j, d) each."""
+        """Predict mean and standard error of each at dates, shape (j, d) each."""
         return self.fits.predict(self.build_columns(self.shapes, at))
 
     def rate(self) -> tuple[Floats, Floats]:
-        """Rate of change of each at the last point, and its standard error, shape (j,) each."""
+        """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
         near = self.build_columns(self.shapes, np.array([self.span - RATE_STEP * self.span, self.span]))
         return self.fits.rate(np.diff(near)[..., 0] / (RATE_STEP * self.span))
 
 
 def fit_single_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of one column."""
+    """Fit the shapes of one column."""
     span = float(at[-1])
     return _fit_shapes(base, at, list_single_shapes(at), lambda shapes, dates: build_columns(shapes, dates, span))
 
 
 def fit_pair_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of two columns."""
+    """Fit the shapes of two columns."""
     return _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
 
 
 def fit_triple_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of three columns."""
+    """Fit the shapes of three columns."""
     return _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)
 
 
 def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], drawn: ColumnBuilder) -> ShapeFits:
-    """Within a kind equal weight beforehand for each of its shapes."""
+    """Fit shapes; within a kind each has the same prior weight."""
     fits = base.fit_columns(drawn(shapes, at))
     counts = Counter(shape.kind for shape in shapes)
     columns = np.array([0 if shape.kind == "none" else fits.size.shape[1] for shape in shapes])

@@ -30,7 +30,7 @@ StiffnessAt = Callable[[float], float]
 
 
 def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
-    """Stiffness over that of now as a function of the fall of the frequency, and the assumption in words.
+    """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
 
     All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a model
     it stays.
@@ -50,7 +50,7 @@ def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
 
 @lru_cache(maxsize=MAX_CACHED_CALIBRATIONS)
 def _stiffness_ratios(calibration: Calibration) -> Floats:
-    """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
+    """Return the modal stiffness at the tip for each of `CALIBRATED_DROPS` over that for none."""
     stiffness: list[float] = []
     for drop in CALIBRATED_DROPS:
         try:
@@ -62,12 +62,12 @@ def _stiffness_ratios(calibration: Calibration) -> Floats:
 
 
 def apply_drops(samples: ProgramSamples, drops: Floats, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws with all frequencies fallen by each of these shares (k,), one after the other."""
+    """Apply each of some frequency drops (k,) to all samples, one after the other."""
     return samples.sweep(np.ones(drops.size), 1 - drops, np.array([stiffness_at(drop) for drop in drops.tolist()]))
 
 
 def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
-    """Largest fall of the frequency, relative, up to which a depth (m) stays stable in the middle of the doubt.
+    """Find the largest relative drop up to which a depth (m) stays stable in the median.
 
     0.0 where it is unstable now, inf where nothing happens down to 80 %. Looks every 0.2 % of fall.
     """
@@ -97,7 +97,7 @@ N_DROP_ERROR_SAMPLES = 12
 
 
 def find_critical_drop(verdict: Verdict) -> CriticalDrop:
-    """Falls of the frequency that change the word on a program; one beyond 20 % is not looked at."""
+    """Find the frequency drops that change the stability of a program, up to 20 %."""
     samples = verdict.samples
     if verdict.assembly is None or samples is None or verdict.stability is Stability.UNKNOWN:
         return CriticalDrop(math.nan, math.nan, math.nan)
@@ -113,17 +113,17 @@ def find_critical_drop(verdict: Verdict) -> CriticalDrop:
 
 
 def build_stored_verdict(verdict: Verdict, drops: bool) -> StoredVerdict:
-    """What the history keeps of a verdict; falls: with the critical ones, which take as long as the verdict itself."""
+    """Build the stored verdict; drops: with the critical frequency drops, which take as long as the verdict itself."""
     return verdict.stored._replace(critical=find_critical_drop(verdict)) if drops else verdict.stored
 
 
 def is_verdict_missing(ruling: StoredVerdict | None, drops: bool) -> bool:
-    """Whether a program has to be judged to know its ruling; falls: with the critical ones."""
+    """Return whether a program has to be evaluated for its stored verdict; drops: with the critical drops."""
     return ruling is None or (drops and ruling.critical is None)
 
 
 def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Largest fall up to which no draw chatters."""
+    """Return the largest drop up to which no sample chatters."""
     most = min(last, float(CALIBRATED_DROPS[-1]))
 
     def chatters(drop: float) -> bool:
@@ -143,7 +143,7 @@ def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, sti
 
 
 def _drop_error(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Error of the fall at which the middle chatters, from its growth with damping and stiffness of some draws."""
+    """Return the error of the drop at which the median chatters, from damping and stiffness of some samples."""
     rows, median = samples.rows[np.arange(1, N_DROP_ERROR_SAMPLES + 1)], samples[np.array([0])]
     alike = samples.rows[np.zeros(N_DROP_ERROR_SAMPLES, dtype=np.intp)]
     scattered = replace(samples, rows=replace(alike, damping_ratio=rows.damping_ratio, stiffness=rows.stiffness))

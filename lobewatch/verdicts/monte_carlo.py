@@ -47,7 +47,7 @@ WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
 
 
 def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
-    """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
+    """Find the deepest stable depth of each sample (m), shape (samples,); inf beyond the tried depths.
 
     Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
     linearly interpolated. depth: that of the program (m).
@@ -80,7 +80,7 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
 
 
 def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
-    """Limits (m) as `find_sample_limits` gives them, each in the direction of feed that is worst for that very draw.
+    """Refine limits (m) of `find_sample_limits` in the feed direction that is worst for each sample.
 
     For numbers of single draws, such as ratios of two cuts on the same spindle.
     """
@@ -96,7 +96,7 @@ def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
 
 
 def _bracket_limits(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Depths on both sides of the first change to growth in each row, and growth there; inf where there is none."""
+    """Return depths on both sides of the first change to growth in each row, and the growth there."""
     depth = np.pad(tried, ((0, 0), (1, 1)))
     depth[:, -1] = np.inf
     value = np.pad(grown, ((0, 0), (1, 1)), constant_values=1.0)
@@ -106,7 +106,7 @@ def _bracket_limits(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Float
 
 
 def _interpolate_limits(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
-    """Depths at which growth is zero on a line."""
+    """Interpolate the depths at which growth is zero."""
     share = -at_low / (at_high - at_low)
     return np.where(np.isfinite(high), low + share * (np.where(np.isfinite(high), high, low) - low), np.inf)
 
@@ -170,7 +170,7 @@ def sample_program(case: ProgramCase) -> SampledProgram:
 
 
 def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
-    """What is seen of a program on all spindles that it may be run on."""
+    """Evaluate all samples of a program: limits, quantiles, samples that chatter."""
     depth, median, samples, across = program
     limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
@@ -182,7 +182,7 @@ def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
 
 
 def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:
-    """Whether each draw chatters at a depth (m) in any of the cuts, shape (DRAWS,); where none does, that is exact.
+    """Find the samples that chatter at a depth (m) in any of the cuts, shape (samples,); exact where none does.
 
     limits: of the draws in the worst cut (m), shape (DRAWS,). In another cut that is near (cuts,) a draw is looked at
     where its limit, were it as far off the middle as in the worst, has less than EACH to spare, and where the middle
@@ -225,7 +225,7 @@ class LimitBand:
 def compute_limit_band(
     line: StabilityLobes, cut: str, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS
 ) -> LimitBand:
-    """The band around the line of a cut (its name), by draws from the doubt.
+    """Compute the uncertainty band around the limits of a cut (its name) by samples.
 
     Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
     the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
@@ -254,6 +254,6 @@ def compute_limit_band(
 
 
 def _band_depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
-    """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
+    """Return the limit of each row in the worst cut at its own speeds (rpm) (r, s)."""
     depths = [ZeroOrderBatch.of(rows.with_cut(cut)).limits(speed_rpm)[0] for cut in cuts]
     return np.asarray(np.minimum(np.min(depths, axis=0), UNLIMITED_DEPTH))

@@ -90,7 +90,7 @@ class PitchProposal:
 def propose_pitch(
     table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS
 ) -> PitchProposal:
-    """Pitches for a cut at its speed; limits are looked for up to 20 times its depth.
+    """Propose pitches for a cut at its speed; limits are searched up to 20 times its depth.
 
     DataError where the cut cannot be judged, ValueError for less than two teeth.
     """
@@ -129,12 +129,12 @@ class PitchSearch:
     """Their limits (m), the middle first."""
 
     def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
-        """The pattern of each kind with the highest low end of its limit, as far as few draws tell before the judge."""
+        """Find the pattern of each kind with the highest 1 % limit."""
         kinds = itertools.groupby(pitch_patterns(self.case.table.teeth, half_wave), key=lambda pattern: pattern.name)
         return [self._find_best(list(patterns)) for _, patterns in kinds]
 
     def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
-        """The best of one kind."""
+        """Find the best pattern of one kind."""
         places = [
             *np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist(),
             *range(0, self.equal_limits.size, PITCH_SAMPLE_STEP),
@@ -153,7 +153,7 @@ class PitchSearch:
         return max(judged.values(), key=lambda judged: judged.low)
 
     def _stable_depth(self, pattern: PitchPattern, places: Indices) -> float:
-        """The deepest (m) at which the draws at some places are stable."""
+        """Return the deepest (m) at which selected samples are stable."""
         cuts, limits = self.samples.cuts[:N_PITCH_FEEDS], self.samples.limits[:N_PITCH_FEEDS]
         few = replace(self.samples[places], cuts=tuple(with_pitch_pattern(cut, pattern) for cut in cuts), limits=limits)
         speeds = few.rows.speed_rpm[:, np.newaxis]
@@ -163,7 +163,7 @@ class PitchSearch:
         )
 
     def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
-        """Pitches by the judge, and the limit of each draw (m), the middle first."""
+        """Evaluate a pattern; return its evaluation and the limit of each sample (m), the median first."""
         case = self.case.with_changes(pitch_deg=pattern.pitch_deg)
         result = run_monte_carlo(case)
         band = result.median.limit, result.low, result.high
@@ -172,7 +172,7 @@ class PitchSearch:
 
 
 def _pitch_limits(samples: ProgramSamples, depth: float) -> Floats:
-    """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
+    """Return the limit of each sample (m), the median first."""
     limits = refine_sample_limits(samples, find_sample_limits(samples, depth))
     limits[0] = samples.limits[0]
     return np.minimum(limits, MAX_PROGRAM_DEPTH_RATIO * depth)
@@ -181,7 +181,7 @@ def _pitch_limits(samples: ProgramSamples, depth: float) -> Floats:
 def _build_evaluation(
     pattern: PitchPattern, word: Stability, band: tuple[float, float, float], limits: Floats, equal: Floats
 ) -> PitchEvaluation:
-    """Pitches from the limits of their draws and those of equal pitch (m), the middle first."""
+    """Build an evaluation from sample limits and those of equal pitch (m), the median first."""
     gains = limits / equal - 1
     low, high = np.quantile(gains[1:], LIMIT_QUANTILES)
     return PitchEvaluation(

@@ -85,7 +85,7 @@ FEED_ANGLE_STEP = math.pi / 12
 def cutting_conditions_of(
     table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
 ) -> tuple[Cut, ...]:
-    """Cuts that a program makes on its way, in no order; either: milled up and down, whatever the table says.
+    """List the cuts that a program makes on its path, in no order.
 
     In a corner the feed turns, whatever axis it follows on the straight.
     """
@@ -99,7 +99,7 @@ def cutting_conditions_of(
 
 
 def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:
-    """Directions of feed as angles from x (rad): half a turn apart they are alike."""
+    """Return the feed directions as angles from x (rad); half a turn apart they are equivalent."""
     if table.feed != "both" and table.corner_radius_mm is None:
         return (FEED_ANGLES[table.feed],)
     if immersion < MAX_OBLIQUE_FEED_IMMERSION or differ:
@@ -108,7 +108,7 @@ def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tupl
 
 
 def are_directions_equal(x: TipModes, y: TipModes) -> bool:
-    """Whether the modes of both directions are the same, as those of a round spindle or a direction taken for both."""
+    """Return whether the modes of both directions are equal, as those of a round spindle."""
     if x is None or y is None or len(x) != len(y):
         return False
     numbers = np.array([[(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in side] for side in (x, y)])

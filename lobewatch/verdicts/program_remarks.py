@@ -27,7 +27,7 @@ TOOL_MAKER_KEYS = (MissingToolData.CUTTING_SPEED, MissingToolData.FEED_PER_TOOTH
 
 
 def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
-    """Speed and feed per tooth of a program that its tool does not bear, with what it does and the source."""
+    """Yield remarks on speed and feed per tooth outside the limits of the tool."""
     limits = find_tool_limits(machine, table)
     if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
         reach = CutRange(machine, table, limits)
@@ -43,7 +43,7 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
 
 
 def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
-    """Question for what advice on a program would have to know of its tool."""
+    """Ask for tool data that advice on a program needs."""
     if limits.is_guessed:
         whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
         asked = " and ".join(text for unknown, text in MISSING_TOOL_FACTS.items() if unknown in limits.missing)
@@ -97,7 +97,7 @@ MIN_CROSS_LIMIT_RATIO = 1.04
 
 
 def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[Remark]:
-    """Remarks on what is assumed because the program does not say it."""
+    """Warn about defaults assumed for missing program settings."""
     table = case.table
     if (
         table.immersion < NARROW_CUT_IMMERSION
@@ -140,7 +140,7 @@ def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
 
 
 def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSamples) -> float:
-    """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
+    """Return the median limit (m) by the zero-order approximation at another immersion, in the worst feed direction."""
     cut, median = replace(case.program.cut, immersion=immersion), samples.rows[np.array([0])]
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
     speed = np.array([case.table.speed_rpm])
@@ -152,7 +152,7 @@ N_CAUSE_SAMPLES = 60
 
 
 def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
-    """The cause without which most of the draws that chatter at a depth (m) would not.
+    """Find the cause of uncertainty without which most chattering samples would be stable at a depth (m).
 
     Where none of them chatters a direction that was not tapped is all that is left open.
     """

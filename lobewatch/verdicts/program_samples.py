@@ -60,7 +60,7 @@ class ProgramSamples:
     """Doubt that they were drawn from."""
 
     def growth(self, depth: float | Floats) -> Floats:
-        """Growth from tooth to tooth in the worst of its cuts; negative where stable.
+        """Return the growth rate in the worst cut; negative where stable.
 
         depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
         """
@@ -72,7 +72,7 @@ class ProgramSamples:
         )
 
     def critical_growth(self, depth: float) -> Floats:
-        """Growth at a depth (m) in the worst of its cuts, (draws,); of those that surely do not grow that in the first.
+        """Return the growth rate at a depth (m) in the worst cut, (samples,); clearly stable ones in the first cut only.
 
         Some draws say how much more there is in each other cut: passed over are those that die away so much faster.
         """
@@ -89,11 +89,11 @@ class ProgramSamples:
         return grown
 
     def _growth_at_depth(self, cut: Indices, row: Indices, depth: float) -> Floats:
-        """Growth of some draws, each in one of the cuts (k,), at a depth (m), shape (k,)."""
+        """Return the growth rate of some samples, each in one of the cuts (k,), at a depth (m), shape (k,)."""
         return self.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))[:, 0]
 
     def growth_in_cuts(self, cut: Indices, row: Indices, depths: Floats) -> Floats:
-        """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
+        """Return the growth rate of some samples, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
         grown = np.empty(depths.shape)
         angles = np.array([each.feed_angle for each in self.cuts])
         for alike in group_by_engagement(self.cuts):
@@ -105,22 +105,21 @@ class ProgramSamples:
         return grown
 
     def __getitem__(self, places: Indices) -> ProgramSamples:
-        """The draws at some places."""
         return replace(self, rows=self.rows[places])
 
     def with_lowest_cuts(self, below: float, most: int | None = None) -> ProgramSamples:
-        """The cuts with a limit up to a depth (m) alone, at most so many; the worst stays."""
+        """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
         wanted[0] = True
         return self.with_cuts(wanted)
 
     def with_cuts(self, wanted: Flags) -> ProgramSamples:
-        """The cuts at some places alone; the worst where it is none of them."""
+        """Select some cuts; the worst if there is none."""
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
 
     def median_growth_near(self, depth: float, drop: float = 0.0, apart: float = 1.0) -> Floats:
-        """Largest growth of the middle in each cut at a depth (m), as far as speed and frequency may be off.
+        """Return the largest median growth of each cut at a depth (m) within the uncertainty of speed and frequency.
 
         fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
         slower and faster, that counts too. Shape (cuts,).
@@ -133,11 +132,11 @@ class ProgramSamples:
         return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
 
     def scale(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramSamples:
-        """The same draws with speed, frequencies and stiffnesses times these factors."""
+        """Scale speed, frequencies and stiffnesses of all samples."""
         return self.sweep(np.array([speed]), np.array([frequency]), np.array([stiffness]))
 
     def sweep(self, speed: Floats, frequency: Floats | float = 1.0, stiffness: Floats | float = 1.0) -> ProgramSamples:
-        """All draws at each of several factors (k,) after the other, k times as many."""
+        """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
         speeds, frequencies, stiffnesses = (np.repeat(factor, len(self.rows)) for factor in factors)
@@ -151,7 +150,7 @@ class ProgramSamples:
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
-    """The program without any doubt, the feed along x; axes: of its modes (n, 2), None: the first that may be."""
+    """Build the median system, the feed along x; axes: of its modes (n, 2), None: the first sign pattern."""
     vectors = assembly.principal_directions.sign_patterns[0] if axes is None else axes
     return rows_at_speeds(
         build_milling_system(assembly.x, assembly.y, vectors), program.cut, np.array([program.speed_rpm])
@@ -213,7 +212,7 @@ def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = N
 
 
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
-    """The draws with what may differ between a spindle at rest and one in the cut, alike in all modes of a draw."""
+    """Vary the samples by plausible differences between a spindle at rest and one that cuts."""
     rows, random = samples.rows, np.random.default_rng(seed)
     frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
 

@@ -42,7 +42,7 @@ class Advice:
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
-    """Advice beside a verdict; empty where it is unknown."""
+    """Advise on a program: settings to use instead, and the tolerable frequency drop."""
     tool, samples = verdict.assembly, verdict.samples
     if tool is None or samples is None:
         return Advice()
@@ -62,7 +62,7 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
 def find_stable_pockets(
     table: CutTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS, count: int = 3
 ) -> list[Setting]:
-    """Speeds and depths that would be called stable with depth to spare, the largest removal rate first.
+    """Find settings that would be called stable with depth to spare, the largest removal rate first.
 
     The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
     range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
@@ -74,7 +74,7 @@ def find_stable_pockets(
 
 
 def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
-    """A cut as a program of a tool, at any speed and depth where it has none: no search rests on them."""
+    """Build a program from a cut; speed and depth are placeholders."""
     if isinstance(table, ProgramTable):
         return table
     place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
@@ -148,7 +148,7 @@ def recommend(
     present_rpm: float | None = None,
     is_set: bool = False,
 ) -> Recommendation:
-    """The setting of most chips, at a depth where one is asked for; it would be called stable when it is entered.
+    """Recommend the setting of the largest removal rate, at a given depth if there is one.
 
     table: the cut, whose own speed and depth do not count; either: it may be milled up or down, the worse counts;
     present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
@@ -174,7 +174,7 @@ def recommend(
 
 
 def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
-    """Why nothing can be called safe at any speed and depth, and what to do; empty where it can be."""
+    """Return why nothing can be called stable at any setting, and the remedies; empty if it can."""
     asked = find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0)
     asked = [doubted for doubted in asked if doubted.key not in REQUESTED_KEYS]
     if asked:
@@ -183,7 +183,7 @@ def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[st
 
 
 def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
-    """Why no speed of the spindle is one that the tool bears, and what would change it; empty where one is."""
+    """Return why no spindle speed is within the tool limits, and the remedies; empty if one is."""
     speed, limits = reach.machine.speed, reach.limits
     if not reach.is_empty:
         return ()
@@ -197,7 +197,7 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
 def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
-    """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
+    """Build the recommendation of a setting, evaluated as a program."""
     case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
     at = {
         "speed_rpm": setting.speed_rpm,
@@ -216,7 +216,7 @@ def _recommend_setting(
 
 
 def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
-    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    """Return the range of feed per tooth (mm): of the program, else of the tool, else None."""
     own, borne = table.feed_per_tooth_mm, search.cut_range.limits.feed_per_tooth_mm
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
@@ -237,7 +237,7 @@ def _list_alternatives(
 def _explain_no_setting(
     search: SettingSearch, depth_mm: float | None, set_rpm: float | None
 ) -> tuple[str, tuple[str, ...]]:
-    """What there is not, and what would change that."""
+    """Explain why there is no setting, with remedies."""
     if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
         return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES
     if set_rpm is not None:
@@ -247,7 +247,7 @@ def _explain_no_setting(
 
 
 def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
-    """What would make it safe: what settles the doubt first, where that alone stands in the way."""
+    """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])
     probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)

@@ -67,7 +67,7 @@ class CriticalSamples:
         return self.samples[np.union1d(self.likely_first, more)]
 
     def deepest_stable(self, most: float) -> float:
-        """The deepest up to a depth at which, and below which, all that count are stable with depth to spare (m)."""
+        """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth to spare."""
         few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
         while calm == depth < ROBUST_DEPTH_FACTOR * most:
@@ -79,7 +79,7 @@ class CriticalSamples:
         return calm / ROBUST_DEPTH_FACTOR
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
-        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,).
+        """Return the largest growth of the selected samples at relative speeds and depths (m) (k,), with depth to spare.
 
         In the worst direction of feed: it says where to look, no more.
         """
@@ -111,7 +111,7 @@ def select_critical_samples(
 
 
 def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
-    """The deepest up to a depth (m) at which, and below which, all draws are stable (m); 0 where it is hardly any."""
+    """Return the deepest depth (m) up to `most` at which all samples are stable; 0 if there is hardly any."""
     depths = most * CRITICAL_DEPTH_SHARES
     grown = np.max(samples.growth(depths), axis=0)
     if np.all(grown < 0):
@@ -160,11 +160,11 @@ class LikelyDepths:
     """Depth (mm) likely to be safe there, no deeper than tool and drive allow, shape (n,)."""
 
     def window_centers(self, depth_mm: float) -> list[float]:
-        """The middle (rpm) of each window of speeds at which a depth (mm) is likely."""
+        """Return the center (rpm) of each speed window in which a depth (mm) is likely safe."""
         return [float(self.speeds[run[run.size // 2]]) for run in _split_runs(self.depths >= depth_mm)]
 
     def removal_peaks(self, count: int) -> list[tuple[float, float]]:
-        """Speeds (rpm) and depths (mm) with more chips than beside them, the most first; then others apart."""
+        """Return speeds (rpm) and depths (mm) of local maxima of the removal rate, then of others apart."""
         chips = np.pad(self.depths * self.speeds, 1)
         tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
         order = np.argsort(-chips[1:-1], kind="stable")
@@ -179,14 +179,14 @@ class LikelyDepths:
         return [(float(self.speeds[place]), float(self.depths[place])) for place in taken[:count]]
 
     def is_same_pocket(self, first: float, second: float) -> bool:
-        """Whether nearly as much is likely all the way between two speeds (rpm): they lie in one pocket."""
+        """Return whether the likely depth between two speeds (rpm) stays nearly as large: one pocket."""
         ends = np.searchsorted(self.speeds, sorted((first, second)))
         between = self.depths[ends[0] : ends[1] + 1]
         return between.size < 2 or bool(np.min(between) >= POCKET_VALLEY_SHARE * min(between[0], between[-1]))
 
 
 def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> LikelyDepths:
-    """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
+    """Estimate the safe depth over speed within the uncertainty, now and after a frequency drop.
 
     cuts: all that the program makes on its way; spare: depth to spare in the middle of the doubt at least.
     """
@@ -220,7 +220,7 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
 def _limits_by_multipliers(
     spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
 ) -> Floats:
-    """Limits (mm) by multipliers, up to a depth (mm) (n,), where wanted (n,), between few speeds; else by zero order.
+    """Return limits (mm) by multipliers where wanted (n,), interpolated between few speeds; else by zero order.
 
     by_cut: limits by zero order (cuts, n).
     """
@@ -240,7 +240,7 @@ def _limits_by_multipliers(
 
 
 def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
-    """Depth (mm) (r,) at which growth first reaches zero, on a line between looks; inf where it does not.
+    """Return the depth (mm) (r,) at which growth first reaches zero, or inf.
 
     mean: limit by zero order (mm) (r,); most: depth up to which it matters.
     """
@@ -254,7 +254,7 @@ def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
 
 
 def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
-    """The same between depths (mm) (r, d)."""
+    """Interpolate the first zero of growth between depths (mm) (r, d)."""
     if not depths.size:
         return np.empty(0)
     grown = growth_rate(rows, depths / 1e3, count_pieces(rows, float(np.max(depths)) / 1e3, COARSE_CYCLES_PER_PIECE))
@@ -267,7 +267,7 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
 
 
 def _split_runs(wanted: Flags) -> list[Indices]:
-    """Places without a gap between them."""
+    """Split into runs of consecutive places."""
     places: Indices = np.flatnonzero(wanted)
     runs: Sequence[Indices] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     return [run for run in runs if run.size]

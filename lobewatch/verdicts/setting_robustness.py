@@ -51,12 +51,12 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws at the slower speed, then after the fall: the ends of what must be safe."""
+    """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
     return _sweep_speeds_and_drops(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws at these ends, after half of the fall, and at the faster speed."""
+    """Sweep all samples over both speeds, the frequency drop and half of it."""
     return _sweep_speeds_and_drops(
         samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at
     )
@@ -72,7 +72,7 @@ def _sweep_speeds_and_drops(
 def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
-    """Slowest and fastest speed (rpm) around one up to which a depth (m) is safe on all draws."""
+    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
     steps = np.arange(MAX_WINDOW_STEPS + 1.0)
     slow, fast = (
         _last_stable_ratio(near, hardest, np.power(1 + WINDOW_SPEED_STEP, sign * steps), depth) for sign in (-1, 1)
@@ -84,7 +84,7 @@ def find_speed_window(
 
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
-    """Fall of the frequency, relative, up to which a depth (m) is safe on these draws."""
+    """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
     grown = _sweep_speeds_and_drops(
         hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at
     ).critical_growth(depth)
@@ -92,7 +92,7 @@ def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: Stiffn
 
 
 def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Floats, depth: float) -> float:
-    """The last of these speeds, over the present one, which is the first, up to which all draws are stable."""
+    """Return the last relative speed up to which all samples are stable."""
     last = 0
     for steps in np.array_split(np.arange(1, ratio.size), N_WINDOW_PARTS):
         grown = hardest.sweep(ratio[steps]).critical_growth(depth).reshape(steps.size, -1)
@@ -105,7 +105,7 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
 
 
 def _last_stable_row(grown: Floats) -> int:
-    """Row up to which all of growth (k, draws) is negative from the first on."""
+    """Return the row up to which all of growth (k, samples) is negative from the first on."""
     calm = np.all(grown < 0, axis=1)
     return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
 
@@ -117,7 +117,7 @@ DEFAULT_NEEDED_DROP = 0.02
 
 
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
-    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
+    """Return the frequency drop that a recommended setting must tolerate: two tap intervals at the rate so far."""
     days = N_TAP_INTERVALS * machine.machine.tap_interval_days
     drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
     return max(

@@ -111,7 +111,7 @@ class SettingSearch:
         return next(self._search_settings(), None)
 
     def pockets(self, count: int) -> list[Setting]:
-        """The best setting, and the next best of other pockets."""
+        """Return the best setting, and the best of other pockets."""
         taken: list[Setting] = []
         for setting in self._search_settings(taken):
             taken.append(setting)
@@ -120,21 +120,21 @@ class SettingSearch:
         return taken
 
     def nearest_window(self, depth_mm: float, speed_rpm: float) -> Setting | None:
-        """A depth (mm) at the window of speeds nearest to one (rpm)."""
+        """Find a depth (mm) in the speed window nearest to a speed (rpm)."""
         return self._first_safe(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
 
     def fastest_window(self, depth_mm: float) -> Setting | None:
-        """A depth (mm) at the fastest window of speeds."""
+        """Find a depth (mm) in the fastest speed window."""
         return self._first_safe(depth_mm, lambda speed: -speed)
 
     def deepest_at(self, speed_rpm: float, most_mm: float) -> Setting | None:
-        """The deepest at a speed (rpm), up to a depth (mm)."""
+        """Find the deepest setting at a speed (rpm), up to a depth (mm)."""
         if self.best is None or not self.cut_range.low_rpm <= speed_rpm <= self.cut_range.high_rpm:
             return None
         return self._deepest_setting(speed_rpm, min(most_mm, self._deepest_stable(speed_rpm)))
 
     def _first_safe(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
-        """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
+        """Find a depth (mm) in the first safe speed window, the lowest rank first."""
         for speed in self._candidate_speeds(depth_mm, rank):
             if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
                 setting = self.verify(speed, depth_mm)
@@ -143,7 +143,7 @@ class SettingSearch:
         return None
 
     def _candidate_speeds(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
-        """Speeds (rpm) to look for a depth (mm) at; that of most chips, which takes a search, is the last."""
+        """Yield speeds (rpm) at which a depth (mm) is likely safe; the speed of the best setting last."""
         if self.cut_range.is_empty:
             return
         middles = {
@@ -155,7 +155,7 @@ class SettingSearch:
             yield self.best.speed_rpm
 
     def _search_settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
-        """The deepest at speeds of the grid, the most chips first as far as few draws tell.
+        """Yield the deepest settings of the grid, the largest removal rate first.
 
         What was judged in vain comes back with less depth, and the draws that chattered count from then on. Pockets
         that are taken while it goes on are passed over.
@@ -189,11 +189,11 @@ class SettingSearch:
                 depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
-        """Whether a speed (rpm) lies in none of the pockets that are taken."""
+        """Return whether a speed (rpm) lies in none of the pockets taken."""
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
     def _climb(self, speed: float, depths: DepthsBySpeed, kept: SharesBySpeed, looked: set[float]) -> float:
-        """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), once for each top."""
+        """Return the speed (rpm) of the largest removal rate after its neighbors have been tried, once for each peak."""
         for _ in range(0 if speed in looked else N_CLIMBS):
             looked.add(speed)
             if (beside := self._better_neighbor(speed, depths[speed])) in looked:
@@ -204,7 +204,7 @@ class SettingSearch:
         return speed
 
     def _best_speed(self, depths: DepthsBySpeed, kept: SharesBySpeed) -> float:
-        """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
+        """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
         while True:
             speed = max(
                 depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, kept), default=0.0
@@ -214,12 +214,12 @@ class SettingSearch:
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
 
     def _expected_share(self, speed: float, kept: SharesBySpeed) -> float:
-        """Share of its depth that is likely to be left at a speed (rpm), when several of its pocket were judged."""
+        """Return the share of its depth that is likely to be confirmed at a speed (rpm)."""
         shares = [share for other, share in kept.items() if self.likely_depths.is_same_pocket(speed, other)]
         return 1.0 if speed in kept or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
     def _better_neighbor(self, speed: float, depth_mm: float) -> float:
-        """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""
+        """Return a neighboring speed (rpm) with a larger removal rate by the critical samples, or itself."""
         speeds = np.round(speed * (1 + NEIGHBOR_SPEED_STEPS) / SPEED_STEP_RPM) * SPEED_STEP_RPM
         depths = (np.floor(speed * depth_mm / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM
         held = [self.cut_range.contains(*place) for place in zip(speeds.tolist(), depths.tolist(), strict=True)]
@@ -229,13 +229,13 @@ class SettingSearch:
         return float(speeds[held][np.argmin(grown)]) if np.min(grown) < 0 else speed
 
     def _deepest_stable(self, speed: float) -> float:
-        """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
+        """Return the deepest depth (mm) at a speed (rpm) by the critical samples, now and later."""
         most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
         hard = self.critical[speed] = replace(self._critical_samples(speed), chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest_stable(most)
 
     def _critical_samples(self, speed: float) -> CriticalSamples:
-        """The few draws at a speed (rpm)."""
+        """Return the critical samples at a speed (rpm)."""
         if speed in self.critical:
             return self.critical[speed]
         likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
@@ -243,7 +243,7 @@ class SettingSearch:
         return select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
-        """The deepest setting up to a depth (mm)."""
+        """Find the deepest setting up to a depth (mm)."""
         for _ in range(TRIES_PER_SPEED):
             if not (depth_mm := self.cut_range.round_down_depth(depth_mm)):
                 return None
@@ -254,7 +254,7 @@ class SettingSearch:
         return None
 
     def verify(self, speed: float, depth_mm: float) -> Setting | float:
-        """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
+        """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
         depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
         program = sample_program(self.case.at(speed, depth_mm))
@@ -281,7 +281,7 @@ class SettingSearch:
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
 
     def _reduced_depth(self, samples: ProgramSamples, grown: Floats, depth_mm: float) -> float:
-        """A depth (mm) that these draws may let pass, which grow by so much at one (mm) with room (n,)."""
+        """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
         return min(

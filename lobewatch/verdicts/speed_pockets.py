@@ -50,7 +50,7 @@ class SpeedPocket:
 
 
 def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) -> list[SpeedPocket]:
-    """The best pockets of a cut, the largest removal rate first, of a tool that was tapped without force.
+    """Find the best pockets of a cut, the largest removal rate first, for a tool tapped without a force sensor.
 
     By zero order from the modes followed, both of one stiffness; a direction that was not tapped is taken like the
     other. Those narrower than the doubt of f_n are left out. Empty where no such modes are known.
@@ -82,7 +82,7 @@ def _with_arbitrary_stiffness(mode: Mode) -> Mode:
 
 
 def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine) -> float:
-    """Half-width of f_n, relative: of the tap test (95 %), and from one to the next."""
+    """Return the relative half-width of f_n: 95 % error of the tap test, and scatter from one to the next."""
     mode = assembly.without_stiffness[direction]
     error = float(mode.standard_error[0]) * mode.quantile() / mode.frequency
     given = machine.doubt.frequency_percent
@@ -91,13 +91,13 @@ def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine)
 
 
 def format_pockets(best: Sequence[SpeedPocket]) -> str:
-    """Speeds of pockets, for people; windows rounded inwards."""
+    """Format the speeds of pockets; windows are rounded inward."""
     windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
     return ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
 
 
 def speed_pocket_remarks(table: CutTable, name: str, assembly: Assembly, machine: Machine) -> tuple[Remark, ...]:
-    """Remark on the pockets of a cut whose depths are not known; none where none are found."""
+    """Return the remark on pockets with unknown depth, if there are any."""
     best = find_speed_pockets(table, assembly, machine)
     if not best:
         return ()

@@ -42,7 +42,7 @@ class SpindleAtSpeed:
     """Intervals of 95 % with the cuts, alike."""
 
     def scale_modes(self, assembly: Assembly) -> Assembly:
-        """A tool with its modes in the middle of what was learnt; as tapped where nothing was."""
+        """Scale the modes of a tool to the learned median; unchanged where nothing was learned."""
         if self.uncertainty is None:
             return assembly
         count = len(assembly.x or ())
@@ -50,7 +50,7 @@ class SpindleAtSpeed:
         return replace(assembly, x=x, y=y)
 
     def apply_coefficients(self, table: AnyCutTable) -> AnyCutTable:
-        """A cut with the coefficients that were learnt; as it stands in machine.toml where none were."""
+        """Set the learned cutting coefficients of a cut; unchanged where none were learned."""
         if self.uncertainty is None:
             return table
         return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
@@ -61,7 +61,7 @@ NO_TEST_CUTS = SpindleAtSpeed()
 
 
 def _scale_modes(modes: TipModes, factors: Floats) -> TipModes:
-    """Modes with frequency, damping ratio and stiffness times factors (n, 3)."""
+    """Scale frequency, damping ratio and stiffness of modes by factors (n, 3)."""
     return modes and [
         replace(
             mode,

@@ -69,7 +69,7 @@ class LearnedSamples:
     """Kr/Kt over its mean, shape (r,)."""
 
     def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
-        """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
+        """Build samples around a median (a row), at its speed; without: a cause that is left out."""
         take = np.arange(count) % len(self.tangential)
         rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUTS.name)
         force, direction = (
@@ -122,7 +122,7 @@ class Uncertainty:
         return (*self.modes, *across, SPEED.name, COEFFICIENTS.name, *([WEAR.name] if self.wear > 1 else []))
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
-        """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
+        """Sample systems (count rows) around a median one (a row), reproducible by seed.
 
         without: a cause that is taken as known.
         """
@@ -169,13 +169,13 @@ class Uncertainty:
         return self._with_sampled_axes(samples_all, seed, without)
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
-        """With axes drawn from what is open of them."""
+        """Sample the open principal directions."""
         if self.axes is None or not self.axes.are_uncertain or without == CROSS.name:
             return rows
         return replace(rows, vector=self.axes.sample(len(rows), seed))
 
     def _correlated(self, cause: str, uniform: Floats) -> Floats:
-        """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
+        """Correlate the uniform numbers of the tap error, shape (count, n, 4)."""
         return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == TAP_TEST.name else uniform
 
     @property
@@ -184,7 +184,7 @@ class Uncertainty:
 
 
 def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
-    """The doubt of a cut with a tool as it is known at some time, at rest."""
+    """Determine the uncertainty of a cut with a tool that does not rotate."""
     tangential, ratio = _coefficient_ranges(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_tap_correlation(mode) for mode in modes])
@@ -201,13 +201,13 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Largest factor of wear on the cutting coefficients: what the program says, else [doubt]."""
+    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
     said = table.wear if isinstance(table, ProgramTable) else None
     return WEAR_FACTORS[said or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:
-    """Half-widths of the modes by cause, shape (n, 4) each."""
+    """Return half-widths of the modes by cause, shape (n, 4) each."""
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
@@ -225,7 +225,7 @@ def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, 
 
 
 def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Scatter:
-    """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
+    """Return the scatter of the tap tests of a tool in a direction: machine.toml, else the series, else the default."""
     scatter = assembly.scatter(side if side in assembly.directions else assembly.directions[0]) or DEFAULT_TAP_SCATTER
     percents = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
     sizes = [width if wish is None else wish / 100 for width, wish in zip(scatter[:3], percents, strict=True)]
@@ -233,20 +233,20 @@ def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Sc
 
 
 def _prediction_uncertainty(mode: Mode, given: UncertaintyTable) -> tuple[float, float, float, float]:
-    """Half-widths of a mode that is predicted; its phase may be none at all, or twice what it is taken for."""
+    """Return the half-widths of a predicted mode."""
     frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
     return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
 
 
 def _tap_error(mode: Mode) -> Floats:
-    """95 % of the error of the tap test, relative, of the phase in rad; 0 where it is not known."""
+    """Return the 95 % error of the tap test, relative, of the phase in rad; 0 where it is unknown."""
     values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
     error = np.append(mode.standard_error, mode.phase_deg_std)
     return np.asarray(np.nan_to_num(mode.quantile() * error / values))
 
 
 def _tap_correlation(mode: Mode) -> Floats:
-    """Root of the correlations of the errors of a mode whose phase was fitted, shape (4, 4); else 1."""
+    """Return the root of the error correlations of a mode whose phase was fitted, shape (4, 4); else 1."""
     error = np.sqrt(np.diag(mode.joint_covariance))
     if not np.all(error > 0):
         return np.eye(4)
@@ -256,7 +256,7 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Kt and Kr/Kt over the middle: the published range where there is one, else that of [doubt]."""
+    """Return the ranges of Kt and Kr/Kt: published, else by [doubt]."""
     median = machine.coefficients(table)
     if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100

@@ -151,7 +151,7 @@ def evaluate_program(
     at_speed: SpindleAtSpeed = NO_TEST_CUTS,
     result: MonteCarloResult | None = None,
 ) -> Verdict:
-    """The verdict on a program as it stands in machine.toml, or why its tool is not known.
+    """Evaluate a program, or say why it cannot be evaluated.
 
     judgement: that of `run_monte_carlo`, where it is known already.
     """
@@ -202,7 +202,7 @@ def _unknown_verdict(
     assembly: Assembly | None = None,
     further: tuple[Remark, ...] = (),
 ) -> Verdict:
-    """The verdict on a program that cannot be checked."""
+    """Build the verdict on a program that cannot be evaluated."""
     text = "; ".join(map(str, reasons)) or "no modes at the tool tip"
     remark = Remark(NOT_CHECKED_CODE, table.name, f"not checked: {text}")
     return Verdict(table, Stability.UNKNOWN, assembly, remarks=(remark, *further))
@@ -217,12 +217,12 @@ def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
+    """Return whether the compliance is known: both directions tapped, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
 def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] | None:
-    """What is not known of what gives way, and what to do first; None where nothing is left open."""
+    """Return what is unknown of the compliance and what to do first, or None."""
     if len(assembly.directions) < 2:
         return assembly.missing_direction
     if isinstance(table, ProgramTable) and table.thin:

@@ -79,7 +79,7 @@ WHOLE_SIGNAL = CutParts("")
 
 
 def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]:
-    """The cuts in a recording, one at least: without a cut it stands for why there is none.
+    """Find the cuts in a recording; without a cut the only entry gives the reason.
 
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; turn: of the spindle (s).
 
@@ -153,7 +153,7 @@ def _loudness_threshold(level: Floats) -> float:
 def _build_parts(
     axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
 ) -> CutParts:
-    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it; size: of a piece (samples)."""
+    """Build entry, steady part and exit of a stretch of pieces, with its fault; size: of a piece (samples)."""
     step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
     first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
@@ -191,7 +191,7 @@ def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int
 
 
 def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
-    """The power of pieces at the frequencies above `LOWEST`; pieces: shape (pieces, size)."""
+    """Return the power of pieces above `MIN_LOUDNESS_FREQUENCY`; pieces: shape (pieces, size)."""
     size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
     power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(MIN_LOUDNESS_FREQUENCY * size / sample_rate) + 1 :]) ** 2
@@ -199,7 +199,7 @@ def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
 
 
 def _loudness(power: Floats) -> Floats:
-    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies.
+    """Return log10 of the power of each piece over that of the quietest part, averaged over the frequencies.
 
     Mean over frequency, not of logarithms: a light cut is heard in few lines. power: shape (pieces, frequencies).
     """
@@ -215,7 +215,7 @@ def _loudness(power: Floats) -> Floats:
 
 
 def _find_stretches(loud: Flags) -> list[tuple[int, int]]:
-    """First piece and the one after the last of each stretch."""
+    """Return the first piece and the one after the last of each stretch."""
     edge = np.diff(np.concatenate(([0], loud.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))
 
@@ -232,7 +232,7 @@ def _join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tu
 
 
 def _find_longest_air(loud: Sequence[tuple[int, int]], count: int, step: int) -> slice:
-    """The longest part without a cut or a knock."""
+    """Find the longest part without a cut or a knock."""
     ends, begins = [0, *(end + 1 for _, end in loud)], [*(begin for begin, _ in loud), count]
     begin, end = max(zip(ends, begins, strict=True), key=lambda gap: gap[1] - gap[0])
     return slice(begin * step, max(end, begin) * step)

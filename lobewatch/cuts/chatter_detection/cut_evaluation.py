@@ -110,7 +110,7 @@ def evaluate_cut(
     commanded_rpm: float,
     measured_rpm: float | None = None,
 ) -> CutEvaluation:
-    """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
+    """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the lines must not contradict
@@ -127,7 +127,7 @@ def evaluate_cut(
     >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
     >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
     >>> heard = evaluate_cut(cut, air, 10e3, 4, 0.5, 6020.0)
-    >>> heard.word, round(heard.speed_rpm)
+    >>> heard.verdict, round(heard.speed_rpm)
     ('stable', 6000)
     """
     spectra = compute_spectra(cut, sample_rate)
@@ -152,7 +152,7 @@ def evaluate_cut(
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
-    """The word on an axis; a tone alone is looked for in pieces of the air too."""
+    """Evaluate one axis; a tone without sidebands is looked for in pieces of the air, too."""
     lines = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
     unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin_width)
     by_origin = classify_peaks(lines, spectrum, quiet, turning, teeth, unsteady)
@@ -168,7 +168,7 @@ def _evaluate_axis(
 def _find_speed(
     spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
 ) -> SpindleSpeed | CutEvaluation:
-    """The speed of the spindle, or the sound of a cut in which it is not known; commanded in Hz."""
+    """Find the spindle speed, or return the evaluation of a cut without one; commanded in Hz."""
     if measured_rpm is None:
         turning = find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if turning is not None:
@@ -186,7 +186,7 @@ def _find_speed(
 
 
 def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
-    """What is told where nothing is known of air, or where it sounds as the cut does: the speed, and no word."""
+    """Evaluate the speed only, where there is no air or it sounds like the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
     if turning is None:
@@ -200,12 +200,12 @@ def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: fl
 
 
 def _speed_not_found(spectrum: Spectrum, elsewhere: float) -> CutEvaluation:
-    """Of a speed that is not near the one that was set; elsewhere: that which the lines fit (rpm), NaN without one."""
+    """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: speed that fits (rpm), or NaN."""
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=elsewhere)
 
 
 def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
-    """What the word rests on: chatter before anything else, then how loud it is."""
+    """Rank an axis: chatter first, then by energy."""
     if sound.peaks is None:
         return False, 0.0
     if sound.chatter is not None:
@@ -214,7 +214,7 @@ def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
 
 
 def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
-    """The word on an axis whose lines are known."""
+    """Evaluate an axis with classified peaks."""
     lines, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
     if lines is None or turning is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
@@ -244,13 +244,13 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
 
 
 def _chatter_power(chatter: ChatterPeaks) -> float:
-    """Power of the line that names it."""
+    """Return the power of the peak that names the chatter."""
     at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
     return float(chatter.peaks.amplitude[at] ** 2)
 
 
 def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
-    """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
+    """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
     if sound.peaks is None:
         return sound
     power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
@@ -266,7 +266,7 @@ def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float
 
 
 def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
-    """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
+    """Group the peaks by "turns" of the spindle, "tooth" passing, "air" and "chatter"; empty groups are left out."""
     lines, chatter = sound.peaks, sound.chatter
     named: dict[str, SpectralPeaks] = {}
     if lines is not None:
@@ -299,7 +299,7 @@ class CutRecording(NamedTuple):
 
 
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
-    """Tell each cut in a recording; one sound at least, which says why where there is no cut.
+    """Evaluate each cut in a recording; without a cut the only entry gives the reason.
 
     Reasons why one cannot be told are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
@@ -328,13 +328,13 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
 
 
 def _mean_speed(speed: Floats) -> float:
-    """Over the time in which it is known; NaN where it is known in less than half of it."""
+    """Return the mean speed where it is known; NaN where that is less than half of the time."""
     known = speed[np.isfinite(speed)]
     return float(np.mean(known)) if 2 * known.size > speed.size else np.nan
 
 
 def _find_signal_fault(recording: CutRecording, parts: CutParts) -> str:
-    """Why the signal cannot be trusted, a code; empty where it can."""
+    """Return the code of why the signal cannot be trusted; empty if it can."""
     if parts.reason == "too-short":
         return parts.reason
     if recording.clipped is not None and np.any(recording.clipped if parts.reason else recording.clipped[parts.cut]):

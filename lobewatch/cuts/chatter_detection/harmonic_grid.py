@@ -49,7 +49,7 @@ class SpindleSpeed:
 
 
 def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
-    """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
+    """Refine a spindle frequency (Hz) by least squares over its harmonic grid; bin_: bin width of the spectrum (Hz)."""
     speed = SpindleSpeed(frequency, np.inf, 0.0, 0, MAX_GRID_ERRORS**2)
     for tolerance in GRID_TOLERANCES:
         families = find_sideband_families(speed.frequency, lines, tolerance * bin_)
@@ -71,7 +71,7 @@ def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> Spindle
 
 
 def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
-    """Multiples of a frequency (Hz), then the families of the clearest lines that are left; tolerance in Hz."""
+    """Find the harmonics of a frequency (Hz), then the sideband families of the clearest peaks left; tolerance in Hz."""
     order = np.round(lines.frequency / frequency)
     comb = (np.abs(lines.frequency - order * frequency) < tolerance) & (order > 0)
     families = [SidebandFamily(np.flatnonzero(comb), np.zeros(int(comb.sum())), order[comb])]
@@ -94,7 +94,7 @@ def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: fl
 
 
 def _design_rows(family: SidebandFamily, number: int, count: int) -> Floats:
-    """What its lines say of f and of the r of each family, shape (n, count)."""
+    """Return the rows of the least-squares problem for one family, shape (n, count)."""
     rows = np.zeros((family.indices.size, count))
     rows[:, number] = family.sign
     rows[:, 0] = family.order

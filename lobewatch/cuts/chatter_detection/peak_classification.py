@@ -38,7 +38,7 @@ MIN_STEADINESS_PEAKS = 3
 def estimate_unsteadiness(
     signal: Floats, sample_rate: float, lines: SpectralPeaks, turning: SpindleSpeed, bin_: float
 ) -> float:
-    """By how much the speed varies, relative; signal of the cut, its lines and their bin (Hz)."""
+    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
     order = np.round(lines.frequency / turning.frequency)
     comb = (
         np.abs(lines.frequency - order * turning.frequency)
@@ -58,7 +58,7 @@ def estimate_unsteadiness(
 
 
 def _speed_change(off: Floats) -> float:
-    """Change of the speed in one part: what most of its multiples agree on, else 0; off: of each, relative."""
+    """Return the speed change that most harmonics of one part agree on, else 0; off: relative, of each."""
     near = off[np.abs(off) < MAX_UNSTEADINESS]
     if near.size < max(MIN_STEADINESS_PEAKS, off.size / 2):
         return 0.0
@@ -121,7 +121,7 @@ def is_in_air(lines: SpectralPeaks, air: Spectrum) -> Flags:
 
 
 def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
-    """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
+    """Add intermittent tones of the air near frequencies (Hz) to its spectrum.
 
     signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
     does what passes by 40 Hz in a piece or faster, as a multiple of a spindle that is slowing down.
@@ -141,13 +141,13 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
 
 
 def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
-    """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
+    """Return the bins within a reach of some, none beyond the last; shape (n, 2 reach + 1)."""
     places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
     return np.asarray(np.clip(places, 0, last))
 
 
 def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
-    """The lines of all axes that are not there in air, without skirts."""
+    """Find the peaks of all axes that are not in air, without skirts."""
     lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
 
@@ -160,7 +160,7 @@ def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bo
 def classify_peaks(
     lines: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
-    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
+    """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
 
     unsteady: by how much the speed varies, relative: multiples are so much wider.
     """
@@ -186,7 +186,7 @@ def classify_peaks(
 def _remove_wavering(
     left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed
 ) -> SpectralPeaks:
-    """What is left but for faint lines that are multiples of a speed that wavers faster than is seen in its lines."""
+    """Remove faint peaks next to spindle harmonics, caused by a speed that wavers quickly."""
     if left.energy > MAX_WAVERING_ENERGY * comb.energy:
         return left
     away = fold_frequency(left.frequency, turning.frequency)
@@ -235,7 +235,7 @@ class ChatterPeaks:
 
 
 def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float) -> ChatterPeaks:
-    """The family that chatter is named by; left: one line at least. All in Hz.
+    """Find the family of peaks that chatter is named by, in Hz; left: at least one unexplained peak.
 
     Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
     taken whose multiples explain the most, and whose displacement, amplitude over frequency squared, is large.
@@ -259,13 +259,13 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float)
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_: float) -> bool:
-    """Whether it has another line k tooth passings away, or one turn: a cut makes them, a pump has none. In Hz."""
+    """Return whether chatter has a peak k tooth passings or one turn away: a cut makes them, a pump does not. In Hz."""
     apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
     return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_))
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
-    """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
+    """Return 1 for peaks that are harmonics of a frequency or their sidebands, else 0, shape (n,)."""
     explained = np.zeros(len(left))
     for order in range(1, CHATTER_HARMONICS + 1):
         apart = sideband_distance(left.frequency, order * frequency, tooth_frequency)

@@ -66,7 +66,7 @@ MIN_AGREEING_PEAKS = 3
 def find_spindle_speed(
     cut: Floats, air: Floats, sample_rate: float, teeth: int, commanded_rpm: float
 ) -> SpindleSpeed | None:
-    """Turns a second in the steady part of a cut, near the speed that was set (rpm); None where too few lines agree.
+    """Find the spindle frequency (Hz) in the steady part of a cut, near the commanded speed (rpm), or None.
 
     cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
 
@@ -99,7 +99,7 @@ def find_speed_of_spectra(
 def _find_speed_by_peaks(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """The speed by what stands clear of the noise."""
+    """Find the speed by peaks clear of the noise."""
     lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     of_cut, first = find_cut_peaks(spectra, air), spectra[0]
     voted = find_speed_by_votes(of_cut, join_peaks(lines), first, teeth, commanded)
@@ -119,7 +119,7 @@ def _find_speed_by_peaks(
 def find_speed_by_votes(
     cut_lines: SpectralPeaks, all_lines: SpectralPeaks, spectrum: Spectrum, teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """Turns a second, near those that were set (Hz); None where too few lines agree.
+    """Find the spindle frequency (Hz) by votes of peaks near the commanded one, or None.
 
     cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two lines, each
     sum and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice:
@@ -156,20 +156,20 @@ def find_speed_by_votes(
 
 
 def _spaced_share(lines: SpectralPeaks, frequency: float, teeth: int, bin_: float) -> float:
-    """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
+    """Return the share of peaks with another one or two turns or teeth away; a wrong frequency has few."""
     apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
     steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
     return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
 
 
 def _vote_peaks(votes: Floats) -> Indices:
-    """Where there are more votes than beside, the most first."""
+    """Return the places of local maxima of the votes, the most votes first."""
     places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, VOTE_PEAK_WIDTH) == votes) & (votes > 0))
     return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]
 
 
 def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:
-    """Votes for each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    """Count the votes for each frequency of a grid (Hz); sharpness: of one peak (Hz)."""
     weight, step = np.log10(lines.clearness), grid[1] - grid[0]
     i, j = np.triu_indices(len(lines), 1)
     spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
@@ -188,7 +188,7 @@ def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
 
 
 def _smooth_votes(votes: Floats, width: float) -> Floats:
-    """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
+    """Spread each vote over its neighbors; width: standard deviation in grid steps."""
     reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
     spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     return np.convolve(votes, spread, "same")
@@ -206,7 +206,7 @@ of pulses that were counted wrong; chosen."""
 def check_tachometer_speed(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, measured: float
 ) -> tuple[SpindleSpeed | None, float]:
-    """Turns a second (Hz) by lines near those of a tachometer, and those that contradict it; NaN: none do.
+    """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
     commanded: as it was set, measured: by the tachometer (Hz). Where it is more than 5 % off what was set, it is
     followed if the lines fit it alone and it is no multiple of that. Where no lines say a speed near it, it is the
@@ -231,7 +231,7 @@ def is_pulse_multiple(ratio: float) -> bool:
 
 
 def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
-    """The speed of the tachometer, of which the lines make none; None where hardly one is a multiple of it."""
+    """Return the speed of the tachometer if some peaks are its harmonics, else None."""
     lines, bin_ = find_cut_peaks(spectra, air), spectra[0].bin_width
     own = fold_frequency(lines.frequency, measured) < PEAK_TOLERANCE * bin_
     if np.count_nonzero(own) < MIN_AGREEING_PEAKS:
@@ -254,7 +254,7 @@ def find_distant_speed(
     heard: SpindleSpeed | None,
     beside: SpectralPeaks | None = None,
 ) -> float:
-    """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
+    """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
     heard: the speed that was found, and beside: lines that are no multiples of it. Only a comb whose multiples
     they are, and on which more lines agree, is one then. That of half of it is none, which chatter of period two makes;
@@ -279,7 +279,7 @@ def find_distant_speed(
 
 
 def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPeaks, bin_: float) -> bool:
-    """Whether most of what is beside the multiples of a speed is on another comb, not that of half of it."""
+    """Return whether most peaks that are no harmonics of a speed fit another comb, not that of half of it."""
     belongs = fold_frequency(beside.frequency, comb.frequency) < PEAK_TOLERANCE * bin_
     is_half = abs(2 * comb.frequency / heard.frequency - 1) < SAME_SPEED_TOLERANCE
     share = np.count_nonzero(belongs) / len(beside), beside[belongs].energy / beside.energy
@@ -287,11 +287,11 @@ def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPea
 
 
 def _rank_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> tuple[float, float]:
-    """Of a comb among others: the tenths of the lines that are its multiples, then its frequency: half has as many."""
+    """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
     comb = refine_comb(frequency, lines, bin_)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
 
 
 def _is_mains_speed(speed: SpindleSpeed, hum: float) -> bool:
-    """Whether a spindle turns as fast as a hum (Hz), or twice: its multiples, or those of period two, are the same."""
+    """Return whether a spindle turns as fast as a hum (Hz), or twice as fast."""
     return any(abs(speed.frequency / (times * hum) - 1) < HUM_TOLERANCE for times in (1, 2))

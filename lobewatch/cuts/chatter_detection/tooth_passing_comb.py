@@ -55,7 +55,7 @@ class Comb(NamedTuple):
 def find_comb(
     lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
 ) -> SpindleSpeed | None:
-    """The comb near a frequency (Hz), up to `around` from it, relative, that explains the most; None without one.
+    """Find the comb within `around` (relative) of a frequency (Hz) that explains the most peaks, or None.
 
     lines: of all axes, without skirts; bin_: of the spectrum (Hz). Each line is a vote for the frequencies that it is a
     multiple of; those of the loudest are compared, after least squares, by the lines that they explain.
@@ -72,7 +72,7 @@ def find_comb(
 def find_distant_comb(
     lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
 ) -> SpindleSpeed | None:
-    """The comb that explains the most, half or twice the frequency (Hz) at most and further than `around` from it.
+    """Find the best comb between half and twice a frequency (Hz), farther than `around` from it, or None.
 
     Of those that explain as many tenths of the lines that of which all are tooth passing, else the highest; none of
     which all multiples have an order in common that the teeth have not: that is a part of another.
@@ -91,19 +91,19 @@ def find_distant_comb(
 
 
 def list_distant_centers(frequency: float, around: float) -> list[float]:
-    """Frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
+    """List frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
     steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
     return [float(centre) for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps]))]
 
 
 def refine_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed | None:
-    """A frequency (Hz) made exact by least squares over its multiples among lines; None where there are none."""
+    """Refine a frequency (Hz) by least squares over its harmonics among peaks; None without any."""
     comb = _fit_comb(frequency, lines, lines.frequency[np.newaxis], bin_)
     return _comb_speed(comb, lines, bin_) if np.any(comb.is_member) else None
 
 
 def _folded_images(lines: SpectralPeaks, sample_rate: float) -> Floats:
-    """What may have been folded to each line (Hz), itself first; shape (images, n)."""
+    """Return the frequencies that may have been folded to each peak (Hz), itself first; shape (images, n)."""
     heard = lines.frequency
     return np.stack([heard, sample_rate - heard, sample_rate + heard, 2 * sample_rate - heard])
 
@@ -119,7 +119,7 @@ def _find_best_comb(lines: SpectralPeaks, images: Floats, bin_: float, frequency
 
 
 def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float) -> Floats:
-    """Frequencies (Hz) that the loudest lines are multiples of."""
+    """Return the frequencies (Hz) that the loudest peaks are harmonics of."""
     loudest = lines.frequency[:MAX_COMB_ANCHORS]
     orders = np.arange(1, int(np.max(loudest, initial=0.0) / frequency / (1 - around)) + 1)
     parts = (loudest[:, np.newaxis] / orders).ravel()
@@ -127,7 +127,7 @@ def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float
 
 
 def _fit_comb(frequency: float, lines: SpectralPeaks, images: Floats, bin_: float) -> Comb:
-    """A frequency made exact by least squares over its multiples."""
+    """Fit a frequency by least squares to its harmonics."""
     comb = _build_comb(frequency, images, bin_)
     for _ in range(COMB_FIT_STEPS):
         if not np.any(comb.is_member):
@@ -147,12 +147,12 @@ def _build_comb(frequency: float, images: Floats, bin_: float) -> Comb:
 
 
 def _peak_error(lines: SpectralPeaks, bin_: float) -> Floats:
-    """Standard error of each line (Hz), with what the speed wavers by."""
+    """Return the standard error of each peak (Hz), with the variation of the speed."""
     return np.hypot(lines.frequency_error(bin_), COMB_SPEED_WAVER * lines.frequency)
 
 
 def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, teeth: int, around: float) -> float:
-    """How many of all combs that are tried would have as many multiples among lines that lie anywhere.
+    """Return how many of all combs tried would have as many harmonics among random peaks.
 
     Multiples of tooth passing alone are so much rarer.
     """
@@ -205,7 +205,7 @@ def find_comb_by_sum(
     around: float,
     usual: float = 1.0,
 ) -> SpindleSpeed | None:
-    """The comb near a frequency (Hz), up to `around` from it, relative, that is loudest over noise; None without one.
+    """Find the comb within `around` (relative) of a frequency (Hz) that is loudest over the noise, or None.
 
     spectra and air: of each axis; what is no louder than in air does not count. lines: those that stand clear, of all
     axes; where they are many, they settle it, and there is one on a multiple of anything. The mean over all axes of
@@ -237,7 +237,7 @@ def find_comb_by_sum(
 
 
 def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
-    """log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, in the mean of all axes, 0 to `MOST`; 0 where it is of air."""
+    """Return log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, the mean of all axes; 0 where it is air."""
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):
         above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
@@ -249,7 +249,7 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
 
 
 def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
-    """Whether the multiples that are heard have an order in common that the teeth have not: it is another's comb."""
+    """Return whether the harmonics share an order that the teeth do not: the comb belongs to another frequency."""
     orders = np.arange(1, heard.size + 1)
     return any(
         _sum_chance(heard[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
@@ -257,7 +257,7 @@ def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
 
 
 def _sum_chance(heard: Floats, values: Floats) -> float:
-    """How often as many of the values, drawn anywhere, have a sum as large; noise is among them, if they are few."""
+    """Return how often random values have a sum as large."""
     count, level = heard.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
     share = (
         np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)

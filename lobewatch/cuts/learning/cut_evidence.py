@@ -40,7 +40,7 @@ class PowerEvidence:
 
 
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
-    """What a power says of a cut in a material."""
+    """Estimate Kt from the drive power of a cut in a material."""
     of_edges = power.edge_share / (1 + power.edge_share)
     common = math.hypot(
         DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
@@ -88,7 +88,7 @@ class CutEvidence:
         return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
     def is_repeat_of(self, other: CutEvidence) -> bool:
-        """Whether another cut is this one made again: of one program, in one material, at one speed and depth."""
+        """Return whether another cut repeats this one: same program, material, speed and depth."""
         near = abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
         same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)
         return near and same and abs(math.log(other.depth / self.depth)) < REPEAT_DEPTH_TOLERANCE
@@ -119,7 +119,7 @@ REJECTED_DEPTH_TOLERANCE = 0.10
 def is_setting_taken(
     speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence] = ()
 ) -> bool:
-    """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since.
+    """Return whether chatter was recorded at a setting (rpm, m) or hardly deeper, and no stable cut there since.
 
     doubted: cuts that are not believed, which take more.
     """
@@ -133,7 +133,7 @@ def is_setting_taken(
 
 
 def find_cut_to_repeat(cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence]) -> CutEvidence | None:
-    """The first cut that is not believed and was made once only; None where there is none."""
+    """Find the first rejected cut that was made only once, or None."""
     for cut in cuts:
         if cut in rejected and sum(cut.is_repeat_of(other) for other in cuts) == 1:
             return cut

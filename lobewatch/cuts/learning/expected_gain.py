@@ -48,16 +48,16 @@ class CutGrid:
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
     def contains(self, speed: float) -> bool:
-        """Whether a speed (rpm) lies within, as far as a heard one may be off."""
+        """Return whether a speed (rpm) lies within the grid, with the tolerance of a recorded speed."""
         return bool(self.speeds[0] * (1 - SPEED_GRID_STEP) <= speed <= self.speeds[-1] * (1 + SPEED_GRID_STEP))
 
     def build_evidence(self, speed: float, depth: float, word: CutVerdict = "stable") -> CutEvidence:
-        """A cut of it."""
+        """Build the evidence of a cut with this program."""
         return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 
 
 def list_speeds(low: float, high: float) -> Floats:
-    """Speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
+    """List the speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
     number = max(int(np.log(high / low) / SPEED_GRID_STEP) + 1, 2)
     return np.unique(
         np.clip(np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM, low, high)
@@ -65,14 +65,14 @@ def list_speeds(low: float, high: float) -> Floats:
 
 
 def floor_depth(depth: float) -> float:
-    """The deepest depth (m) that can be set and is not deeper."""
+    """Round a depth (m) down to one that can be set."""
     return round(math.floor(depth * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING) * TRIED_DEPTH_STEP_MM, 6) / 1e3
 
 
 def compare_zero_order(
     x: TipModes, y: TipModes, cut: Cut, feed_angles: tuple[float, ...], speeds: Floats, deepest: float
 ) -> Floats:
-    """True limit over that by zero order at speeds (rpm), shape (s,); 1 where neither is less than a depth (m).
+    """Return the true limit over the zero-order limit at speeds (rpm), shape (s,).
 
     x and y: modes of the spindle in the middle. Semi-discretisation at fewer speeds, between them interpolated.
     """
@@ -124,7 +124,7 @@ class LimitCharts:
 
     @classmethod
     def of(cls, samples: SpindleSamples, grid: CutGrid) -> LimitCharts:
-        """Limits of draws at speed."""
+        """Compute the limits of samples at speed."""
         rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
         fed = [
@@ -144,7 +144,7 @@ class LimitCharts:
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def true_best_rates(self, cuts: Sequence[CutEvidence]) -> Floats:
-        """Largest removal rate (rpm m) of the cuts that were heard stable and are so, in each draw, shape (r,)."""
+        """Return the largest removal rate (rpm m) of cuts that are truly stable in each sample, shape (r,)."""
         best = np.zeros(len(self.limits))
         for cut in cuts:
             if not cut.has_chatter:
@@ -152,7 +152,7 @@ class LimitCharts:
         return best
 
     def is_label_wrong(self, cut: CutEvidence) -> Flags:
-        """Whether the word of a cut is wrong in each draw, shape (r,)."""
+        """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
         excess = np.log(cut.depth / self.limits[:, row])
         return np.asarray(
@@ -162,8 +162,7 @@ class LimitCharts:
         )
 
     def expected_gains(self, weights: Floats, best: float | Floats) -> Floats:
-        """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,); best: that so far, of each
-        draw or of all."""
+        """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
         more = self.removal_rates > np.min(best)
         speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
         order, chips = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
@@ -177,7 +176,7 @@ class LimitCharts:
         return best_gains
 
     def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
-        """Speeds, by their place, and depths (m) that are worth looking at."""
+        """Yield candidate speeds, by their place, and depths (m)."""
         gains = self.expected_gains(np.full(len(self.limits), 1 / len(self.limits)), best)
         places = list[int]()
         for row in np.argsort(-gains).tolist():
@@ -196,8 +195,7 @@ class LimitCharts:
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
-        """Worth of a cut (rpm m): what it gains, and where more are left what the best next one gains then; best: as
-        for `gains`."""
+        """Return the worth of a cut (rpm m): its own gain, and that of the best next cut."""
         stable = self.limits[:, row] >= depth - EQUAL_DEPTH_TOLERANCE
         chance, chips = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
         if chance <= MIN_STABLE_PROBABILITY:
@@ -209,7 +207,7 @@ class LimitCharts:
         return gain + after + (1 - chance) * self._gain_after_chatter(row, ~stable, best)
 
     def _gain_after_chatter(self, row: int, chatters: Flags, best: float | Floats) -> float:
-        """Gain of the next cut, over frequencies that may be heard."""
+        """Return the gain of the next cut, averaged over possible chatter frequencies."""
         places = np.flatnonzero(chatters)
         if not places.size:
             return 0.0
@@ -227,5 +225,5 @@ class LimitCharts:
         return float(np.mean(gains))
 
     def _next_gain(self, weights: Floats, best: float | Floats) -> float:
-        """Gain of the best cut at any speed (rpm m)."""
+        """Return the gain of the best cut at any speed (rpm m)."""
         return float(np.max(self.expected_gains(weights, best)))

@@ -56,13 +56,13 @@ class InconsistentCut:
 
 
 def wrong_label_probability(evidence: NewEvidence) -> float:
-    """Chance that the word of a cut is wrong under spindles that explain all."""
+    """Return the probability that the verdict of a cut is wrong on spindles that explain all cuts."""
     cut, before = evidence.cut, evidence.prior
     return float(np.sum(before.weights * mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))))
 
 
 def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
-    """What is wrong with a cut under spindles that explain all; None where nothing is."""
+    """Find what contradicts a cut on spindles that explain all cuts, or None."""
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
     wrong = wrong_label_probability(evidence)
     if np.isfinite(cut.frequency) and cut.has_chatter:
@@ -79,7 +79,7 @@ def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
 
 
 def is_power_inconsistent(evidence: NewEvidence) -> bool:
-    """Whether the power of a cut says another Kt than all that was known before."""
+    """Return whether the power of a cut implies another Kt than all earlier cuts."""
     cut, before = evidence.cut, evidence.prior
     if cut.power is None:
         return False
@@ -91,7 +91,7 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
 
 
 def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
-    """Cuts that are not believed, of those that were learnt from: each counts as its chance to be right says."""
+    """Find the cuts to reject, of those that were learned from."""
     few = posterior.resample(N_CHECK_SAMPLES)
     rejected = (find_contradiction(few.predict(cut)) for cut in posterior.cuts)
     return tuple(uncertainty for uncertainty in rejected if uncertainty is not None)
@@ -100,7 +100,7 @@ def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
 def inconsistent_cut_remarks(
     posterior: Posterior, contradicting: Sequence[InconsistentCut], about: str
 ) -> Iterator[Remark]:
-    """What was left out, and where the spindle is not what it was tapped as; about: the program."""
+    """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, contradicting)
     if posterior.is_frequency_unusual:
         between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
@@ -109,12 +109,12 @@ def inconsistent_cut_remarks(
 
 
 def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
-    """The same cut as it was made at other times."""
+    """Return the same cut as made at other times."""
     return [other for other in posterior.cuts if other is not cut and cut.is_repeat_of(other)]
 
 
 def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
-    """Remark on a cut that is not believed."""
+    """Build the remark on a rejected cut."""
     cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""

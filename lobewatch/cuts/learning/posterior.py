@@ -54,7 +54,7 @@ class Interval(NamedTuple):
     """Weighted standard deviation."""
 
     def no_narrower(self, low: float, high: float) -> Interval:
-        """An interval that has both of these inside."""
+        """Return an interval that includes both values."""
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
@@ -111,24 +111,24 @@ class Posterior:
         )
 
     def learn_from(self, cut: CutEvidence) -> Posterior:
-        """What is known after one more cut."""
+        """Update with one more cut."""
         return self.predict(cut).update()
 
     def predict(self, cut: CutEvidence) -> NewEvidence:
-        """A cut, and what it would sound like on the spindles that are not ruled out."""
+        """Predict a cut on the samples that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
         samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
         before = replace(self, samples=samples, log_weight=self.log_weight[likely])
         return NewEvidence(before, cut, predict_cut(cut, samples))
 
     def draw(self, count: int) -> SpindleSamples:
-        """Draws of equal weight."""
+        """Draw samples of equal weight."""
         return self.samples[
             _resample_indices(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))
         ]
 
     def resample(self, count: int) -> Posterior:
-        """The same by so many draws of equal weight."""
+        """Resample to a number of samples of equal weight."""
         return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
 
 
@@ -144,7 +144,7 @@ class NewEvidence:
     """Sound that each of these draws would make in it."""
 
     def update(self) -> Posterior:
-        """What is known with it."""
+        """Update the posterior with the cut."""
         log_weight = self.prior.log_weight + _cut_log_likelihood(
             self.cut, self.prior.samples, self.prediction, self.prior.cuts
         )
@@ -155,7 +155,7 @@ class NewEvidence:
 def build_prior(
     median: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0
 ) -> Posterior:
-    """What is known before the first cut.
+    """Build the posterior before the first cut.
 
     middle: the spindle at rest in the middle of the doubt (a row).
     """
@@ -165,8 +165,7 @@ def build_prior(
 def _cut_log_likelihood(
     cut: CutEvidence, samples: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
 ) -> Floats:
-    """Logarithm of the likelihood of one cut after those before it; the word of an old one counts less, the more the
-    frequency has moved since."""
+    """Return the log likelihood of one cut after those before it; an old cut counts less."""
     word = log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
     return cut.weight * word + power_log_likelihood(cut, samples.force_factors(cut.material), before)
 
@@ -177,7 +176,7 @@ def _normalize_weights(log_weight: Floats) -> Floats:
 
 
 def _refresh(posterior: Posterior) -> Posterior:
-    """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
+    """Resample to equal weights, and move each sample by Metropolis-Hastings steps."""
     weights, samples, cuts = posterior.weights, posterior.samples, posterior.cuts
     random = np.random.default_rng((posterior.seed, 3, len(cuts)))
     spread = np.cov(samples.normal.T, aweights=weights) + ADDED_VARIANCE * np.eye(samples.normal.shape[1])
@@ -197,7 +196,7 @@ def _refresh(posterior: Posterior) -> Posterior:
 
 
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
-    """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
+    """Return the log of prior times likelihood of all cuts; -inf where that is not above the least (r,).
 
     A draw that cannot come to more any more is not asked about further cuts.
     """
@@ -213,7 +212,7 @@ def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], lea
 
 
 def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> Indices:
-    """Places drawn by weight, systematically: each as often as its weight says, but for one."""
+    """Draw indices by weight, systematically: each as often as its weight says, give or take one."""
     at = (np.arange(count) + random.uniform()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), at), weights.size - 1)
 

@@ -55,15 +55,13 @@ class SpindleSamples:
     """Doubt that the coefficients were drawn from."""
 
     def __len__(self) -> int:
-        """Number of draws."""
         return len(self.normal)
 
     def __getitem__(self, places: Indices | slice) -> SpindleSamples:
-        """Some of them."""
         return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
     def with_materials(self, count: int, seed: int) -> SpindleSamples:
-        """The same with coefficients of so many materials at least, new ones as the prior has them."""
+        """Add cutting coefficients from the prior until there are `count` materials."""
         missing = self._material_index(count) - self.normal.shape[1]
         if missing <= 0:
             return self
@@ -71,7 +69,7 @@ class SpindleSamples:
         return replace(self, normal=np.hstack((self.normal, more)))
 
     def ratios(self) -> dict[str, Floats]:
-        """What differs from rest as factors: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each.
+        """Return all learned factors by name: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each.
 
         "frequency_x" is that of the mode in x which gives way most, "frequency_x_2" of the next.
         """
@@ -88,7 +86,7 @@ class SpindleSamples:
         return values
 
     def force_factors(self, material: int) -> Floats:
-        """Factors of Kt of a material, shape (r,)."""
+        """Return the factors of Kt of a material, shape (r,)."""
         first, rejected = self._material_index(material), self.uncertainty.tangential
         at_speed, normal = self.normal[:, first : first + 2].T
         force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
@@ -97,7 +95,7 @@ class SpindleSamples:
         )
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
-        """Spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
+        """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._side_factors()[:, self.at_rest.axes[self.at_rest.direction]]
         push, ratio = self._coefficient_factors(material, tangential, radial)
         return replace(
@@ -143,7 +141,7 @@ class SpindleSamples:
 
 
 def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
-    """Draws from the prior around a spindle at rest (a row), the same for a seed."""
+    """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     normal = np.random.default_rng((seed, 2)).standard_normal(
         (count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL)
@@ -152,12 +150,12 @@ def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed
 
 
 def _count_spindle_numbers(rows: MillingRows) -> int:
-    """Number of numbers of a draw that are not of a material."""
+    """Return the count of normal numbers per sample that belong to the spindle."""
     return rows.direction.size + NUMBERS_PER_SPINDLE
 
 
 def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:
-    """Factors on a ratio Kr/Kt below which shares of the prior lie: within its doubt, or anything from 0 to 1.
+    """Return factors of Kr/Kt at probabilities: uniform within its range, or with some probability from 0 to 1.
 
     Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as doubted.
     """
@@ -172,13 +170,13 @@ def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) ->
 
 
 def _to_heavy_tailed(normal: Floats) -> Floats:
-    """Standard normal numbers as those of a mixture of which a share is wider, of the same order."""
+    """Map standard normal numbers to a mixture with heavy tails, in the same order."""
     return np.asarray(np.interp(normal, *_mixture_quantiles()))
 
 
 @cache
 def _mixture_quantiles() -> tuple[Floats, Floats]:
-    """Standard normal numbers, and those of the mixture that as many lie below."""
+    """Return standard normal numbers and the mixture quantiles of the same probabilities."""
     value = np.linspace(-MIXTURE_TABLE_END, MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS)
     beyond = (1 - WIDE_FREQUENCY_SHARE) * scipy.special.ndtr(
         -np.abs(value)

@@ -70,14 +70,14 @@ class NextCut:
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:
-    """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
+    """Find a program of machine.toml by its name or the beginning of it; ValueError if there is none."""
     return find_by_name({table.name: table for table in machine.program}, name)
 
 
 def learn_program(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
 ) -> LearningResult:
-    """Learn from the cuts of a machine; those of other tools say nothing of this one."""
+    """Learn from the cuts of a machine; cuts of other tools do not count."""
     start = build_prior(
         build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
     )
@@ -96,7 +96,7 @@ def learn_program(
 def find_next_cut(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
 ) -> NextCut:
-    """The next test cut of a program of which so many shall be made at most."""
+    """Find the next test cut of a program, of `most` cuts."""
     learning = learn_program(table, assembly, machine, cuts)
     left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
@@ -108,7 +108,7 @@ def find_next_cut(
 
 
 def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:
-    """Speeds of the machine, and depths that tool and drive allow."""
+    """Build the grid of speeds and the depths that tool and drive allow."""
     reach = CutRange.of(machine, table)
     speeds = reach.speeds(SPEED_GRID_STEP)
     deepest = reach.depth_limits(speeds) / 1e3
@@ -120,7 +120,7 @@ def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) ->
 def collect_tool_evidence(
     cuts: Sequence[CutEntry], table: ProgramTable, assembly: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
-    """The cuts of the same tool that count, oldest first."""
+    """Collect the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
     evidence = []
@@ -152,7 +152,7 @@ def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvid
 
 
 def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
-    """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where not known."""
+    """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
     pairs = [
         (interpolate_frequency(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series
     ]

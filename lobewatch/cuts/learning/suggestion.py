@@ -52,7 +52,7 @@ class Suggestion:
 
 
 def find_best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
-    """Largest speed times depth (rpm m) that was heard stable; 0 where none was."""
+    """Return the largest stable speed times depth (rpm m); 0 without a stable cut."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.has_chatter), default=0.0)
 
 
@@ -64,7 +64,7 @@ def suggest_cut(
     rejected: Collection[CutEvidence] = (),
     programmed: float = 0.0,
 ) -> Suggestion | None:
-    """The next test cut; None where nothing more is to be gained.
+    """Suggest the next test cut, or None if nothing more can be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
     are not believed. One of those that lies within the grid is made again, once, but for a stable one with the last
@@ -102,7 +102,7 @@ def suggest_cut(
 def _find_repeat(
     few: Posterior, cuts: Sequence[CutEvidence], left: int, rejected: Collection[CutEvidence]
 ) -> CutEvidence | None:
-    """The cut whose word is to be asked for again; None where all are sure enough, or were asked for.
+    """Find the cut whose verdict is worth a repetition, or None.
 
     The last cut makes none again whose word "stable" is not believed: that would gain nothing.
     """
@@ -120,7 +120,7 @@ def _find_repeat(
 def _find_likely_stable(
     grid: CutGrid, speed: float, depth: float, best: float, samples: SpindleSamples, careful_from: float
 ) -> Suggestion | None:
-    """The cut, or one not as deep where it is more likely to chatter than not; deeper than careful_from (m) hardly."""
+    """Find the cut, or a shallower one, that is likely stable; deeper than careful_from (m) with little risk."""
     nearby = (1.0,) if is_force_constant(grid.cut) else TRIED_DEPTH_SHARES
     for share in nearby if depth <= careful_from else FIRST_CUT_DEPTH_SHARES:
         deep = floor_depth(share * depth)
@@ -134,7 +134,7 @@ def _find_likely_stable(
 
 
 def _build_suggestion(grid: CutGrid, speed: float, depth: float, best: float, samples: SpindleSamples) -> Suggestion:
-    """A cut with what it promises."""
+    """Build the suggestion of a cut."""
     prediction = predict_cut(grid.build_evidence(speed, depth), samples)
     chance = float(np.mean(prediction.chatter_probability))
     gain = (1 - chance) * (speed * depth - best)
@@ -143,7 +143,7 @@ def _build_suggestion(grid: CutGrid, speed: float, depth: float, best: float, sa
 
 
 def _most_informative(ratios: Mapping[str, Floats], chance: Floats) -> str:
-    """Name of what differs most, in its standard deviations, between spindles on which a cut chatters and others."""
+    """Return the factor that differs most, in its standard deviations, between stable and chattering samples."""
     contrast = {}
     for name, values in ratios.items():
         chatters, stable = (float(np.sum(values * share) / np.sum(share)) for share in (chance, 1 - chance))

@@ -33,7 +33,7 @@ INTERVAL_QUANTILES = (0.025, 0.975)
 def evaluate_at_speed(
     table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
 ) -> Verdict:
-    """The verdict on a program, or why its tool is not known; at speed as far as cuts have taught, else at rest."""
+    """Evaluate a program, at speed as far as cuts have been learned from."""
     posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
     verdict = evaluate_program(table, tool, machine, posterior)
     if isinstance(tool, DataError) or tool.directions or not tool.without_stiffness:
@@ -42,7 +42,7 @@ def evaluate_at_speed(
 
 
 def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> SpindleAtSpeed:
-    """What cuts have taught of a program and its spindle; nothing of the reference cut."""
+    """Learn the spindle at speed from the cuts of a program; nothing for the reference cut."""
     if not isinstance(table, ProgramTable) or not tool.directions:
         return NO_TEST_CUTS
     if not any(cut.tool == table.tool and cut.is_usable for cut in cuts):
@@ -57,7 +57,7 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Seque
 def _build_spindle(
     learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
 ) -> SpindleAtSpeed:
-    """The middle of what a lesson has left, and the draws around it."""
+    """Build the spindle at speed from a learning result."""
     at_rest, samples = (
         build_median_row(build_program(learning.program, machine), tool),
         learning.posterior.draw(N_PROGRAM_SAMPLES),
@@ -96,7 +96,7 @@ def _build_spindle(
 
 
 def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
-    """Half-widths of 95 % of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
+    """Return 95 % half-widths of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
     relative = [
         np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
     ]
@@ -104,12 +104,12 @@ def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
 
 
 def _factor_ranges(posterior: Posterior) -> dict[str, FactorRange]:
-    """Intervals of all that is learnt, over the values at rest."""
+    """Return the intervals of all learned factors."""
     return {name: FactorRange(interval.low, interval.high) for name, interval in posterior.intervals.items()}
 
 
 def _factor_range(values: Floats) -> FactorRange:
-    """95 % of some draws over their mean."""
+    """Return the 95 % range of samples over their mean."""
     low, high = np.quantile(values, INTERVAL_QUANTILES) / np.mean(values) if np.mean(values) > 0 else (1.0, 1.0)
     return FactorRange(min(float(low), 1.0), max(float(high), 1.0))
 
@@ -126,7 +126,7 @@ class LobesAtSpeed(NamedTuple):
 
 
 def compute_lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:
-    """The lobes of programs with the same cut, from their verdicts; None where no test cut has taught anything."""
+    """Compute the lobes of programs with the same cut, or None without learned test cuts."""
     for verdict in verdicts:
         tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
         if tool is None or not at_speed.n_cuts:

@@ -23,4 +23,4 @@ def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: 
     assert np.all(np.isfinite(expected))
     assert np.asarray(columns["program_limit"])[1] == pytest.approx(expected)
     assert np.all(np.isnan(np.asarray(columns["program_limit"])[0]))
-    assert list(columns["program_verdict"]) == ["", "\n".join(rulings[name].word for name in "ABC")]
+    assert list(columns["program_verdict"]) == ["", "\n".join(rulings[name].stability for name in "ABC")]

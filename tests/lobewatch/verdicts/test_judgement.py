@@ -18,7 +18,7 @@ DEPTH = 3.6
 
 
 def mode(frequency: float, stiffness: float, error: float) -> Mode:
-    """A mode whose stiffness is known with a relative standard error."""
+    """Build a mode with a relative standard error of its stiffness."""
     errors = np.array([1e-4 * frequency, 3e-5, error * stiffness])
     return Mode(frequency, 0.03, stiffness, covariance=np.diag(errors**2))
 

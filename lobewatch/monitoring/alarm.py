@@ -1,4 +1,4 @@
-"""Alarms: raised and closed by what was measured, acknowledged by a person.
+"""Alarms: triggered and closed by what was measured, acknowledged by a person.
 
 Imported with every look at a plant, so without numpy.
 """
@@ -17,14 +17,14 @@ from lobewatch.machine.journal.entries import Acknowledgement, format_alarm_id
 
 
 class Alarm(msgspec.Struct, frozen=True):
-    """A reason that rings. Its identity is what rings, of what, and the tap test that first raised it."""
+    """A reason with an active alarm. Its identity is the alarm, of what, and the tap test that first triggered it."""
 
     code: str
     """Code of the reason."""
     about: str
     """Series or program."""
     triggered_by: str
-    """Identity of the tap test that raised it."""
+    """Identity of the tap test that triggered it."""
     triggered_at: datetime
     """Time of that tap test."""
     acknowledgement: Acknowledgement | None = None
@@ -63,7 +63,7 @@ class Alarm(msgspec.Struct, frozen=True):
 
 
 class TriggeredAlarm(NamedTuple):
-    """A reason that rings, and the tap test that first raised it."""
+    """A reason with an active alarm, and the tap test that first triggered it."""
 
     remark: Remark
     """Reason."""

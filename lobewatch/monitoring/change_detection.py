@@ -1,15 +1,15 @@
 """Detect drops and rises in a series with a change-point model.
 
-Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality
-Technology 35(4), with hinges beside the steps, one-sided.
+Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality Technology
+35(4), with hinges beside the steps, one-sided.
 
-anew.
+again.
 
-Two points running that are sure of a fall raise an alarm; four running that are not close it. Nothing else does: no
-rise, and nothing that was done to the machine. A sure rise begins the watch anew at the point that was sure of it, for
-among the lower points before no fall would be seen any more. (From where it seems to have risen, chance rises would
-begin it at their highest points, and a third of them would end as a fall.) An alarm that is open goes on to be judged
-by its own watch.
+Two points running that are sure of a drop trigger an alarm; four running that are not close it. Nothing else does:
+no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of
+it, for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance
+rises would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on
+to be evaluated by its own monitor.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
 MIN_MONITORED_POINTS = 9
-"""Number of points before which nothing is judged; chosen."""
+"""Number of points before which nothing is evaluated; chosen."""
 MIN_POINTS_WITH_PRIOR = 5
 """The same where something is known of the scatter beforehand; chosen."""
 SURE_CHANGE_SCORE = 3.3
-"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is looked at."""
+"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is checked."""
 MIN_SHARED_CHANGE = 0.5
 """Least share of what two series did on the mean that one of them did, where that counts for it; chosen."""
 SCORE_BLOCK_ROWS = 64
-"""Number of points that are judged at once, to bound the memory."""
+"""Number of points that are evaluated at once, to bound the memory."""
 
 ChangeKind = Literal["step", "slope"]
 CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
@@ -47,11 +47,11 @@ class SeriesChange(NamedTuple):
     """A change of a series, as it is fitted to a number of its points."""
 
     kind: ChangeKind
-    """Kind: fallen at once, or falling since."""
+    """Kind: dropped at once, or falling since."""
     point: int
     """Index of the first point after the step, or of the last one before the slope."""
     size: float
-    """Fall from there to the last point fitted, in the unit of the series."""
+    """Drop from there to the last point fitted, in the unit of the series."""
     half_width: float
     """Half the width of the 95 % interval of the size."""
 
@@ -64,11 +64,11 @@ class LikeliestChange(NamedTuple):
     is_step: Flags
     """Whether the change is a step, shape (r,)."""
     point: Indices
-    """Index of its point as in Fall, shape (r,)."""
+    """Index of its point as in Drop, shape (r,)."""
 
     @classmethod
     def of_none(cls, n: int) -> Self:
-        """Where no point is judged."""
+        """Where no point is evaluated."""
         return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
 
 
@@ -79,9 +79,9 @@ class ChangeMonitor:
     level_model: LevelModel
     """Base of the fits."""
     change: LikeliestChange
-    """Likeliest change up to each point; the score of the first ones, which are not judged, is NaN."""
+    """Likeliest change up to each point; the score of the first ones, which are not evaluated, is NaN."""
     sign: int
-    """1 where it looks for falls, -1 where for rises."""
+    """1 where it detects drops, -1 where for rises."""
 
     @property
     def scores(self) -> Floats:
@@ -129,7 +129,7 @@ def monitor_drops(readings: Readings) -> ChangeMonitor:
 def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMonitor]:
     """Monitor a series for drops, and its mirror image for rises.
 
-    What the mean of both directions did is looked at beside what the one did alone.
+    What the mean of both directions did is checked beside what the one did alone.
     """
     base, common, shared = (
         build_level_model(readings),
@@ -188,7 +188,7 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
 
 
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
-    """Find where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): drops, rises."""
+    """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
     points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
     for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
@@ -221,18 +221,18 @@ def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -
 
 
 N_CLOSING_POINTS = 4
-"""Points running, none of them sure of the fall, that close an alarm; chosen."""
+"""Points running, none of them sure of the drop, that close an alarm; chosen."""
 
 
 class DetectedDrop(NamedTuple):
-    """A fall that has raised an alarm; points by their index in the series."""
+    """A drop that has triggered an alarm; points by their index in the series."""
 
     triggered_at: int
-    """Point that raised it, the second one running that was sure."""
+    """Point that triggered it, the second one running that was sure."""
     closed_at: int | None
     """Point that closed it; None while it is open."""
     change: SeriesChange
-    """Kind and beginning as they were when it was raised, size as it is now."""
+    """Kind and beginning as they were when it was triggered, size as it is now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,11 +240,11 @@ class Detection:
     """What has been seen of a series."""
 
     scores: Floats
-    """Score of each point in the watch of its time, shape (n,); NaN for the first 8 points of a watch."""
+    """Score of each point in the monitor of its time, shape (n,); NaN for the first 8 points of a monitor."""
     drops: tuple[DetectedDrop, ...]
-    """Falls that have raised an alarm, oldest first."""
+    """Drops that have triggered an alarm, oldest first."""
     rise: SeriesChange | None
-    """Newest sure rise, which the watch began anew with, its size positive; None where there is none."""
+    """Newest sure rise, which restarted the monitor, its size positive; None where there is none."""
 
     @property
     def open_drops(self) -> tuple[DetectedDrop, ...]:
@@ -253,7 +253,7 @@ class Detection:
 
     @property
     def needs_repeat(self) -> bool:
-        """Whether the newest point alone is sure of a fall."""
+        """Whether the newest point alone is sure of a drop."""
         return not self.open_drops and self.scores.size > 0 and bool(self.scores[-1] >= SURE_CHANGE_SCORE)
 
 

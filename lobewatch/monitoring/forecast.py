@@ -1,8 +1,8 @@
 """When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
 
 Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
-averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No random
-numbers.
+averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No
+random numbers.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from lobewatch.monitoring.trend_shapes import (
 )
 
 MIN_FORECAST_POINTS = 8
-"""Number of points from which on anything is foretold; chosen."""
+"""Number of points from which on anything is forecast; chosen."""
 CROSSING_QUANTILES = (0.1, 0.5, 0.9)
 """Probabilities at which a level counts as reached: earliest, probable and latest date; chosen."""
 N_FORECAST_DATES = 241
-"""Number of dates looked at up to the horizon; between them the probability is interpolated."""
+"""Number of dates checked up to the horizon; between them the probability is interpolated."""
 
 DROPPED_SHAPE_WEIGHT = 1e-3
 """Weight that all shapes that are left out have together."""
@@ -43,7 +43,7 @@ NEGLIGIBLE_PROBABILITY = 1e-12
 RATE_QUANTILES = (0.025, 0.975)
 """Probabilities of the interval of a rate."""
 QUANTILE_HALVINGS = 40
-"""Halvings of the range in which a quantile is looked for."""
+"""Halvings of the range in which a quantile is searched."""
 FAN_STANDARD_ERRORS = 50
 """Standard errors around the means within which any level of a fan lies."""
 
@@ -66,7 +66,7 @@ class Rate(NamedTuple):
     """Rate of change of a series at its last point, in its unit for one of its dates."""
 
     value: float
-    """Mean of the mixture; negative where it falls."""
+    """Mean of the mixture; negative where it drops."""
     low: float
     """2.5 % quantile."""
     high: float
@@ -75,7 +75,7 @@ class Rate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """The mixture of all courses that a series may take."""
+    """The mixture of all trends that a series may take."""
 
     shapes: tuple[TrendShape, ...]
     """Shapes that were fitted, j of them."""
@@ -139,7 +139,8 @@ class Forecast:
 def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
     """Forecast a series y (n,) over its increasing dates (n,) to a date, at most twice its own span ahead.
 
-    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
+    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a
+    span.
     """
     return fit_past(dates, Readings(y, temperature)).forecast(horizon)
 

@@ -57,10 +57,10 @@ class LevelModel:
         return precision
 
     def explained_root(self, kind: str, n: Indices, k: Indices) -> Floats:
-        """Return the signed root of the sum of squares that a change from each point k (m,) on explains in the first n (r, 1).
+        """Return the signed root of the sum of squares that a change from each point k (m,) on explains.
 
-        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
-        n runs from one number to another, k from 0.
+        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the
+        change. n runs from one number to another, k from 0.
         """
         if self.columns.shape[1] > 1:
             product, square = self._change(kind, n, k)
@@ -99,7 +99,7 @@ class LevelModel:
         return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
 
     def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
-        """Return the sizes of changes from points k (r,) on in the first n (r,), shape (r,): steps, or slopes a point."""
+        """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
         sizes = np.empty(n.size)
         for kind, rows in (("step", np.flatnonzero(fell)), ("slope", np.flatnonzero(~fell))):
             if rows.size:

@@ -57,7 +57,7 @@ OTHER_VALUES = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
 MIN_REPORTED_CHANGE = 0.1
 """Change of these (%) that is told; no verdict feels a smaller one, and computed data have such."""
 RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (run-in)?"
-"""What is said of a fall as that of bearings that run in; it rings like any other."""
+"""What is said of a drop as that of bearings that run in; it triggers an alarm like any other."""
 
 
 def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
@@ -119,7 +119,7 @@ def _change_text(change: SeriesChange) -> str:
 
 @dataclass(frozen=True)
 class SeriesStatus:
-    """The standing of one tool in one direction."""
+    """The status of one tool in one direction."""
 
     tool: str
     """Tool in the spindle."""
@@ -130,13 +130,13 @@ class SeriesStatus:
     first_time: datetime
     """Time of the test that it is compared with."""
     drop: Estimate
-    """Fall of the followed frequency from the start of the series to the last test that shows it (%)."""
+    """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
     """Points, alarm and forecast; None where no test of it can be compared with."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
     triggered: tuple[TriggeredAlarm, ...]
-    """Those that ring."""
+    """Those that trigger an alarm."""
     history: SeriesHistory = field(compare=False, repr=False)
     """Rows that all this follows from, and the history of their values."""
 
@@ -153,12 +153,12 @@ class SeriesStatus:
 
 @dataclass(frozen=True)
 class MachineStatus:
-    """The standing of one machine."""
+    """The status of one machine."""
 
     time: datetime
-    """Time that it is the standing at."""
+    """Time that it is the status at."""
     reasons: tuple[Remark, ...]
-    """Reasons in order of harm, without what a person has said to them."""
+    """Reasons in order of severity, without what a person has said to them."""
     next_step: str
     """Next step, one sentence."""
     remarks: tuple[Remark, ...]
@@ -166,7 +166,7 @@ class MachineStatus:
     alarms: tuple[Alarm, ...] = ()
     """Alarms that are open, in the order of their reasons."""
     series: tuple[SeriesStatus, ...] = ()
-    """Series, the one that fell most first."""
+    """Series, the one that dropped most first."""
     last_tap: datetime | None = None
     """Time of the newest tap test; None where there is none."""
     days_left: float | None = None
@@ -174,16 +174,29 @@ class MachineStatus:
 
     @property
     def status(self) -> StatusLevel:
-        """Light of the worst reason."""
+        """Status of the worst reason."""
         return worst_status(self.remarks)
 
     @property
     def is_early(self) -> bool:
-        """Whether its alarm is that of a fall short of every limit."""
+        """Whether its alarm is that of a drop short of every limit."""
         return is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
-        """Return the status of one series, or None."""
+        """Return the status of one series, or None.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        direction
+            Direction at the tool tip, "x" or "y".
+
+        Returns
+        -------
+        SeriesStatus or None
+            Status of the series; None if it was never tapped.
+        """
         fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
         return next(fits, None)
 
@@ -199,8 +212,8 @@ def assess_status(
 ) -> MachineStatus:
     """Assess the status of a machine at a time; the last row has the verdict on every program.
 
-    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first; scatter:
-    what other machines told of it.
+    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first;
+    scatter: what other machines told of it.
     """
     rows = history.current
     if not rows and files:

@@ -18,7 +18,7 @@ from lobewatch.monitoring.trend_shapes import PRIOR_ODDS, ShapeKind, TrendShape
 LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances that the level gathers over the span, in that of a point; chosen."""
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
-"""Variances that the rate, in levels a span, gathers over the span, likewise; chosen."""
+"""Variances that the rate, in levels a span, gathers over the span, too; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class _RotatedPoints:
 
 
 def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWalkFits:
-    """Fit lines whose level ("wander") or rate ("bend") is a random walk; at: dates from the first point on, shape (n,)."""
+    """Fit lines whose level ("wander") or rate ("bend") is a random walk; at: dates, shape (n,)."""
     points = _rotate_points(base, at, kind)
     amounts = RATE_VARIANCES if kind == "bend" else LEVEL_VARIANCES
     still, _, _ = points.solve(np.ones(at.size))

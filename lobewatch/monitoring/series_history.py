@@ -1,6 +1,6 @@
 """One series of tap tests and what follows from its rows: where each value started, and how it has changed since.
 
-Made once for a standing and handed on with it. What is worked out of it lasts as long as it does.
+Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class SeriesHistory:
 
     @property
     def drop(self) -> Estimate:
-        """Fall of the frequency (%) to the newest test, or where that is in question, to another that fell farther."""
+        """Frequency drop (%) to the newest test, or where that is in question, to another that dropped farther."""
         newest = [rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows]
         change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN_ESTIMATE)
         return Estimate(-change.value + 0.0, change.std)
@@ -157,7 +157,7 @@ class SeriesHistory:
 
     @property
     def first_falling(self) -> HistoryRow | None:
-        """The tap test that raised the alarm of the watch over the frequency; None where none is open."""
+        """The tap test that triggered the alarm of the monitor over the frequency; None where none is open."""
         trend = self.frequency.trend
         if trend is None or trend.open_drop is None:
             return None
@@ -191,8 +191,8 @@ def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHisto
 def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
     """Estimate the preload left in the bearings from the change of their stiffness; see dsm.preload_left.
 
-    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it open,
-    or where one of the calibrated bearings has rollers.
+    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it
+    open, or where one of the calibrated bearings has rollers.
     """
     stiffness = series.values["bearing_stiffness"]
     change = stiffness.change

@@ -98,7 +98,7 @@ class PercentSeries(NamedTuple):
     temperatures: tuple[float, ...]
     """Temperatures of the spindle (degC); NaN where not recorded."""
     reclamped: tuple[bool, ...]
-    """Whether the tool was clamped anew for each of them."""
+    """Whether the tool was reclamped for each of them."""
 
     def percent(self, span: TapRange) -> float:
         """Return the change of a point (%): mean of two, median from three on."""
@@ -177,8 +177,8 @@ def winsorize(y: Floats) -> Floats:
 MIN_SCATTER_POINTS = 8
 """Points of a series from which on its scatter tells anything; chosen."""
 DOF_PER_DIFFERENCE = 0.25
-"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares, differences
-of neighbours two thirds of that of residuals."""
+"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares,
+differences of neighbours two thirds of that of residuals."""
 MIN_OTHER_SERIES = 4
 """Series that anything is said of others from; chosen."""
 MAX_PRIOR_DOF = 30.0

@@ -22,14 +22,14 @@ CodedT = TypeVar("CodedT", Remark, Alarm)
 
 
 class StatusLevel(StrEnum):
-    """The light of a machine, worst first."""
+    """The status of a machine, worst first."""
 
     ALARM = "alarm"
-    """Beyond a limit: a fall, a decay, or a program that is not stable any more."""
+    """Beyond a limit: a drop, a decay, or a program that is not stable any more."""
     UNKNOWN = "unknown"
     """Damaged, unreadable or never tapped: nothing can be said."""
     WARN = "warn"
-    """In want of attention: a smaller fall, a doubt, damage, a test that is due."""
+    """In want of attention: a smaller drop, an uncertainty, damage, a test that is due."""
     GOOD = "good"
     """Nothing is known to be wrong."""
 

@@ -23,11 +23,11 @@ class ThresholdDates(msgspec.Struct, frozen=True):
     earliest: float | None = None
     """At a probability of 10 %; None where not before `foretold_to`."""
     probable: float | None = None
-    """At 50 %; None likewise."""
+    """At 50 %; None also."""
     latest: float | None = None
-    """At 90 %; None likewise."""
+    """At 90 %; None also."""
     forecast_end: float | None = None
-    """Last day that was looked at; None where nothing can be foretold."""
+    """Last day that was checked; None where nothing can be forecast."""
 
     @property
     def is_known(self) -> bool:
@@ -52,7 +52,7 @@ class ProgramForecast(msgspec.Struct, frozen=True):
 NO_FORECAST = ThresholdDates()
 ALREADY_REACHED = ThresholdDates(is_measured=True)
 LimitForecasts = tuple[tuple[float, ThresholdDates], ...]
-"""Fixed limits (%) of machine.toml, each with when the worst series has fallen by it."""
+"""Fixed limits (%) of machine.toml, each with when the worst series has dropped by it."""
 
 
 def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:

@@ -29,15 +29,15 @@ from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
 
 MAX_TREND_POINTS = 1000
-"""Number of newest points that alone are judged; chosen, as the work grows with its square."""
+"""Number of newest points that alone are evaluated; chosen, as the work grows with its square."""
 DAYS_PER_MONTH = 30.44
 """Mean length of a month (days)."""
 FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
-"""Time after the last point (days) beyond which nothing is foretold; chosen."""
+"""Time after the last point (days) beyond which nothing is forecast; chosen."""
 MAX_RUN_IN_RATE = 0.4
-"""Rate of a fall over its mean rate so far below which it has slowed down; chosen."""
+"""Rate of a drop over its mean rate so far below which it has slowed down; chosen."""
 N_START_POINTS = 3
-"""Points that the start of a series is looked for in while it has no fitted line; chosen."""
+"""Points that the start of a series is searched in while it has no fitted line; chosen."""
 
 
 class TapValue(NamedTuple):
@@ -56,7 +56,7 @@ class TapValue(NamedTuple):
     operator: str = ""
     """Who held the hammer."""
     reclamped: bool = False
-    """Whether the tool was clamped anew for it."""
+    """Whether the tool was reclamped for it."""
 
 
 class TrendPoint(NamedTuple):
@@ -80,7 +80,7 @@ class TrendPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """One series, judged."""
+    """One series, evaluated."""
 
     points: tuple[TrendPoint, ...]
     """Points, oldest first; one at least."""
@@ -92,7 +92,7 @@ class Trend:
     """Shapes that it allows, over days of use, those behind the last point being days since 1970; None below 8
     points."""
     today: int
-    """Day since 1970 that it is judged on."""
+    """Day since 1970 that it is evaluated on."""
 
     def at_day(self, now: datetime) -> Trend:
         """Return this trend as of another day."""
@@ -100,7 +100,7 @@ class Trend:
 
     @cached_property
     def detection(self) -> Detection:
-        """What the watch over its points has seen."""
+        """What the monitor over its points has seen."""
         return detect_changes(self.readings)
 
     @cached_property
@@ -124,8 +124,8 @@ class Trend:
     def start(self) -> float:
         """Its start (%): the highest of the fitted line at the first 8 points, else of the first three points.
 
-        A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
-        spindle that falls from the beginning.
+        A first test clamped badly must not hide a drop for ever, and a mean of the first ones would hide that of a
+        spindle that drops from the beginning.
         """
         if self.past_fit is not None:
             return float(self.past_fit.fitted[:MIN_FORECAST_POINTS].max())
@@ -133,7 +133,7 @@ class Trend:
 
     @property
     def is_stale(self) -> bool:
-        """Whether today is farther from its last point than anything is foretold."""
+        """Whether today is farther from its last point than anything is forecast."""
         return self.forecast is not None and self.today > self.forecast.dates[-1]
 
     @property
@@ -162,12 +162,12 @@ class Trend:
 
     @property
     def open_drop(self) -> DetectedDrop | None:
-        """The newest fall whose alarm is open; None without alarm."""
+        """The newest drop whose alarm is open; None without alarm."""
         return next(reversed(self.detection.open_drops), None)
 
     @property
     def is_run_in(self) -> bool:
-        """Whether the open fall began among the first points and has slowed down since, as new bearings run in."""
+        """Whether the open drop began among the first points and has slowed down since, as new bearings run in."""
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
         fallen = self.start - float(self.past_fit.fitted[-1])
@@ -176,7 +176,7 @@ class Trend:
 
     @property
     def drop_since(self) -> datetime | None:
-        """Time at which the fall began or happened that the alarm is about; None without alarm."""
+        """Time at which the drop began or happened that the alarm is about; None without alarm."""
         return None if self.open_drop is None else self.points[self.open_drop.change.point].time
 
 
@@ -188,8 +188,8 @@ def fit_trend(
 ) -> Trend:
     """Fit the trend of a series, oldest first, with at least one value.
 
-    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, likewise;
-    known: what is known of its scatter beforehand.
+    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
+    what is known of its scatter beforehand.
     """
     points = _newest_points(series)
     readings = _build_readings(points, _newest_points(other) if other else (), known)

@@ -47,18 +47,18 @@ PRIOR_ODDS: dict[ShapeKind, float] = {
     "wander": 0.5,
     "bend": 0.5,
 }
-"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many courses hold their dates."""
+"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many trends hold their dates."""
 
 
 class TrendShape(NamedTuple):
-    """One shape that the course of a series may have."""
+    """One shape that the trend of a series may have."""
 
     kind: ShapeKind
-    """Kind: "none", steady; "slope", a line from a point on; "step", fallen once; "curve", accelerating or slowing;
+    """Kind: "none", steady; "slope", a line from a point on; "step", dropped once; "curve", accelerating or slowing;
     "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
     "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
     start: float
-    """Date from which on it falls, or on which it fell; the later one of two slopes; the step of a crash."""
+    """Date from which on it drops, or on which it dropped; the later one of two slopes; the step of a crash."""
     accelerates: bool = False
     """Whether a curve accelerates; else it slows down."""
     rate: float = 0.0

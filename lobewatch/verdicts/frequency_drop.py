@@ -18,7 +18,7 @@ from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
 
 CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
-"""Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
+"""Frequency drop for which the model is recalibrated; between them its stiffness is interpolated."""
 N_DROP_STEPS = 101
 """Number of looks between no fall and the largest of them ..."""
 N_DROP_PARTS = 8
@@ -32,8 +32,8 @@ StiffnessAt = Callable[[float], float]
 def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
 
-    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a model
-    it stays.
+    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a
+    model it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
     clause = "stiffness does not (no model)"
@@ -87,13 +87,13 @@ def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: Sti
 
 
 DROP_SEARCH_STEP = 0.0125
-"""Step of the fall at which all draws are looked at."""
+"""Step of the fall at which all samples are checked."""
 DROP_SLOPE_STEP = 1e-3
 """Step of the fall over which the growth is taken to be straight."""
 DROP_HALVINGS = 4
 """Halvings between the two looks at which the first of them chatters."""
 N_DROP_ERROR_SAMPLES = 12
-"""Number of draws of damping and stiffness that the error of the fall comes from."""
+"""Number of samples of damping and stiffness that the error of the fall comes from."""
 
 
 def find_critical_drop(verdict: Verdict) -> CriticalDrop:

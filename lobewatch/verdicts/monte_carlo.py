@@ -26,22 +26,22 @@ from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
-"""Shares of the limit in the middle, as its own cutting coefficient moves it, at which each draw is looked at ..."""
+"""Shares of the median limit, as its own cutting coefficient moves it, at which each sample is checked ..."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
 """... and shares at which those are looked at that are stable at all of these."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
-"""Shares of the deepest of interest where there is no limit in the middle."""
+"""Shares of the deepest of interest where there is no median limit."""
 N_REFINED_EXTREMES = 9
 """Number of the lowest and of the highest limits that are then refined, in all directions of feed that count."""
 LIMIT_REFINEMENT_STEPS = 3
 """Steps of that refinement."""
 SIMILAR_FEED_LIMIT = 1.15
-"""Directions of feed whose limit is at most so many times the lowest one count ..."""
+"""Directions of feed whose limit is at most this many times the lowest one count ..."""
 MAX_SIMILAR_FEEDS = 3
 """... the lowest of them."""
 
 RECHECKED_LIMIT_SHARES = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
-"""Shares of the limit of each draw at which it is looked at once more ..."""
+"""Shares of the limit of each sample at which it is checked once more ..."""
 WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
 """... in the directions of feed whose limit is at most so many times the lowest one, the lowest of them."""
 
@@ -49,7 +49,7 @@ WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
 def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
     """Find the deepest stable depth of each sample (m), shape (samples,); inf beyond the tried depths.
 
-    Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
+    Of the other samples than the lowest and highest it is the first change between the depths that are checked,
     linearly interpolated. depth: that of the program (m).
     """
     limit, worst = float(samples.limits[0]), samples.with_lowest_cuts(0.0)
@@ -82,7 +82,7 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
 def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
     """Refine limits (m) of `find_sample_limits` in the feed direction that is worst for each sample.
 
-    For numbers of single draws, such as ratios of two cuts on the same spindle.
+    For numbers of single samples, such as ratios of two cuts on the same spindle.
     """
     settled, finite = limits.copy(), np.flatnonzero(np.isfinite(limits))
     if not finite.size:
@@ -112,50 +112,50 @@ def _interpolate_limits(low: Floats, high: Floats, at_low: Floats, at_high: Floa
 
 
 LIMIT_QUANTILES = (0.01, 0.99)
-"""Quantiles of the limit over the doubt that a band reaches between."""
+"""Quantiles of the limit over the uncertainty that a band reaches between."""
 SKIPPED_CUT_MARGIN = 1.15
-"""Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed over,
-unless the middle chatters in it at a depth so much larger somewhere within the doubt of the speed ..."""
+"""Factor that the limit of a cut on its path, were it as doubtful as the lowest, has of margin where it is passed
+over, unless the middle chatters in it at a depth this much larger somewhere within the uncertainty of the speed ..."""
 SKIPPED_SAMPLE_MARGIN = 1.6
 """... and that of one draw in such a cut. Both are for the share of draws that chatter: before `stable` is said every
-draw is looked at in every cut. In 408 judgements of random cuts, each fed in up to 24 ways, EACH missed 6 draws."""
+sample is checked in every cut. In 408 results of random cuts, each fed in up to 24 ways, it missed 6 samples."""
 
 
 class MonteCarloResult(NamedTuple):
-    """What the word on a program rests on."""
+    """What the verdict on a program rests on."""
 
     median: ProgramLimit
-    """Limit in the middle of the doubt."""
+    """Limit in the median estimate."""
     lowest: float
     """Lowest limit of any of the spindles (m)."""
     low: float
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     high: float
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     samples: ProgramSamples
-    """Spindles that it was judged on."""
+    """Spindles that it was evaluated on."""
     chatters: Flags
-    """Whether each draw chatters, without the middle, shape (DRAWS,)."""
+    """Whether each sample chatters, without the middle, shape (samples,)."""
     axes_ratio: float
-    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
 
     @property
     def is_stable_throughout(self) -> bool:
-        """Whether it is stable in the middle and on every draw."""
+        """Whether it is stable in the median and on every sample."""
         return self.median.stable and not np.any(self.chatters)
 
 
 class SampledProgram(NamedTuple):
-    """A program on all the spindles that it may be run on, before these are looked at."""
+    """A program on all the spindles that it may be run on, before these are checked."""
 
     depth: float
     """Its depth (m)."""
     median: ProgramLimit
-    """Limit in the middle of the doubt."""
+    """Limit in the median estimate."""
     samples: ProgramSamples
-    """Spindles from all of the doubt."""
+    """Spindles from all of the uncertainty."""
     axes_ratio: float
-    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
@@ -164,7 +164,7 @@ def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
 
 
 def sample_program(case: ProgramCase) -> SampledProgram:
-    """Find the median limit of a program and draw its samples."""
+    """Find the median limit of a program and sample its samples."""
     median, axes, axes_ratio = find_worst_limit(case)
     return SampledProgram(case.depth, median, draw_samples(case, median, axes), axes_ratio)
 
@@ -182,11 +182,11 @@ def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
 
 
 def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:
-    """Find the samples that chatter at a depth (m) in any of the cuts, shape (samples,); exact where none does.
+    """Find the samples that chatter at a depth (m) in any of the cuts; exact where none does.
 
-    limits: of the draws in the worst cut (m), shape (DRAWS,). In another cut that is near (cuts,) a draw is looked at
-    where its limit, were it as far off the middle as in the worst, has less than EACH to spare, and where the middle
-    chatters around (cuts,). Only where none of these chatters all others are looked at, in all cuts.
+    limits: of the samples in the worst cut (m), shape (samples,). In another cut that is near (cuts,), a sample is
+    checked if its limit, scaled as in the worst cut, has less than `SKIPPED_SAMPLE_MARGIN`, and if the median chatters
+    around it (cuts,). All others are checked only if none of these chatters, in all cuts.
     """
     chatters = limits <= depth
     softness = limits / samples.limits[0] if np.isfinite(samples.limits[0]) else np.ones(limits.size)
@@ -203,7 +203,7 @@ def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits
 
 
 N_BAND_SAMPLES = 64
-"""Number of draws from the doubt."""
+"""Number of samples from the uncertainty."""
 N_BAND_SPEEDS = 81
 """Number of speeds of their diagrams."""
 UNLIMITED_DEPTH = 1e3
@@ -212,7 +212,7 @@ UNLIMITED_DEPTH = 1e3
 
 @dataclass(frozen=True, eq=False)
 class LimitBand:
-    """Band between 1 and 99 % of the limits over the doubt, at the speeds of a diagram."""
+    """Band between 1 and 99 % of the limits over the uncertainty, at the speeds of a diagram."""
 
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (n,)."""
@@ -227,9 +227,10 @@ def compute_limit_band(
 ) -> LimitBand:
     """Compute the uncertainty band around the limits of a cut (its name) by samples.
 
-    Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
-    the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
-    order, and for any method as to spindle speed, cutting coefficient, and changes that all modes share.
+    Each sample is worked out by the zero-order approximation. Of a line by another method it is the same line at the
+    speed that belongs to the frequency of the sample, times what zero-order approximation says of the rest: that
+    holds to a per cent for a line by zero order, and for any method as to spindle speed, cutting coefficient, and
+    changes that all modes share.
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))

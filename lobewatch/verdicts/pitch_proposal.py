@@ -1,8 +1,8 @@
 """Unequal pitches for one cut at one speed: what they gain over equal ones, over all that is not known.
 
-The closed form of the best difference between neighbours says which patterns are looked at; zero order after Altintas,
-Engin & Budak, over few draws, says how deep they may go; the multipliers of the same draws say which of each kind is
-best; and what is said of that is the judge's, draw by draw beside equal pitch.
+The closed form of the best difference between neighbours says which patterns are checked; zero-order approximation
+after Altintas, Engin & Budak, over few samples, says how deep they may go; the multipliers of the same samples say
+which of each kind is best; and what is said of that is the evaluation's, sample by sample beside equal pitch.
 """
 
 from __future__ import annotations
@@ -28,43 +28,44 @@ from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, e
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 N_LOWEST_PITCH_SAMPLES, PITCH_SAMPLE_STEP = 8, 40
-"""Number of draws, those that equal pitch has the lowest limits in, and step between others, in which patterns are
-compared before the best are judged ..."""
+"""Number of samples, those that equal pitch has the lowest limits in, and step between others, in which patterns are
+compared before the best are evaluated ..."""
 N_PITCH_FEEDS = 2
 """... in so many ways of the cut, the worst ..."""
 PITCH_DEPTH_FACTOR = 2.0
 """... down to so many times their lowest limit by zero order."""
 MAX_PITCH_TRIES, MIN_CONFIRMED_SHARE = 3, 0.9
-"""Number of patterns of a kind that are judged, and share of the depth that few draws allow, as much of which is good
-enough: below it the draws that chatter first join the few."""
+"""Number of patterns of a kind that are evaluated, and share of the depth that few samples allow, as much of which
+is good enough: below it the samples that chatter first join the few."""
 N_ADDED_SAMPLES = 8
-"""Number of draws that do."""
+"""Number of samples that do."""
 MIN_PITCH_GAIN = 1.05
 """Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class PitchEvaluation:
-    """Pitches of a cutter with what the judge says of the cut."""
+    """Pitches of a cutter with what the evaluation says of the cut."""
 
     pattern: PitchPattern
     """Pitches."""
     stability: Stability
-    """Word on the cut at its depth."""
+    """Stability of the cut at its depth."""
     limit: float
-    """Deepest stable depth in the middle of the doubt (m); inf where there is none as deep as the tool cuts."""
+    """Deepest stable depth in the median estimate (m); inf where there is none as deep as the tool cuts."""
     low: float
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     high: float
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     gain: float
-    """Limit over that of equal pitch, less 1, in the middle of the doubt."""
+    """Limit over that of equal pitch, less 1, in the median estimate."""
     gain_low: float
-    """1 % quantile of the gain over the doubt: both cutters on the same spindle and material, draw by draw."""
+    """1 % quantile of the gain over the uncertainty: both cutters on the same spindle and material, sample by
+    sample."""
     gain_high: float
-    """99 % quantile of the gain over the doubt."""
+    """99 % quantile of the gain over the uncertainty."""
     share_worse: float
-    """Share of the doubt in which equal pitch has the higher limit."""
+    """Share of the uncertainty in which equal pitch has the higher limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ def propose_pitch(
 ) -> PitchProposal:
     """Propose pitches for a cut at its speed; limits are searched up to 20 times its depth.
 
-    DataError where the cut cannot be judged, ValueError for less than two teeth.
+    DataError where the cut cannot be evaluated, ValueError for less than two teeth.
     """
     equal = equal_pitch(table.teeth)
     verdict = evaluate_program(msgspec.structs.replace(table, pitch_deg=equal.pitch_deg), assembly, machine, at_speed)
@@ -119,12 +120,12 @@ def propose_pitch(
 
 @dataclass(frozen=True, eq=False)
 class PitchSearch:
-    """Looking for pitches of one cut."""
+    """Search for pitches of one cut."""
 
     case: ProgramCase
     """Cut and tool; the pitch of the cut does not count."""
     samples: ProgramSamples
-    """Draws of the cut with equal pitch."""
+    """Samples of the cut with equal pitch."""
     equal_limits: Floats
     """Their limits (m), the middle first."""
 

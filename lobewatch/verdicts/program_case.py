@@ -75,7 +75,7 @@ MAX_OBLIQUE_FEED_IMMERSION = 0.5
 """Radial depth over diameter below which a cut in both directions is worst at angles between x and y, always ..."""
 EQUAL_DIRECTION_TOLERANCES = (0.02, 0.1, 0.1)
 """... and from which on it is only where f_n, zeta or K in x and y differ by more than this, relatively, or modes lie
-askew. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
+with rotated principal directions. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
 MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
 """Directions that a cut may be milled in; a slot is both at once."""
 FEED_ANGLE_STEP = math.pi / 12

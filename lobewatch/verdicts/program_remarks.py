@@ -37,7 +37,8 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
         yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
-        text = f"feed_per_tooth_mm = {feed:g} is outside {_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
+        allowed = f"{_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
+        text = f"feed_per_tooth_mm = {feed:g} is outside {allowed}"
         cure = "feed within that, or enter what its maker says as feed_per_tooth_mm"
         yield _tool_limit_remark(table, f"{text} ({borne.source})", cure)
 
@@ -68,7 +69,7 @@ def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
 
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
-    """Who bears that, in words."""
+    """Who allows that, in verdicts."""
     tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
     where = "in a slot" if limits.cut == "slot" else "at the side"
     return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
@@ -148,7 +149,7 @@ def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSam
 
 
 N_CAUSE_SAMPLES = 60
-"""Number of draws that chatter, of which it is seen what each lacks to be stable."""
+"""Number of samples that chatter, of which it is seen what each lacks to be stable."""
 
 
 def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:

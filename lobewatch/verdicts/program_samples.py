@@ -28,41 +28,42 @@ from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.uncertainty import Uncertainty
 
 N_PROGRAM_SAMPLES = 300
-"""Number of draws: as many stable ones say, with 95 % confidence, that no more than 1 % of the doubt chatters."""
+"""Number of samples: as many stable ones say, with 95 % confidence, that no more than 1 % of the uncertainty
+chatters."""
 ROTATING_SEED = 1
-"""Seed of the draws for the turning spindle."""
+"""Seed of the samples for the rotating spindle."""
 ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
 """Middle and standard deviation of f_n, zeta and K in the cut over those at rest; chosen: plausible, not measured."""
 ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD = 1.0, 0.30
 """Middle and standard deviation of Kt in the cut over that of the table; chosen, as those. The prior of the learning
-begins 10 % higher (`priors.FORCE`), since cuts then correct it; nothing corrects the chance made here."""
+begins 10 % higher (`ROTATING_FORCE_PRIOR`), since cuts then correct it; nothing corrects the chance made here."""
 FREQUENCY_MARGIN, N_MARGIN_SPEEDS = 0.003, 7
-"""Relative distance of the frequency that is looked at beside the doubt of the speed, and number of looks."""
+"""Relative distance of the frequency that is checked beside the uncertainty of the speed, and number of looks."""
 N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
-"""Number of draws, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
+"""Number of samples, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
 MIN_ROTATING_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramSamples:
-    """Draws of one program; row 0 is the middle, without any doubt."""
+    """Samples of one program; row 0 is the middle, without any uncertainty."""
 
     rows: MillingRows
-    """All draws, the feed along x."""
+    """All samples, the feed along x."""
     cuts: tuple[Cut, ...]
-    """Cuts that the program makes on its way, the worst first."""
+    """Cuts that the program makes on its path, the worst first."""
     limits: Floats
-    """Deepest stable depth of each in the middle (m)."""
+    """Deepest stable depth of each in the median (m)."""
     piece_factor: int
     """Number of pieces of a turn over those that modes alone ask for."""
     uncertainty: Uncertainty
-    """Doubt that they were drawn from."""
+    """Uncertainty that they were drawn from."""
 
     def growth(self, depth: float | Floats) -> Floats:
         """Return the growth rate in the worst cut; negative where stable.
 
-        depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
+        depth in m: one, several (d,) or those of each sample (samples, d). Returns shape (samples, d).
         """
         wanted = np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
@@ -72,9 +73,10 @@ class ProgramSamples:
         )
 
     def critical_growth(self, depth: float) -> Floats:
-        """Return the growth rate at a depth (m) in the worst cut, (samples,); clearly stable ones in the first cut only.
+        """Return the growth rate at a depth (m) in the worst cut; clearly stable samples in the first cut only.
 
-        Some draws say how much more there is in each other cut: passed over are those that die away so much faster.
+        Some samples say how much more there is in each other cut: passed over are those that die away this much
+        faster.
         """
         places = np.arange(len(self.rows))
         grown = self._growth_at_depth(np.zeros_like(places), places, depth)
@@ -158,7 +160,7 @@ def build_median_row(program: Program, assembly: Assembly, axes: Floats | None =
 
 
 class WorstLimit(NamedTuple):
-    """Limit of a program in the middle of its doubt, with the axes that are worst of those that may be."""
+    """Limit of a program in the median of its uncertainty, with the axes that are worst of those that may be."""
 
     limit: ProgramLimit
     """The lowest limit."""
@@ -189,12 +191,12 @@ def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:
 
 
 def _unlimited_samples(case: ProgramCase, rows: MillingRows) -> ProgramSamples:
-    """Samples of a program with unknown limits."""
+    """Build the samples of a program with unknown limits."""
     return ProgramSamples(rows, case.cuts, np.full(len(case.cuts), np.inf), 1, case.uncertainty)
 
 
 def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
-    """Draw the samples of a program with unknown limits, in the principal directions that are likely the worst.
+    """Sample the samples of a program with unknown limits, in the principal directions that are likely the worst.
 
     program: the case at another speed and depth, in SI units.
     """
@@ -203,7 +205,7 @@ def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
 
 
 def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = None) -> ProgramSamples:
-    """Draw the samples of a program from its median limit, with modes along axes (n, 2)."""
+    """Sample the samples of a program from its median limit, with modes along axes (n, 2)."""
     median, limits = build_median_row(case.program, case.spindle, axes), np.array(limit.limits)
     order = np.argsort(limits)
     finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)

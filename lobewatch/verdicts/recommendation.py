@@ -27,22 +27,35 @@ from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, fin
 
 @dataclass(frozen=True)
 class Advice:
-    """What goes beyond the word."""
+    """What goes beyond the verdict."""
 
     best: Setting | None = None
-    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the most chips per
-    time. None where the program is stable, nothing is safe, or nothing can be said."""
+    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the largest
+    removal rate per time. None where the program is stable, nothing is safe, or nothing can be said."""
     deepest_here: Setting | None = None
     """Deepest cut at the program's own speed, where `best` has another depth."""
     tolerable_drop: float = math.nan
-    """Tolerable fall of the frequency in the middle of the doubt, relative; 0 where it is not stable now, inf where
-    nothing happens down to 80 %, NaN where the program could not be checked."""
+    """Tolerable frequency drop in the median estimate, relative; 0 where it is not stable now, inf where nothing
+    happens down to 80 %, NaN where the program could not be checked."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what the decay rests on, and what would have to be known of the tool."""
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
-    """Advise on a program: settings to use instead, and the tolerable frequency drop."""
+    """Advise on a program: settings to use instead, and the tolerable frequency drop.
+
+    Parameters
+    ----------
+    verdict
+        Verdict on the program.
+    machine
+        Machine with its speeds, drive and tap interval.
+
+    Returns
+    -------
+    Advice
+        Advice; empty if the verdict is unknown.
+    """
     tool, samples = verdict.assembly, verdict.samples
     if tool is None or samples is None:
         return Advice()
@@ -64,8 +77,23 @@ def find_stable_pockets(
 ) -> list[Setting]:
     """Find settings that would be called stable with depth to spare, the largest removal rate first.
 
-    The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
-    range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
+    Parameters
+    ----------
+    table
+        Program or reference cut; its own speed and depth do not count.
+    assembly
+        Tool as tapped.
+    machine
+        Machine with its speeds, drive and tap interval.
+    at_speed
+        Spindle at speed, as learned from test cuts.
+    count
+        Largest number of settings.
+
+    Returns
+    -------
+    list of Setting
+        Settings in different stable pockets; empty if none is stable, a direction was not tapped or is in question.
     """
     if not is_compliance_known(table, assembly):
         return []
@@ -88,7 +116,7 @@ CUT_REMEDIES = (
     "another tool: a thicker one, or with fewer teeth",
     "a smaller radial depth",
 )
-"""What makes a cut safe that is not, in words."""
+"""What makes a cut safe that is not, in verdicts."""
 TOOL_SPEED_REMEDIES = (
     "a smaller diameter",
     "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
@@ -133,9 +161,9 @@ class Recommendation:
     alternatives: tuple[Alternative, ...] = ()
     """Settings beside it, two at most."""
     feed_mm: tuple[float, float] | None = None
-    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    """Least and greatest feed per tooth (mm): its own, else the tool limits; None where neither is known."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what it rests on, and on what is not known of the tool."""
+    """Remarks on what it rests on, and on the uncertainty of the tool."""
 
 
 def recommend(

@@ -1,7 +1,7 @@
 """Estimate the safe depth over speed from few samples, before a setting is evaluated.
 
-Zero order narrows; where it is not exact, the multipliers of the middle of the doubt are looked at at coarser speeds,
-so that what it does not see (low immersion, flip) counts. Nothing is judged yet.
+Zero order narrows; where it is not exact, the multipliers of the median estimate are checked at coarser speeds, so
+that what it does not see (low immersion, flip) counts. Nothing is evaluated yet.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from lobewatch.verdicts.setting_robustness import (
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
-"""Number of draws that grow most at the depth that is likely ..."""
+"""Number of samples that grow most at the depth that is likely ..."""
 N_FLEXIBLE_SAMPLES = 8
 """... and of those with the largest force on the most flexible mode, whatever grows there."""
 N_CRITICAL_FEEDS = 2
-"""Number of directions of feed, the worst around the speed, in which they are looked at."""
+"""Number of directions of feed, the worst around the speed, in which they are checked."""
 CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
 """Shares of a depth at which they are."""
 DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
-"""Shares of the step between two of these, one calm and one not, at which they are once more."""
+"""Shares of the step between two of these, one stable and one not, at which they are once more."""
 DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
-"""Factor of the depth up to which is looked, where all of it is calm, and where hardly any of it is ..."""
+"""Factor of the depth up to which is looked, where all of it is stable, and where hardly any of it is ..."""
 MIN_SEARCHED_DEPTH = 1e-5
 """... down to this (m)."""
 
@@ -52,13 +52,14 @@ class CriticalSamples:
     """A cut at one speed."""
 
     likely_depth: float
-    """Depth that is likely (m): the scale of what is looked at."""
+    """Depth that is likely (m): the scale of what is checked."""
     samples: ProgramSamples
-    """All draws at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth to spare."""
+    """All samples at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth of
+    margin."""
     likely_first: Indices
     """Places of the few that are likely the first to chatter."""
     chattered: frozenset[int] = frozenset()
-    """Draws that count too since they have chattered elsewhere."""
+    """Samples that count too since they have chattered elsewhere."""
 
     @property
     def selected(self) -> ProgramSamples:
@@ -67,7 +68,7 @@ class CriticalSamples:
         return self.samples[np.union1d(self.likely_first, more)]
 
     def deepest_stable(self, most: float) -> float:
-        """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth to spare."""
+        """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth margin."""
         few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
         while calm == depth < ROBUST_DEPTH_FACTOR * most:
@@ -79,7 +80,7 @@ class CriticalSamples:
         return calm / ROBUST_DEPTH_FACTOR
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
-        """Return the largest growth of the selected samples at relative speeds and depths (m) (k,), with depth to spare.
+        """Return the largest growth of the selected samples at relative speeds and depths (m) (k,).
 
         In the worst direction of feed: it says where to look, no more.
         """
@@ -131,17 +132,18 @@ def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
 LIKELY_SPEED_STEP = 0.002
 """Relative step of the speeds."""
 COARSE_SPEED_STEPS = 6
-"""Steps between two speeds at which the multipliers are looked at ..."""
+"""Steps between two speeds at which the multipliers are checked ..."""
 TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
 """... and shares of the limit by zero order at which they are ..."""
 FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
 """... and of the way from the last of these to the deepest that matters, where none of them chatters."""
 N_LIKELY_FEEDS = 2
-"""Number of directions of feed, those that zero order has as the worst at a speed, in which they are."""
+"""Number of directions of feed, those that zero-order approximation has as the worst at a speed, in which they are."""
 MIN_REMOVAL_SHARE = 0.75
-"""Share of the most chips that zero order has, as many of which must be thinkable at a speed for a look."""
+"""Share of the largest removal rate that zero-order approximation has, as many of which must be thinkable at a speed
+for a look."""
 MAX_DEPTH_FACTOR = 1.3
-"""Limits beyond so many times the deepest that may be cut, with all to spare, are not told apart."""
+"""Limits beyond this many times the deepest that may be cut, with all of margin, are not told apart."""
 LIKELY_FREQUENCY_MARGIN = 0.003
 """Relative distance of the frequency that is counted on beside speed and fall."""
 MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
@@ -188,7 +190,7 @@ class LikelyDepths:
 def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> LikelyDepths:
     """Estimate the safe depth over speed within the uncertainty, now and after a frequency drop.
 
-    cuts: all that the program makes on its way; spare: depth to spare in the middle of the doubt at least.
+    cuts: all that the program makes on its path; spare: depth margin in the median estimate at least.
     """
     cuts, spindle, uncertainty = case.cuts, case.spindle, case.uncertainty
     number = max(int(math.log(reach.high_rpm / reach.low_rpm) / LIKELY_SPEED_STEP), 1)
@@ -220,9 +222,9 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
 def _limits_by_multipliers(
     spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
 ) -> Floats:
-    """Return limits (mm) by multipliers where wanted (n,), interpolated between few speeds; else by zero order.
+    """Return limits (mm) by multipliers where wanted (n,), interpolated; else by the zero-order approximation.
 
-    by_cut: limits by zero order (cuts, n).
+    by_cut: limits by the zero-order approximation (cuts, n).
     """
     places = np.unique(np.append(np.arange(0, speeds.size, COARSE_SPEED_STEPS), speeds.size - 1))
     places = places[wanted[places]]
@@ -242,7 +244,7 @@ def _limits_by_multipliers(
 def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
     """Return the depth (mm) (r,) at which growth first reaches zero, or inf.
 
-    mean: limit by zero order (mm) (r,); most: depth up to which it matters.
+    mean: limit by the zero-order approximation (mm) (r,); most: depth up to which it matters.
     """
     ends = np.minimum(mean * TRIED_ZERO_ORDER_SHARES[-1], most)[:, np.newaxis]
     tried = np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis])

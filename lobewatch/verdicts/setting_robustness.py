@@ -31,23 +31,23 @@ class Setting:
     window_rpm: tuple[float, float]
     """Slowest and fastest speed around it at which the depth would be called stable too."""
     depth_margin: float
-    """Limit in the middle of the doubt over depth, less 1."""
+    """Limit in the median estimate over depth, less 1."""
     drop_margin: float
-    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+    """Frequency drop that it stands, relative, and is still called stable; 0.1 stands for that and more."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
-"""Relative step of a window of speeds, most steps on each side, and parts in which they are looked at."""
+"""Relative step of a window of speeds, most steps on each side, and parts in which they are checked."""
 ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
 """Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
 ROBUST_DEPTH_FACTOR = 1.05
 """Factor of the depth up to which it must be ..."""
 MIN_DEPTH_MARGIN = 0.20
-"""Depth that a recommended setting has to spare in the middle of the doubt."""
+"""Depth that a recommended setting has of margin in the median estimate."""
 MIN_ROBUST_DROP = 0.01
 """... and fall of the frequency that it must stand at least."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
-"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
+"""Frequency drop that a setting is checked with; more than the last is not told apart."""
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:

@@ -1,9 +1,9 @@
-"""The one search for settings that would be called stable, with something to spare: advice, pockets, recommendations.
+"""The one search for settings that would be called stable, with something of margin: advice, pockets, recommendations.
 
-Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`CriticalSamples`). What
-is recommended has been judged like any program: `run_monte_carlo` finds it stable throughout, and the same draws are stable
-around it and as the spindle will be when it is tapped again (`room`). Where no speed of the grid has such a depth,
-nothing is recommended.
+Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few samples how deep
+(`CriticalSamples`). What is recommended has been evaluated like any program: `run_monte_carlo` finds it stable
+throughout, and the same samples are stable around it and as the spindle will be when it is tapped again (`room`).
+Where no speed of the grid has such a depth, nothing is recommended.
 """
 
 from __future__ import annotations
@@ -41,49 +41,49 @@ from lobewatch.verdicts.setting_robustness import (
 )
 
 MAX_DEPTH_MARGIN = 20.0
-"""Depth to spare that stands for more too, and for no limit: no deeper is looked."""
+"""Depth margin that stands for more too, and for no limit: no deeper is looked."""
 MAX_SEARCHED_SPEEDS = 12
-"""Number of speeds that few draws are looked at at before it is said that there is none."""
+"""Number of speeds that few samples are checked at before it is said that there is none."""
 PROMISING_FACTOR = 1.1
-"""A speed is looked at where the depth that is likely times this, and times the largest share of such a depth that few
-draws have left elsewhere, would be more chips than are known of."""
+"""A speed is checked where the depth that is likely times this, and times the largest share of such a depth that few
+samples have left elsewhere, would be a larger removal rate than are known of."""
 NEIGHBOR_SPEED_STEPS = np.concatenate(
     [sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)]
 )
-"""Relative distances of speeds that are looked at beside that of most chips ..."""
+"""Relative distances of speeds that are checked beside that of largest removal rate ..."""
 N_CLIMBS = 2
 """... and number of times that they are."""
 MIN_FAILED_SPEEDS = 3
-"""Number of speeds judged in vain that say what is left at others of their pocket."""
+"""Number of speeds evaluated in vain that say what is left at others of their pocket."""
 TRIES_PER_SPEED, MAX_SETTING_TRIES = 4, 12
-"""Number of depths that are judged at one speed, and at all of them."""
+"""Number of depths that are evaluated at one speed, and at all of them."""
 NEARLY_SAFE_SHARE = 0.85
-"""Share of a depth that is wanted, where so much is likely it may be safe too."""
+"""Share of a depth that is wanted, where this much is likely it may be safe too."""
 MAX_REMEMBERED_SAMPLES = 8
-"""Draws of each judgement that are remembered where they chatter."""
+"""Samples of each result that are remembered where they chatter."""
 NEXT_DEPTH_SHARE = 0.98
-"""Share of a depth, at least as much less of which is looked at where draws chatter."""
+"""Share of a depth, at least as much less of which is checked where samples chatter."""
 N_WINDOW_SAMPLES = 24
-"""Number of draws, the hardest, that bound a window before all of them decide."""
+"""Number of samples, the hardest, that bound a window before all of them decide."""
 
 DepthsBySpeed = dict[float, float]
 """Depths (mm) that may be safe, by speeds (rpm)."""
 SharesBySpeed = dict[float, float]
-"""Shares that all draws left of the depths that few allowed, by speeds (rpm) that were judged in vain."""
+"""Shares that all samples left of the depths that few allowed, by speeds (rpm) that were evaluated in vain."""
 
 
 @dataclass(frozen=True, eq=False)
 class SettingSearch:
-    """Looking for settings of one cut with a tool that is surely known."""
+    """Search for settings of one cut with a tool that is surely known."""
 
     case: ProgramCase
     """Program and tool; the speed and depth of the program do not count."""
     critical: dict[float, CriticalSamples] = field(default_factory=dict)
-    """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
+    """Few samples by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
-    """Draws that have chattered where few others made it seem safe."""
+    """Samples that have chattered where few others made it seem safe."""
     results: dict[tuple[float, float], MonteCarloResult] = field(default_factory=dict)
-    """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
+    """Results of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def cut_range(self) -> CutRange:
@@ -92,12 +92,12 @@ class SettingSearch:
 
     @cached_property
     def needed_drop(self) -> float:
-        """Fall of the frequency that a setting must stand, relative."""
+        """Frequency drop that a setting must stand, relative."""
         return find_needed_drop(self.case.assembly, self.case.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
-        """Stiffness over that of now by the fall of the frequency."""
+        """Stiffness over that of now by the frequency drop."""
         return model_softening(self.case.assembly)[0]
 
     @cached_property
@@ -157,8 +157,8 @@ class SettingSearch:
     def _search_settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
         """Yield the deepest settings of the grid, the largest removal rate first.
 
-        What was judged in vain comes back with less depth, and the draws that chattered count from then on. Pockets
-        that are taken while it goes on are passed over.
+        What was evaluated in vain comes back with less depth, and the samples that chattered count from then on.
+        Pockets that are taken while it goes on are passed over.
         """
         if self.cut_range.is_empty:
             return
@@ -193,7 +193,7 @@ class SettingSearch:
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
     def _climb(self, speed: float, depths: DepthsBySpeed, kept: SharesBySpeed, looked: set[float]) -> float:
-        """Return the speed (rpm) of the largest removal rate after its neighbors have been tried, once for each peak."""
+        """Return the speed (rpm) of the largest removal rate after its neighbors have been tried, once a peak."""
         for _ in range(0 if speed in looked else N_CLIMBS):
             looked.add(speed)
             if (beside := self._better_neighbor(speed, depths[speed])) in looked:

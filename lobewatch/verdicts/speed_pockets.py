@@ -40,7 +40,8 @@ class SpeedPocket:
     speed_rpm: float
     """Speed of its deepest point (rpm)."""
     window_rpm: tuple[float, float]
-    """Slowest and fastest speed at which the limit is 0.8 of its deepest or more, wherever f_n is within its doubt."""
+    """Slowest and fastest speed at which the limit is 0.8 of its deepest or more, wherever f_n is within its
+    uncertainty."""
     gain: float
     """Limit there over the lowest one in the range of speeds (-); MOST_GAIN stands for more, too."""
 
@@ -52,8 +53,9 @@ class SpeedPocket:
 def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) -> list[SpeedPocket]:
     """Find the best pockets of a cut, the largest removal rate first, for a tool tapped without a force sensor.
 
-    By zero order from the modes followed, both of one stiffness; a direction that was not tapped is taken like the
-    other. Those narrower than the doubt of f_n are left out. Empty where no such modes are known.
+    By zero-order approximation from the modes followed, both of one stiffness; a direction that was not tapped is
+    taken like the other. Those narrower than the uncertainty of f_n are left out. Empty where no such modes are
+    known.
     """
     modes, reach = assembly.without_stiffness, CutRange.of(machine, table)
     if not modes or reach.is_empty:

@@ -1,7 +1,7 @@
 """Uncertainty of a program by cause, and Monte Carlo samples drawn from it.
 
-Half-widths of independent uniform distributions; where test cuts have taught, the draws that they have left. Whatever
-is said of a program over its doubt comes from these draws.
+Half-widths of independent uniform distributions; where test cuts have shown, the samples that they have left.
+Whatever is said of a program over its uncertainty comes from these samples.
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ class LearnedSamples:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Doubt of a program, by what it comes from."""
+    """Uncertainty of a program, by what it comes from."""
 
     modes: Mapping[str, Floats]
-    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
-    (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
-    that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
+    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y,
+    shape (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction"
+    (a tool that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
     tap_correlation: Floats
     """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
     speed: float
@@ -103,12 +103,12 @@ class Uncertainty:
     ratio: FactorRange
     """Range of Kr/Kt, the direction of the force, over the middle."""
     wear: float = 1.0
-    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the least
-    is 1."""
+    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the
+    least is 1."""
     axes: PrincipalDirections | None = None
     """Axes of the modes, and what is open of them; None where they count as known."""
     learned: LearnedSamples | None = None
-    """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
+    """Samples that test cuts have left, which stand for the half-widths; None where none has shown anything."""
 
     def __post_init__(self) -> None:
         """Refuse causes without a record in `UNCERTAINTY_CAUSES`."""
@@ -122,9 +122,23 @@ class Uncertainty:
         return (*self.modes, *across, SPEED.name, COEFFICIENTS.name, *([WEAR.name] if self.wear > 1 else []))
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
-        """Sample systems (count rows) around a median one (a row), reproducible by seed.
+        """Sample systems within the uncertainty, reproducible by seed.
 
-        without: a cause that is taken as known.
+        Parameters
+        ----------
+        median
+            Median system, one row.
+        count
+            Number of samples.
+        seed
+            Seed of the random numbers; the other causes have the same samples whatever is left out.
+        without
+            Name of a cause that is left out.
+
+        Returns
+        -------
+        MillingRows
+            Sampled systems, `count` rows.
         """
         rows = self._sample_new_edges(median, count, seed, without)
         if self.wear == 1 or without == WEAR.name:
@@ -156,7 +170,7 @@ class Uncertainty:
         if without == COEFFICIENTS.name:
             tangential, ratio = np.ones((2, count))
         rows = median[np.zeros(count, dtype=np.intp)]
-        samples_all = replace(
+        samples = replace(
             rows,
             frequency=rows.frequency * factor[..., 0],
             damping_ratio=rows.damping_ratio * factor[..., 1],
@@ -166,7 +180,7 @@ class Uncertainty:
             tangential=rows.tangential * np.maximum(tangential, MIN_SAMPLE_FACTOR),
             radial=rows.radial * np.maximum(tangential, MIN_SAMPLE_FACTOR) * np.maximum(ratio, 0.0),
         )
-        return self._with_sampled_axes(samples_all, seed, without)
+        return self._with_sampled_axes(samples, seed, without)
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
         """Sample the open principal directions."""
@@ -184,7 +198,22 @@ class Uncertainty:
 
 
 def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
-    """Determine the uncertainty of a cut with a tool that does not rotate."""
+    """Determine the uncertainty of a cut with a tool that does not rotate.
+
+    Parameters
+    ----------
+    assembly
+        Tool as tapped or predicted.
+    table
+        Program or reference cut.
+    machine
+        Machine with its [doubt] table and materials.
+
+    Returns
+    -------
+    Uncertainty
+        Half-widths by cause, and ranges of the cutting coefficients.
+    """
     tangential, ratio = _coefficient_ranges(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_tap_correlation(mode) for mode in modes])
@@ -201,7 +230,7 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
+    """Return the largest wear factor on the cutting coefficients, of the program or of [uncertainty]."""
     said = table.wear if isinstance(table, ProgramTable) else None
     return WEAR_FACTORS[said or machine.doubt.wear]
 
@@ -256,7 +285,7 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Return the ranges of Kt and Kr/Kt: published, else by [doubt]."""
+    """Return the ranges of Kt and Kr/Kt: published, else by [uncertainty]."""
     median = machine.coefficients(table)
     if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100

@@ -9,10 +9,10 @@ from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 
 @dataclass(frozen=True)
 class UncertaintyCause:
-    """A cause of uncertainty with its texts; words in braces are filled in by `program_remarks.uncertainty_advice`."""
+    """A cause of uncertainty with its texts, templates for `program_remarks.uncertainty_advice`."""
 
     name: str
-    """Name in `Uncertainty.causes`, `Verdict.decisive_cause` and JSON."""
+    """Name in `Uncertainty.causes`, `find_decisive_cause` and JSON."""
     sentence: str
     """Sentence where it is the decisive cause of a doubtful verdict."""
     remedy: str

@@ -36,22 +36,23 @@ class Stability(StrEnum):
     """Word that is said of a program."""
 
     STABLE = "stable"
-    """At most 1 % of the doubt chatters, at 95 % confidence."""
+    """At most 1 % of the uncertainty chatters, at 95 % confidence."""
     DOUBTFUL = "doubtful"
-    """Stable in the middle, but more of the doubt may chatter; a remark says what decides and what would settle it."""
+    """Stable in the median, but more of the uncertainty may chatter; a remark says what decides and what would
+    settle it."""
     NOT_STABLE = "not stable"
-    """It chatters in the middle of the doubt."""
+    """It chatters in the median estimate."""
     UNKNOWN = "unknown"
     """It could not be checked; a remark says why."""
 
 
 class CriticalDrop(NamedTuple):
-    """Falls of the frequency of today, relative; 0 where the word has changed already, inf where none changes it."""
+    """Frequency drop of today, relative; 0 where the verdict has changed already, inf where none changes it."""
 
     doubtful: float
     """Fall up to which it stays stable; NaN where it could not be checked."""
     not_stable: float
-    """Fall up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
+    """Fall up to which it stays stable in the median estimate; NaN where it could not be checked."""
     error: float
     """Standard error of `not_stable`, by damping and stiffness as they scatter from tap test to tap test."""
 
@@ -60,15 +61,15 @@ class StoredVerdict(NamedTuple):
     """What the history keeps of a verdict."""
 
     stability: Stability
-    """Word on the program."""
+    """Stability of the program."""
     limit: float
-    """Deepest stable depth at the program's speed in the middle of the doubt (m); NaN where it is not known."""
+    """Deepest stable depth at the program's speed in the median estimate (m); NaN where it is not known."""
     critical: CriticalDrop | None = None
-    """Falls of the frequency that change the word; None where nobody has asked yet."""
+    """Frequency drop that change the verdict; None where nobody has asked yet."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the median estimate; None where it is unknown."""
         return None if self.stability is Stability.UNKNOWN else self.stability is not Stability.NOT_STABLE
 
 
@@ -77,27 +78,28 @@ class Verdict:
     """Whether a program is stable with a tool in the spindle as it is known at some time."""
 
     program: ProgramTable
-    """Program as it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
+    """Program as in machine.toml, with the cutting coefficients that test cuts have shown."""
     stability: Stability
-    """Word on the program."""
+    """Stability of the program."""
     assembly: Assembly | None = None
     """Tool as tapped that it was checked with; None where there is nothing to check with."""
     at_speed: SpindleAtSpeed = NO_TEST_CUTS
-    """Spindle as test cuts have taught it beside that."""
+    """Spindle as test cuts have shown it beside that."""
     limit: float = math.nan
-    """Deepest stable depth at its speed in the middle of the doubt, in the worst direction of feed (m); inf where there
+    """Deepest stable depth at its speed in the median estimate, in the worst direction of feed (m); inf where there
     is none up to 20 times its own, NaN where unknown."""
     limit_low: float = math.nan
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     limit_high: float = math.nan
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     chatter_risk: float = math.nan
-    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those learnt."""
+    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those
+    learned."""
     decisive_cause: str = ""
-    """Cause of the doubt that decides (`Uncertainty.causes`), "question" where a tap test is in question, "workpiece" where
-    it is thin; empty unless it is doubtful."""
+    """Cause of the uncertainty that decides (`Uncertainty.causes`), "question" where a tap test is in question,
+    "workpiece" where it is thin; empty unless it is doubtful."""
     chatter_frequency: float = math.nan
-    """Frequency that is heard at the limit (Hz); NaN where there is none."""
+    """Frequency that is recorded at the limit (Hz); NaN where there is none."""
     kind: str = ""
     """Kind of the limit: "hopf", "flip" or ""."""
     feed_angle: float = math.nan
@@ -105,17 +107,17 @@ class Verdict:
     method: str = ""
     """Method that the limit was found by."""
     detail: str = ""
-    """Fineness of the method, and number of draws."""
+    """Fineness of the method, and number of samples."""
     drive_limit: float = math.inf
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
     samples: ProgramSamples | None = None
-    """Spindles that it was judged on; None where it is unknown."""
+    """Spindles that it was evaluated on; None where it is unknown."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what it rests on, what would settle it, and why it is unknown."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the median estimate; None where it is unknown."""
         return self.stored.is_stable
 
     @property
@@ -130,7 +132,7 @@ class Verdict:
 
     @property
     def depth_margin(self) -> float:
-        """Limit in the middle over depth, less 1; negative where it is not stable."""
+        """Median limit over depth, less 1; negative where it is not stable."""
         return self.limit / (self.program.depth_mm / 1e3) - 1
 
     @property
@@ -153,7 +155,27 @@ def evaluate_program(
 ) -> Verdict:
     """Evaluate a program, or say why it cannot be evaluated.
 
-    judgement: that of `run_monte_carlo`, where it is known already.
+    Parameters
+    ----------
+    table
+        Program as in machine.toml.
+    tool
+        Tool as tapped or predicted, or the reason why it is unknown.
+    machine
+        Machine.
+    at_speed
+        Spindle at speed, as learned from test cuts.
+    result
+        Monte Carlo result of the same program, if it has been computed already.
+
+    Returns
+    -------
+    Verdict
+        Verdict with limits, uncertainty and remarks.
+
+    References
+    ----------
+    .. [1] JCGM 101:2008, Propagation of distributions using a Monte Carlo method (GUM-S1).
     """
     if isinstance(tool, DataError):
         unknown = _unknown_verdict(table, (Remark("no-tap", "", str(tool)),))

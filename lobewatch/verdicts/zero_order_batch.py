@@ -5,8 +5,8 @@ where
 
     det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
 
-Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal.
-Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal. Source:
+Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:
 def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -> tuple[Floats, Floats]:
     """Find the lowest limit (m) and its frequency (Hz) of loops (r, k) with uneven pitch, at tooth frequencies (r, s).
 
-    As `lobes.uneven_limits`: b = -1 / Re(L s) where Im(L s) = 0, between the frequencies on a line; inf and NaN where
-    there is none.
+    As `lobes.uneven_limits`: b = -1 / Re(L s) where Im(L s) = 0, between the frequencies on a line; inf and NaN
+    where there is none.
     """
     depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     for i in range(teeth.shape[1]):
@@ -55,7 +55,7 @@ def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -
 
 
 FREQUENCY_GRID_REACH = 0.7
-"""Distance from each natural frequency up to which frequencies are looked at, relative ..."""
+"""Distance from each natural frequency up to which frequencies are checked, relative ..."""
 FREQUENCY_GRID_POINTS = 49
 """... and number of them, dense near it."""
 MAX_BATCH_NUMBERS = 300_000

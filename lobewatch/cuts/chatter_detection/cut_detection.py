@@ -13,10 +13,10 @@ from lobewatch.arrays import Flags, Floats
 CUT_PIECE_LENGTH = 0.04
 """Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
 MIN_CUT_LOUDNESS = 0.2
-"""A cut is so much louder than air, in log10 of the power."""
+"""A cut is this much louder than air, in log10 of the power."""
 POWER_STEP_MARGIN = 1.0
-"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10): chatter
-of few lines is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
+"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10):
+chatter of few peaks is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
 MIN_AIR_SHARE = 0.1
 """Share of a recording that is air, at least; or air is the quietest part."""
 N_QUIET_PIECES = 5
@@ -30,9 +30,9 @@ N_SMOOTHED_PIECES = 3
 MAX_THRESHOLD_STEPS = 50
 """Steps after which the threshold stands."""
 ENTRY_LOUDNESS_STEP = 0.3
-"""Entry and exit are so much louder or quieter than most of a cut, in log10 of the power: twice."""
+"""Entry and exit are this much louder or quieter than most of a cut, in log10 of the power: twice."""
 MIN_CUT_LENGTH_SHARE = 1 / 6
-"""What has so much of the length of the longest cut beside it is none; chosen."""
+"""What has this much of the length of the longest cut beside it is none; chosen."""
 MAX_ENTRY_TIME = 2.0
 """Longest entry or exit (s)."""
 MAX_PAUSE_TIME = 0.1
@@ -48,7 +48,7 @@ MIN_CUT_TIME = 0.3
 MAX_CUT_TIME = 2.0
 """... and at most, its end: no spindle is so steady that more is of use (s)."""
 KNOCK_PEAK_RATIO = 4.0
-"""A piece of a cut with a peak so many times those around it is a knock."""
+"""A piece of a cut with a peak this many times those around it is a knock."""
 N_KNOCK_NEIGHBORS = 6
 """Pieces on each side that a piece is compared with ..."""
 KNOCK_PEAK_QUANTILE = 0.75
@@ -172,7 +172,8 @@ def _build_parts(
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
     """How many pieces at the beginning and at the end of a cut stand beside its longest part of one loudness.
 
-    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself changes.
+    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself
+    changes.
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_QUIET_PIECES)
     usual = _join_stretches(_find_stretches(np.abs(smooth - np.median(smooth)) < ENTRY_LOUDNESS_STEP), join)
@@ -201,7 +202,7 @@ def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
 def _loudness(power: Floats) -> Floats:
     """Return log10 of the power of each piece over that of the quietest part, averaged over the frequencies.
 
-    Mean over frequency, not of logarithms: a light cut is heard in few lines. power: shape (pieces, frequencies).
+    Mean over frequency, not of logarithms: a light cut is recorded in few peaks. power: shape (pieces, frequencies).
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
     beside = N_QUIET_PIECES // 2

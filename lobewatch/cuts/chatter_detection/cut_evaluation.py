@@ -45,7 +45,7 @@ from lobewatch.cuts.chatter_detection.spindle_speed import (
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
-"""Energy of what is left over that of the comb: above it, with side bands, a cut chatters ..."""
+"""Energy of what is left over that of the comb: above it, with sidebands, a cut chatters ..."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
 """... without side bands above this ..."""
 MAX_STABLE_ENERGY = 2e-4
@@ -53,7 +53,7 @@ MAX_STABLE_ENERGY = 2e-4
 MIN_COMB_ENERGY = 1e-9
 """Least energy that the comb is taken to have, over that of what is left."""
 MIN_SIDEBANDS = 3
-"""Number of lines of a family that is chatter for sure."""
+"""Number of peaks of a family that is chatter for sure."""
 FLIP_TOLERANCE = 0.003
 """Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
 MAX_UNEVEN_ENERGY = 5.0
@@ -63,15 +63,15 @@ MAX_RUNOUT_ENERGY = 8.0
 SLOT_IMMERSION = 0.95
 """Immersion from which on tooth passing nearly vanishes."""
 END_PEAK_TOLERANCE = 1.0
-"""Distance of a line at the end of a cut up to which it is that of the whole cut (bins)."""
+"""Distance of a peak at the end of a cut up to which it is that of the whole cut (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutEvaluation:
-    """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
+    """Evaluation of one cut in a recording, with its evidence; None and NaN where it did not get so far."""
 
     verdict: CutVerdict
-    """Word for what the cut sounded like."""
+    """Verdict on the cut."""
     reason: str
     """Code of why it cannot be told; empty where it can."""
     parts: CutParts = WHOLE_SIGNAL
@@ -79,19 +79,19 @@ class CutEvaluation:
     spindle_speed: SpindleSpeed | None = None
     """True speed of the spindle."""
     energy_ratio: float = np.nan
-    """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
+    """Energy of what is left, at the end of the cut, over that of the harmonics of the spindle."""
     chatter: ChatterPeaks | None = None
-    """Lines of chatter."""
+    """Peaks of chatter."""
     peaks: PeaksByOrigin | None = None
-    """All lines, by where they come from."""
+    """All peaks, by where they come from."""
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
     distant_rpm: float = np.nan
-    """Speed further from the one that was set that the lines fit (rpm); NaN without one, or where one is near."""
+    """Speed further from the one that was commanded that the peaks fit (rpm); NaN without one, or where one is near."""
     tone: float = np.nan
     """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
     axis: int = 0
-    """Which of several axes the word rests on, from 0."""
+    """Which of several axes the verdict rests on, from 0."""
     measured_rpm: float | None = None
     """Speed by the tachometer in the cut (rpm), NaN where it gave none there; None without a tachometer."""
 
@@ -113,15 +113,15 @@ def evaluate_cut(
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
-    commanded_rpm as it was set; measured_rpm by a tachometer, which the lines must not contradict
-    ("tacho-contradicts"); None without one. All axes have one speed, and the word is that of the loudest evidence: of
-    the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
-    "speed-not-found", "no-air" (also where only lines that are there in air make a speed, which is named),
+    commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
+    ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
+    of the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
+    "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
     "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
-    "unexplained-tone" (a line without side bands), "slow-sampling" (fewer than three multiples of tooth passing are
-    heard, folded ones too).
+    "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
+    recorded, folded ones too).
 
-    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+    Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
     >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
     >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
@@ -152,7 +152,7 @@ def evaluate_cut(
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
-    """Evaluate one axis; a tone without sidebands is looked for in pieces of the air, too."""
+    """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     lines = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
     unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin_width)
     by_origin = classify_peaks(lines, spectrum, quiet, turning, teeth, unsteady)
@@ -200,7 +200,7 @@ def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: fl
 
 
 def _speed_not_found(spectrum: Spectrum, elsewhere: float) -> CutEvaluation:
-    """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: speed that fits (rpm), or NaN."""
+    """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: a speed that fits (rpm)."""
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=elsewhere)
 
 

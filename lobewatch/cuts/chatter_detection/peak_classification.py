@@ -24,15 +24,15 @@ from lobewatch.cuts.chatter_detection.spectrum import (
 N_STEADINESS_PARTS = 4
 """Parts that a cut is divided into."""
 N_STEADINESS_PEAKS = 8
-"""Multiples that are looked at."""
+"""Harmonics that are checked."""
 MAX_UNSTEADINESS = 2e-3
-"""Largest change that is looked for, relative."""
+"""Largest change that is searched, relative."""
 MIN_UNSTEADINESS = 1e-4
 """Change that every spindle varies by, relative; chosen."""
 UNSTEADINESS_FACTOR = 3.0
 """Change of the speed over that of the means of the parts: within a part it varies too; chosen."""
 MIN_STEADINESS_PEAKS = 3
-"""Multiples that must have changed alike."""
+"""Harmonics that must have changed alike."""
 
 
 def estimate_unsteadiness(
@@ -67,54 +67,54 @@ def _speed_change(off: Floats) -> float:
 
 
 PEAK_TOLERANCE = 1.2
-"""A line belongs to a frequency that is no further away than this (bins)."""
+"""A peak belongs to a frequency that is no further away than this (bins)."""
 MAX_AIR_POWER_RATIO = 9.0
-"""Power of a line over that which it has in air, below which it comes from elsewhere."""
+"""Power of a peak over that which it has in air, below which it comes from elsewhere."""
 AIR_PEAK_TOLERANCE = 2.0
-"""Distance up to which a line of the air part is the same (bins of its own)."""
+"""Distance up to which a peak of the air part is the same (bins of its own)."""
 AIR_PIECE_LENGTH = 0.5
-"""Length of the pieces of air in which tones are looked for that come and go (s); each begins in the middle of the one
+"""Length of the pieces of air in which tones are searched that come and go (s); each begins in the middle of the one
 before it; chosen ..."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
 """... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
 once in 1000 airs of 10 s; chosen."""
 MAX_FOLDED_RATES = 2.0
-"""Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
+"""Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
 UPPER_BAND_SHARE = 0.7
 """... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
 MAX_HARMONICS = 16
 """... or than any, where fewer than this are below half the sample rate; chosen."""
 MIN_TOOTH_HARMONICS = 3
-"""Multiples of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
+"""Harmonics of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
 FOLDED_PEAK_SLACK = 1e-3
 """... and so much further off, relative: from few lines the speed is no better known."""
 MAX_FOLDED_AMPLITUDE = 1.5
-"""Amplitude of a folded multiple over that of the loudest multiple, at most."""
+"""Amplitude of a folded harmonic over that of the loudest harmonic, at most."""
 MAX_WAVERING_ENERGY = 0.05
-"""Energy of all that is left over that of the multiples up to which lines as near to these as `steadiness.MOST` are of
-a speed that wavers; chosen, with a stable cut that a microphone has heard in sight."""
+"""Energy of all that is left over that of the harmonics up to which peaks as near to these as `MAX_UNSTEADINESS` are
+of a speed that wavers; chosen, with a stable cut that a microphone has recorded in sight."""
 MAX_SPEED_ERRORS = 3.0
-"""Standard errors of the spindle frequency within which its multiples may lie; chosen."""
+"""Standard errors of the spindle frequency within which its harmonics may lie; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class PeaksByOrigin:
-    """All lines of a cut."""
+    """All peaks of a cut."""
 
     comb: SpectralPeaks
-    """Multiples of the frequency of the spindle, the first left out: it is there in air."""
+    """Harmonics of the frequency of the spindle, the first left out: it is there in air."""
     tooth_order: Integers
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
     air: SpectralPeaks
-    """Lines that are there in air."""
+    """Peaks that are there in air."""
     folded: SpectralPeaks
-    """Lines where multiples above half the sample rate are folded to."""
+    """Peaks where harmonics above half the sample rate are folded to."""
     unexplained: SpectralPeaks
-    """Lines that are left: chatter, where there is any."""
+    """Peaks that are left: chatter, where there is any."""
 
 
 def is_in_air(lines: SpectralPeaks, air: Spectrum) -> Flags:
-    """Whether lines are there in air too."""
+    """Whether peaks are there in air too."""
     return np.asarray(
         lines.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(lines.frequency, AIR_PEAK_TOLERANCE)
     )
@@ -124,7 +124,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """Add intermittent tones of the air near frequencies (Hz) to its spectrum.
 
     signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
-    does what passes by 40 Hz in a piece or faster, as a multiple of a spindle that is slowing down.
+    does what passes by 40 Hz in a piece or faster, as a harmonic of a spindle that is slowing down.
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
@@ -153,7 +153,7 @@ def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Spec
 
 
 def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
-    """Whether fewer than three multiples of tooth passing are below half the sample rate."""
+    """Whether fewer than three harmonics of tooth passing are below half the sample rate."""
     return spectrum.sample_rate / 2 < MIN_TOOTH_HARMONICS * teeth * turning.frequency
 
 
@@ -162,7 +162,7 @@ def classify_peaks(
 ) -> PeaksByOrigin:
     """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
 
-    unsteady: by how much the speed varies, relative: multiples are so much wider.
+    unsteady: by how much the speed varies, relative: harmonics are this much wider.
     """
     order = np.round(lines.frequency / turning.frequency)
     away = np.abs(lines.frequency - order * turning.frequency)
@@ -196,7 +196,7 @@ def _remove_wavering(
 def _is_near_folded(
     lines: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> Flags:
-    """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
+    """Whether peaks lie where harmonics of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
     if not orders.size:
@@ -209,15 +209,15 @@ def _is_near_folded(
 
 
 MIN_CHATTER_AMPLITUDE = 0.1
-"""Share of the loudest amplitude that a line has that names chatter ..."""
+"""Share of the loudest amplitude that a peak has that names chatter ..."""
 MIN_FAMILY_AMPLITUDE = 1e-3
 """... and one that belongs to it."""
 MAX_CHATTER_ANCHORS = 12
-"""Lines whose families are compared."""
+"""Peaks whose families are compared."""
 CHATTER_HARMONICS = 3
-"""Multiples of a frequency that are looked for."""
+"""Harmonics of a frequency that are searched."""
 DISPLACEMENT_WEIGHT = 0.3
-"""Weight of the displacement of a family beside the lines that it explains; chosen ..."""
+"""Weight of the displacement of a family beside the peaks that it explains; chosen ..."""
 MIN_FAMILY_ENERGY = 0.25
 """... which has this share of the energy of the largest at least."""
 
@@ -227,18 +227,18 @@ class ChatterPeaks:
     """One family."""
 
     frequency: float
-    """Frequency of the line with the largest displacement (Hz)."""
+    """Frequency of the peak with the largest displacement (Hz)."""
     error: float
     """Standard error of the frequency (Hz)."""
     peaks: SpectralPeaks
-    """All lines f_c + k tooth passing."""
+    """All peaks f_c + k tooth passing."""
 
 
 def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float) -> ChatterPeaks:
     """Find the family of peaks that chatter is named by, in Hz; left: at least one unexplained peak.
 
-    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
-    taken whose multiples explain the most, and whose displacement, amplitude over frequency squared, is large.
+    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their sidebands too. So that of the loudest peaks is
+    taken whose harmonics explain the most, and whose displacement, amplitude over frequency squared, is large.
     """
     part = left.amplitude > MIN_FAMILY_AMPLITUDE * np.max(left.amplitude)
     weight = np.where(part, (left.amplitude / left.frequency**2) ** 2, 0.0)

@@ -31,15 +31,15 @@ NOISE_BINS = 64
 NOISE_QUANTILE = 0.25
 """... as this quantile of their power: lines may fill the rest."""
 MIN_PEAK_POWER = 25.0
-"""A line has so many times the power of the noise: noise reaches it once in 1e11 bins."""
+"""A peak has this many times the power of the noise: noise reaches it once in 1e11 bins."""
 MIN_PEAK_DISTANCE = 1.5
-"""Least distance of two lines that are told apart (bins)."""
+"""Least distance of two peaks that are told apart (bins)."""
 SKIRT_BINS = 10.0
-"""Distance up to which a line has a skirt (bins): 5 of the window's own width ..."""
+"""Distance up to which a peak has a skirt (bins): 5 of the window's own width ..."""
 SKIRT_AMPLITUDE_RATIO = 3.0
 """... of lines so many times fainter: a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
-"""Standard error of the frequency of a line, over the root of its clearness (bins) ..."""
+"""Standard error of the frequency of a peak, over the root of its clearness (bins) ..."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
 """... and the part of it that stays however clear the line is (bins)."""
 
@@ -104,7 +104,7 @@ def compute_spectrum(signal: Floats, sample_rate: float) -> Spectrum:
 
 
 def compute_power(signal: Floats, size: int) -> Floats:
-    """Compute the squared amplitude at each frequency, shape (size // 2 + 1,); the signal is zero-padded to this size."""
+    """Compute the squared amplitude at each frequency, shape (size // 2 + 1,), of a zero-padded signal."""
     phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
     window = sum(share * np.cos(k * phase) for k, share in enumerate(BLACKMAN_HARRIS))
     return np.asarray((2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2)

@@ -29,28 +29,29 @@ from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
 )
 
 COMB_SPEED_TOLERANCE = 0.05
-"""Relative distance from the speed that was set up to which a plain comb is looked for ..."""
+"""Relative distance from the speed that was commanded up to which a plain comb is searched ..."""
 USUAL_SPEED_TOLERANCE = 0.002
 """... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
 SAME_SPEED_TOLERANCE = 1e-3
 """... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
-many lines: it has one unknown, they have one more for each family of side bands."""
+many peaks: it has one unknown, they have one more for each family of sidebands."""
 MIN_SURE_VOTES = 6
-"""Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all of them."""
+"""Peaks that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all
+of them."""
 VOTE_SPEED_TOLERANCE = 0.021
-"""Relative distance from the speed that was set up to which votes are counted."""
+"""Relative distance from the speed that was commanded up to which votes are counted."""
 MAX_VOTE_HARMONIC = 60
-"""Multiples of the frequency of the spindle by which two of them may differ."""
+"""Harmonics of the frequency of the spindle by which two of them may differ."""
 VOTE_WIDTH = 0.25
-"""Standard deviation of a line in the count of votes (bins)."""
+"""Standard deviation of a peak in the count of votes (bins)."""
 VOTE_GRID_STEP, FINEST_VOTE_HARMONIC = 0.25, 40
-"""Step of the grid of speeds, over the standard deviation of the vote of this multiple; chosen."""
+"""Step of the grid of speeds, over the standard deviation of the vote of this harmonic; chosen."""
 OWN_PEAK_TOLERANCE = 0.5
-"""Distance up to which a line is that of the turning spindle (bins); chosen."""
+"""Distance up to which a peak is that of the rotating spindle (bins); chosen."""
 VOTE_REACH = 2
 """Standard deviations up to which a vote is spread."""
 MIN_OWN_PEAK_VOTES = 0.2
-"""A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+"""A speed whose own peak is recorded is taken where it has this much of the votes of the best one."""
 MAX_SPEED_MISFIT = 4.0
 """A speed with a larger misfit is compared with others ..."""
 MAX_RIVAL_SPEEDS = 12
@@ -58,7 +59,8 @@ MAX_RIVAL_SPEEDS = 12
 VOTE_PEAK_WIDTH = 9
 """... of as many steps of the grid around each."""
 MIN_GRID_SHARE = 0.5
-"""Share of the lines that must belong to the lattice, and must have a neighbour one or two turns or teeth away ..."""
+"""Share of the peaks that must belong to the harmonic grid, and must have a neighbour one or two turns or teeth away
+..."""
 MIN_AGREEING_PEAKS = 3
 """... and number of them that must agree: a pump that is switched on has lines of its own."""
 
@@ -70,7 +72,7 @@ def find_spindle_speed(
 
     cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
 
-    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+    Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
     >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
     >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
@@ -87,7 +89,7 @@ def find_spindle_speed(
 def find_speed_of_spectra(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """`find_spindle_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
+    """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
     lines, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, lines, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
@@ -121,9 +123,9 @@ def find_speed_by_votes(
 ) -> SpindleSpeed | None:
     """Find the spindle frequency (Hz) by votes of peaks near the commanded one, or None.
 
-    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two lines, each
-    sum and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice:
-    chatter f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two peaks, each
+    sum and each peak itself votes for the frequencies that it is a harmonic of, for harmonics of the teeth twice:
+    chatter f_c + k f counts as much as the harmonics k f. The best is made exact by least squares.
     """
     loudest = cut_lines.loudest(MAX_COMB_PEAKS)
     if len(loudest) < 2:
@@ -195,12 +197,12 @@ def _smooth_votes(votes: Floats, width: float) -> Floats:
 
 
 TACHOMETER_TOLERANCE = 2e-3
-"""Relative difference up to which a tachometer and the lines say one speed: a column may be rounded; chosen."""
+"""Relative difference up to which a tachometer and the peaks say one speed: a column may be rounded; chosen."""
 TACHOMETER_ERROR = 5e-5
 """Relative standard error of a tachometer: a sample at each end of a second or two; chosen."""
 PULSE_RATIO_TOLERANCE = 0.02
-"""Relative distance from a whole number within which a tachometer over the speed that was set, or the inverse, speaks
-of pulses that were counted wrong; chosen."""
+"""Relative distance from a whole number within which a tachometer over the speed that was commanded, or the inverse,
+speaks of pulses that were counted wrong; chosen."""
 
 
 def check_tachometer_speed(
@@ -209,8 +211,8 @@ def check_tachometer_speed(
     """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
     commanded: as it was set, measured: by the tachometer (Hz). Where it is more than 5 % off what was set, it is
-    followed if the lines fit it alone and it is no multiple of that. Where no lines say a speed near it, it is the
-    speed by itself, if three of them are its multiples.
+    followed if the peaks fit it alone and it is no harmonic of that. Where no peaks say a speed near it, it is the
+    speed by itself, if three of them are its harmonics.
     """
     is_near = abs(measured / commanded - 1) < COMB_SPEED_TOLERANCE
     at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
@@ -225,7 +227,7 @@ def check_tachometer_speed(
 
 
 def is_pulse_multiple(ratio: float) -> bool:
-    """Whether a tachometer over the speed that was set is a whole number above 1, or one over it."""
+    """Whether a tachometer over the speed that was commanded is a whole number above 1, or one over it."""
     whole = max(ratio, 1 / ratio)
     return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
 
@@ -243,7 +245,7 @@ def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], 
 HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
 """Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
 MIN_DISTANT_SHARE = 0.5
-"""Share of the lines beside the multiples of a speed, or of their energy, on another that takes its place; chosen."""
+"""Share of the peaks beside the harmonics of a speed, or of their energy, on another that takes its place; chosen."""
 
 
 def find_distant_speed(
@@ -256,9 +258,9 @@ def find_distant_speed(
 ) -> float:
     """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    heard: the speed that was found, and beside: lines that are no multiples of it. Only a comb whose multiples
-    they are, and on which more lines agree, is one then. That of half of it is none, which chatter of period two makes;
-    the mains hum at multiples of theirs.
+    recorded: the speed that was found, and beside: peaks that are no harmonics of it. Only a comb whose harmonics
+    they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of period two
+    makes; the mains hum at harmonics of theirs.
     """
     lines, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth

@@ -20,36 +20,36 @@ from lobewatch.cuts.chatter_detection.spectrum import (
 )
 
 COMB_TOLERANCE = 1.2
-"""Distance from a multiple up to which a line belongs to it (bins): as wide as a line (`sorted_lines.WIDE`)."""
+"""Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""
 COMB_SPEED_WAVER = 1e-4
-"""Change of every speed, relative (`steadiness.LEAST`): by so much multiples are unsure."""
+"""Change of every speed, relative (`MIN_UNSTEADINESS`): by this much harmonics are unsure."""
 MAX_COMB_PEAKS = 40
-"""Lines that are looked at ..."""
+"""Peaks that are checked ..."""
 MAX_COMB_ANCHORS = 16
 """... and those that a comb is looked for from; chosen."""
 COMB_FIT_STEPS = 3
 """Steps of the least squares."""
 MAX_COMB_CHANCE = 1e-4
-"""A comb that as many lines as random would have more often than this, over all combs that are tried, is none."""
+"""A comb that as many peaks as random would have more often than this, over all combs that are tried, is none."""
 MAX_PEAK_WEIGHT = 3.0
-"""Most that one line counts, in log10 of its clearness: a loud one is no more than a line; chosen."""
+"""Most that one peak counts, in log10 of its clearness: a loud one is no more than a peak; chosen."""
 MIN_COMB_SHARE = 0.5
-"""Share of the lines that a comb far from the speed that was set explains at least."""
+"""Share of the peaks that a comb far from the speed that was commanded explains at least."""
 MIN_COMB_HARMONICS = 3
-"""Multiples that a comb has at least: any two lines have one."""
+"""Harmonics that a comb has at least: any two peaks have one."""
 
 
 class Comb(NamedTuple):
-    """A frequency, and the lines that are its multiples."""
+    """A frequency, and the peaks that are its harmonics."""
 
     frequency: float
     """Frequency (Hz)."""
     is_member: Flags
-    """Which lines are multiples, shape (n,)."""
+    """Which peaks are harmonics, shape (n,)."""
     order: Floats
     """Order of each, shape (n,)."""
     offset: Floats
-    """Distance of each from its multiple (Hz), as that is folded, shape (n,)."""
+    """Distance of each from its harmonic (Hz), as that is folded, shape (n,)."""
 
 
 def find_comb(
@@ -57,8 +57,8 @@ def find_comb(
 ) -> SpindleSpeed | None:
     """Find the comb within `around` (relative) of a frequency (Hz) that explains the most peaks, or None.
 
-    lines: of all axes, without skirts; bin_: of the spectrum (Hz). Each line is a vote for the frequencies that it is a
-    multiple of; those of the loudest are compared, after least squares, by the lines that they explain.
+    peaks: of all axes, without skirts; bin_: of the spectrum (Hz). Each peak is a vote for the frequencies that it
+    is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
     """
     lines = lines.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
@@ -74,8 +74,8 @@ def find_distant_comb(
 ) -> SpindleSpeed | None:
     """Find the best comb between half and twice a frequency (Hz), farther than `around` from it, or None.
 
-    Of those that explain as many tenths of the lines that of which all are tooth passing, else the highest; none of
-    which all multiples have an order in common that the teeth have not: that is a part of another.
+    Of those that explain as many tenths of the peaks that of which all are tooth passing, else the highest; none of
+    which all harmonics have an order in common that the teeth have not: that is a part of another.
     """
     lines, best, rank = lines.loudest(MAX_COMB_PEAKS), None, (0.0, False, 0.0)
     for centre in list_distant_centers(frequency, around):
@@ -154,7 +154,7 @@ def _peak_error(lines: SpectralPeaks, bin_: float) -> Floats:
 def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, teeth: int, around: float) -> float:
     """Return how many of all combs tried would have as many harmonics among random peaks.
 
-    Multiples of tooth passing alone are so much rarer.
+    Harmonics of tooth passing alone are this much rarer.
     """
     orders = np.unique(comb.order[comb.is_member])
     if orders.size < MIN_COMB_HARMONICS:
@@ -176,24 +176,24 @@ def _comb_speed(comb: Comb, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
 
 
 MIN_HARMONIC_LEVEL = 0.6
-"""log10 of its power over that of the noise from which on a multiple counts: noise is seldom so loud; chosen ..."""
+"""log10 of its power over that of the noise from which on a harmonic counts: noise is seldom so loud; chosen ..."""
 MAX_HARMONIC_LEVEL = 2.4
 """... and the most that it counts beyond that; chosen."""
 SUM_FREQUENCY_STEP = 0.25
-"""Step of the frequencies that are tried, over what moves the highest multiple by a bin; chosen."""
+"""Step of the frequencies that are tried, over what moves the highest harmonic by a bin; chosen."""
 N_SUM_LEVELS = 100
-"""Levels into which a multiple's part of the sum is divided."""
+"""Levels into which a harmonic's part of the sum is divided."""
 CLEAR_SUM_MEAN = 1 / 3
-"""Mean over the multiples below which a comb must be far rarer by chance, which takes each for itself: side bands of a
-line that is no multiple come together; chosen ..."""
+"""Mean over the harmonics below which a comb must be far rarer by chance, which takes each for itself: sidebands of
+a peak that is no harmonic come together; chosen ..."""
 FAINT_SUM_CHANCE = 1e-8
 """... as this; chosen."""
 MAX_REMAINING_CHANCE = 0.05
-"""How often chance may make the multiples that are left without those of one order; chosen."""
+"""How often chance may make the harmonics that are left without those of one order; chosen."""
 HARMONIC_BINS = 4.0
-"""Distance from a multiple up to which the spectrum is its own (bins): half the width of the window's main lobe."""
+"""Distance from a harmonic up to which the spectrum is its own (bins): half the width of the window's main lobe."""
 WEAK_PEAK_POWER = 4.0
-"""Power over that of the noise of the lines from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
+"""Power over that of the noise of the peaks from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
 
 
 def find_comb_by_sum(
@@ -207,11 +207,11 @@ def find_comb_by_sum(
 ) -> SpindleSpeed | None:
     """Find the comb within `around` (relative) of a frequency (Hz) that is loudest over the noise, or None.
 
-    spectra and air: of each axis; what is no louder than in air does not count. lines: those that stand clear, of all
-    axes; where they are many, they settle it, and there is one on a multiple of anything. The mean over all axes of
-    log10 of power over noise is summed over the multiples (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It is a
-    comb where as many frequencies that are no multiples would have that sum less often than once in ten thousand, over
-    all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
+    spectra and air: of each axis; what is no louder than in air does not count. peaks: those that stand clear, of
+    all axes; where they are many, they settle it, and there is one on a harmonic of anything. The mean over all axes
+    of log10 of power over noise is summed over the harmonics (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It
+    is a comb where as many frequencies that are no harmonics would have that sum less often than once in ten
+    thousand, over all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
     """
     if len(lines) >= MAX_COMB_PEAKS * len(spectra):
         return None

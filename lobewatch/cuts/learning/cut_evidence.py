@@ -14,17 +14,17 @@ from lobewatch.machine.journal.cut_entry import CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
 
 DRIVE_POWER_SPREAD = 0.15
-"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency of
-motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
+"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency
+of motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
 EDGE_FORCE_SPREAD, UNKNOWN_EDGE_FORCE_SPREAD = 0.3, 0.5
-"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it was
-measured with), and where it is not: what is published differs by three times."""
+"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it
+was measured with), and where it is not: what is published differs by three times."""
 POWER_READING_SPREAD = 0.05
 """Standard deviation, relative, of one reading: a display that jumps, a feed or a radial depth a little off."""
 CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD = 0.89, 0.08
-"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations in
-time: edges that have left the cut do not rub, and thick chips, which it has beside thin ones, cost less. See
-docs/cuts.md."""
+"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations
+in time: edges that have left the cut do not rub, and thick chips, which it has next to thin ones, cost less.
+See docs/cuts.md."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ class CutEvidence:
     depth: float
     """Axial depth (m)."""
     verdict: CutVerdict
-    """Word for what it sounded like."""
+    """Verdict on its sound."""
     frequency: float = math.nan
-    """Chatter frequency (Hz); NaN where none was heard or told."""
+    """Chatter frequency (Hz); NaN where none was recorded or told."""
     feed_angles: tuple[float, ...] = (0.0,)
     """Directions it may have been fed in, as angles from x (rad): the worst counts."""
     material: int = 0
@@ -111,7 +111,7 @@ class CutEvidence:
 
 TAKEN_SPEED_TOLERANCE, TAKEN_DEPTH_TOLERANCE = 0.01, 0.04
 """Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen: what is
-less deep than an edge (`likelihood.EDGE`) the spindles that are learnt tell by themselves ..."""
+less deep than an edge (`LIMIT_SPREAD`) the spindles that are learned tell by themselves ..."""
 REJECTED_DEPTH_TOLERANCE = 0.10
 """... but not where they do not believe it."""
 

@@ -24,15 +24,15 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constan
 LIMIT_SPREAD = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
 MISLABELED_SHARE = 0.03
-"""Share of cuts that are written down as what they are not; chosen: 2.7 % are heard wrong, some are typed wrong."""
+"""Share of cuts that are written down as what they are not; chosen: 2.7 % are recorded wrong, some are typed wrong."""
 UNPITCHED_MISLABELED_SHARE = 0.06
-"""The same of chatter of which no frequency was told, so that nothing speaks for it but the word; chosen."""
+"""The same of chatter of which no frequency was told, so that nothing speaks for it but the verdict; chosen."""
 CHATTER_FREQUENCY_SPREAD = 0.01
 """Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
 FOREIGN_FREQUENCY_SHARE = 0.05
 """Share of chatter frequencies that say nothing; chosen, see docs/cuts.md, How good it is."""
 WRONG_KIND_SHARE = 0.1
-"""Share of chatter that is heard as that of the other kind; chosen."""
+"""Share of chatter that is recorded as that of the other kind; chosen."""
 MULTIPLIER_ACCURACY = 1e-3
 """Accuracy of a multiplier, relative."""
 FLIP_ANGLE_TOLERANCE = 1e-3
@@ -49,7 +49,8 @@ class CutPrediction(NamedTuple):
     frequency: Floats
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
     limit_frequency: Floats
-    """Folded frequency at the limit of its speed, by zero order (Hz); may be NaN where the cut says nothing of any."""
+    """Folded frequency at the limit of its speed, by the zero-order approximation (Hz); may be NaN where the cut
+    says nothing of any."""
     is_flip: Flags
     """Whether that is of period two."""
 
@@ -66,8 +67,8 @@ class CutPrediction(NamedTuple):
     def frequency_distances(self, cut: CutEvidence) -> Floats:
         """Return the distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
 
-        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
-        limit of a pocket these are two modes or lobes.
+        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond
+        the limit of a pocket these are two modes or lobes.
         """
         return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
 
@@ -86,8 +87,8 @@ def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
 def log_likelihood(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
     """Return the log likelihood of the recorded verdict for each sample, shape (r,).
 
-    again: the same cut as it was made at other times, whose words are known: all have one truth, so that of two words
-    that differ one is wrong, however near its limit the cut is.
+    again: the same cut as it was made at other times, whose verdicts are known: all have one truth, so that of two
+    verdicts that differ one is wrong, however near its limit the cut is.
     """
     return np.asarray(np.log(sum(_likelihoods(cut, prediction, again))))
 
@@ -101,9 +102,9 @@ def mislabel_probability(cut: CutEvidence, prediction: CutPrediction, again: Seq
 def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> tuple[Floats, float]:
     """Return the log distance of Kt by power from that of each sample, and its variance.
 
-    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e standard
-    normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance. ValueError for a
-    cut without power.
+    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e
+    standard normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance.
+    ValueError for a cut without power.
     """
     if cut.power is None:
         raise ValueError(f"cut {cut.id} has no power; ask for one that has")

@@ -19,15 +19,15 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constan
 from modal import Mode
 
 SPEED_GRID_STEP = 0.008
-"""Relative step of the speeds that are looked at."""
+"""Relative step of the speeds that are checked."""
 TRIED_SPEED_STEP_RPM, TRIED_DEPTH_STEP_MM = 10.0, 0.05
 """Steps that can be set at a machine (rpm and mm)."""
 DEPTH_ROUNDING = 1e-6
 """Share of a step of depth that rounding of numbers may miss."""
 N_COMPARED_SPEEDS = 80
-"""Number of speeds at which zero order is compared with semi-discretisation."""
+"""Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
-"""Least and largest ratio of true limit to zero order that is believed; chosen."""
+"""Least and largest ratio of true limit to the zero-order limit that is believed; chosen."""
 
 TipModes = Sequence[Mode] | None
 
@@ -45,7 +45,7 @@ class CutGrid:
     max_depths: Floats
     """Depth that tool and drive allow at each (m), shape (s,)."""
     zero_order_trust: Floats
-    """True limit in the middle over that by zero order, at each speed, shape (s,)."""
+    """True median limit over that by the zero-order approximation, at each speed, shape (s,)."""
 
     def contains(self, speed: float) -> bool:
         """Return whether a speed (rpm) lies within the grid, with the tolerance of a recorded speed."""
@@ -74,7 +74,7 @@ def compare_zero_order(
 ) -> Floats:
     """Return the true limit over the zero-order limit at speeds (rpm), shape (s,).
 
-    x and y: modes of the spindle in the middle. Semi-discretisation at fewer speeds, between them interpolated.
+    x and y: modes of the spindle in the median. Semi-discretisation at fewer speeds, between them interpolated.
     """
     if is_force_constant(cut):
         return np.ones(speeds.shape)
@@ -89,25 +89,25 @@ def compare_zero_order(
 MIN_STABLE_PROBABILITY = 0.5
 """Chance of being stable that a test cut has at least."""
 TRIED_STABLE_PROBABILITIES = (0.51, 0.6, 0.7, 0.8, 0.9)
-"""Chances of being stable, of the depths that are looked at; chosen."""
+"""Chances of being stable, of the depths that are checked; chosen."""
 MAX_CANDIDATE_SPEEDS, MIN_CANDIDATE_DISTANCE = 8, 0.02
-"""Largest number of speeds that are looked at, and their least relative distance; chosen."""
+"""Largest number of speeds that are checked, and their least relative distance; chosen."""
 N_EXPECTED_FREQUENCIES = 4
-"""Number of chatter frequencies that may be heard, of which it is worked out what they would tell."""
+"""Number of chatter frequencies that may be recorded, of which it is worked out what they would tell."""
 FREQUENCY_ERROR_FACTOR = 1.5
 """Factor on the error of a chatter frequency, since that at the limit stands for that at the depth; chosen."""
 LIMIT_DEPTH_MARGIN = 1e-6
 """Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
 MAX_LABEL_DEVIATION = 2.0
-"""Edges (`likelihood.EDGE`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
-the word is more likely wrong."""
+"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond
+it the verdict is more likely wrong."""
 EQUAL_DEPTH_TOLERANCE = 1e-9
 """Difference of two depths that is none (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitCharts:
-    """Limits of draws of equal weight over the speeds of a grid."""
+    """Limits of samples of equal weight over the speeds of a grid."""
 
     grid: CutGrid
     """Speeds and depths that a cut may be chosen from."""
@@ -116,7 +116,7 @@ class LimitCharts:
     frequencies: Floats
     """Chatter frequencies at them, folded by how often the cut repeats (Hz), shape (r, s)."""
     depth_order: Indices
-    """Draws of each speed by their limits, the deepest first, shape (r, s)."""
+    """Samples of each speed by their limits, the deepest first, shape (r, s)."""
     typical_frequency: float
     """A natural frequency (Hz)."""
     removal_rates: Floats

@@ -20,9 +20,9 @@ from lobewatch.cuts.learning.cut_likelihood import (
 from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
 
 MAX_WRONG_PROBABILITY = 0.5
-"""Chance that the word of a cut is wrong, given all cuts, from which it is not believed."""
+"""Chance that the verdict of a cut is wrong, given all cuts, from which it is not believed."""
 N_CHECK_SAMPLES = 300
-"""Number of draws that are asked what they say of a cut."""
+"""Number of samples that are asked what they say of a cut."""
 MAX_FREQUENCY_DEVIATION = 4.0
 """Distance (standard deviations) from all frequencies predicted at which chatter is that of something else, and from
 the Kt that was known at which a power is not believed; chosen."""
@@ -135,7 +135,8 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
         Contradiction.POWER: (
             f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
             "another depth, worn edges?",
-            "read it again, or take the cut whose power was misread out with folder_updates.exclude_entry; its word counts",
+            "read it again, or take the cut whose power was misread out with folder_updates.exclude_entry; "
+            "its word counts",
         ),
     }[contradicting.contradiction]
     return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

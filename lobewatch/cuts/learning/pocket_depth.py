@@ -30,7 +30,7 @@ PROGRAM_SPEED_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class PocketDepth:
-    """A pocket with what was heard in it."""
+    """A pocket with what was recorded in it."""
 
     pocket: SpeedPocket
     """Pocket by f_n and damping."""
@@ -39,7 +39,7 @@ class PocketDepth:
     cuts: tuple[CutEvidence, ...]
     """Cuts of the same cutter, material and immersion in its window."""
     max_depth: float
-    """Deepest cut that machine and tool bear there (m)."""
+    """Deepest cut that machine and tool allow there (m)."""
 
     @property
     def chatter_depth(self) -> float:
@@ -48,12 +48,12 @@ class PocketDepth:
 
     @property
     def stable_depth(self) -> float:
-        """Deepest depth that was heard stable, shallower than all chatter (m); 0 where none was."""
+        """Deepest depth that was recorded stable, shallower than all chatter (m); 0 where none was."""
         stable = (cut.depth for cut in self.cuts if not cut.has_chatter)
         return max((depth for depth in stable if depth < self.chatter_depth), default=0.0)
 
     def next_depth(self, first: float) -> float | None:
-        """Choose the depth of the next cut (m): twice the stable one, or between stable and chatter; None if there is none.
+        """Choose the depth of the next cut (m): twice the stable one, or between stable and chatter, or None.
 
         first: depth to begin with (m).
         """

@@ -1,4 +1,4 @@
-"""What was learnt of the turning spindle: draws from the prior, weighted by how well they explain its cuts."""
+"""What was learned of the rotating spindle: samples from the prior, weighted by how well they explain its cuts."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.uncertainty import Uncertainty
 
 N_PRIOR_SAMPLES = 2000
-"""Number of draws."""
+"""Number of samples."""
 N_REFRESHED_SAMPLES = 500
-"""Number of draws that are made anew where few have any weight left ..."""
+"""Number of samples that are redrawn where few have any weight left ..."""
 MIN_EFFECTIVE_SAMPLES = 120
 """... which is when the effective sample size is less."""
 N_MARKOV_MOVES, MARKOV_STEP_SHARE = 4, 0.5
 """Number of times that each is then moved, and how far, as a share of their own spread; chosen."""
 ADDED_VARIANCE = 1e-4
-"""Variance that is added to that of the draws before they are moved: a few alike have none of their own."""
+"""Variance that is added to that of the samples before they are moved: a few alike have none of their own."""
 NEGLIGIBLE_WEIGHT = 1e-6
-"""Share of the largest weight below which a draw is not looked at any more."""
+"""Share of the largest weight below which a sample is not checked any more."""
 MIN_CHATTER_FREQUENCIES, OPEN_FREQUENCY_INTERVAL = 2, (0.90, 1.05)
-"""Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is; chosen."""
+"""Chatter frequencies without which it is unknown how far a spindle at speed may be off, and how far that is;
+chosen."""
 USUAL_FREQUENCY_INTERVAL = (0.945, 1.025)
-"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `priors.FREQUENCY`."""
+"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `ROTATING_FREQUENCY_FACTOR`."""
 INTERVAL_LEVEL = 0.95
 """Share of the weight that an interval holds."""
 
 
 class Interval(NamedTuple):
-    """A number that is learnt, as a factor on that at rest (on that of the table, of coefficients)."""
+    """A number that is learned, as a factor on that at rest (on that of the table, of coefficients)."""
 
     mean: float
     """Weighted mean."""
@@ -60,22 +61,22 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Weighted draws of the turning spindle."""
+    """Weighted samples of the rotating spindle."""
 
     samples: SpindleSamples
     """Spindles at speed."""
     log_weight: Floats
     """Logarithm of the weight of each, up to a constant, shape (r,)."""
     cuts: tuple[CutEvidence, ...] = ()
-    """Cuts that they were learnt from."""
+    """Cuts that they were learned from."""
     n_refreshed: int = 0
-    """Number of times that the draws were made anew."""
+    """Number of times that the samples were redrawn."""
     seed: int = 0
-    """Seed of all draws."""
+    """Seed of all samples."""
 
     @property
     def weights(self) -> Floats:
-        """Weight of each draw, sum 1, shape (r,)."""
+        """Weight of each sample, sum 1, shape (r,)."""
         return _normalize_weights(self.log_weight)
 
     @property
@@ -85,7 +86,7 @@ class Posterior:
 
     @property
     def intervals(self) -> dict[str, Interval]:
-        """Intervals by name (`SpindleSamples.ratios`); of natural frequencies they stay open until chatter was heard twice."""
+        """Intervals by name; those of natural frequencies stay open until chatter was recorded twice."""
         intervals = {name: _weighted_interval(values, self.weights) for name, values in self.samples.ratios().items()}
         if self.n_frequencies < MIN_CHATTER_FREQUENCIES:
             intervals |= {
@@ -97,7 +98,7 @@ class Posterior:
 
     @property
     def n_frequencies(self) -> int:
-        """Cuts whose chatter was heard with its frequency: without any, nothing is learnt of natural frequencies."""
+        """Number of cuts with a chatter frequency; without any, natural frequencies cannot be learned."""
         return sum(cut.has_frequency for cut in self.cuts)
 
     @property
@@ -137,11 +138,11 @@ class NewEvidence:
     """A cut before it teaches anything."""
 
     prior: Posterior
-    """Posterior without it: draws that have any weight left, with coefficients of its material."""
+    """Posterior without it: samples that have any weight left, with coefficients of its material."""
     cut: CutEvidence
     """The cut."""
     prediction: CutPrediction
-    """Sound that each of these draws would make in it."""
+    """Sound that each of these samples would make in it."""
 
     def update(self) -> Posterior:
         """Update the posterior with the cut."""
@@ -157,7 +158,7 @@ def build_prior(
 ) -> Posterior:
     """Build the posterior before the first cut.
 
-    middle: the spindle at rest in the middle of the doubt (a row).
+    middle: the spindle at rest in the median estimate (a row).
     """
     return Posterior(sample_prior(median, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
@@ -198,7 +199,7 @@ def _refresh(posterior: Posterior) -> Posterior:
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     """Return the log of prior times likelihood of all cuts; -inf where that is not above the least (r,).
 
-    A draw that cannot come to more any more is not asked about further cuts.
+    A sample that cannot come to more any more is not asked about further cuts.
     """
     value: Floats = -np.sum(samples.normal**2, axis=1) / 2
     hope = [cut.weight * max_log_likelihood(cut) for cut in cuts]

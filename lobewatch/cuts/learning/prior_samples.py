@@ -2,8 +2,8 @@
 
 Standard deviations: f_n -1.5 +- 2 %, for each mode apart; zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1
 +- 30 %, for each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen:
-plausible, not measured. They are joined with the doubt of the program. Each number is a function of one that is
-standard normal, so that draws can be moved without leaving the prior out of sight.
+plausible, not measured. They are joined with the uncertainty of the program. Each number is a function of one that
+is standard normal, so that samples can be moved without leaving the prior out of sight.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ ROTATING_FORCE_PRIOR = (1.1, ROTATING_FORCE_SPREAD)
 """Middle of Kt at speed over that of the table, chosen, and its standard deviation relative to that; as FREQUENCY,
 DAMPING and STIFFNESS, which are those of the chance of chatter beside a verdict (the deviation of f_n absolute)."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
-"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle is
-far off."""
+"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle
+is far off."""
 MIN_PRIOR_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 MAX_SAMPLED_DAMPING = 0.95
@@ -37,10 +37,10 @@ MAX_SAMPLED_DAMPING = 0.95
 OPEN_FORCE_RATIO_SHARE = 0.3
 """Share of the ratios Kr/Kt that are anything from 0 to 1, whatever is published or written down; chosen."""
 NUMBERS_PER_SPINDLE, NUMBERS_PER_MATERIAL = 4, 3
-"""Numbers of a draw beside the f of each mode: (zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as doubted) of
-each material."""
+"""Numbers of a sample beside the f of each mode: (zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as uncertain)
+of each material."""
 MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS = 18, 3601
-"""End (standard deviations) and number of points of the table that `_quantiles` makes of the mixture."""
+"""End (standard deviations) and number of points of the table that `_mixture_quantiles` makes of the mixture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class SpindleSamples:
     at_rest: MillingRows
     """The spindles at rest, with the error of tap tests, r rows; their speeds are what a speed of 1 is truly."""
     uncertainty: Uncertainty
-    """Doubt that the coefficients were drawn from."""
+    """Uncertainty that the coefficients were drawn from."""
 
     def __len__(self) -> int:
         return len(self.normal)
@@ -157,7 +157,7 @@ def _count_spindle_numbers(rows: MillingRows) -> int:
 def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:
     """Return factors of Kr/Kt at probabilities: uniform within its range, or with some probability from 0 to 1.
 
-    Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as doubted.
+    Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as uncertain.
     """
     if median <= 0:
         return np.asarray(rejected.low + (rejected.high - rejected.low) * share)

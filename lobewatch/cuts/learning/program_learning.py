@@ -31,16 +31,16 @@ from lobewatch.verdicts.uncertainty import uncertainty_of
 
 @dataclass(frozen=True, eq=False)
 class LearningResult:
-    """What was learnt for one program."""
+    """What was learned for one program."""
 
     program: ProgramTable
-    """Program as it stands in machine.toml."""
+    """Program as in machine.toml."""
     prior: Posterior
     """Spindle and coefficients as known without any cut."""
     posterior: Posterior
     """Spindle and coefficients as known with the cuts."""
     inconsistent_cuts: tuple[InconsistentCut, ...]
-    """Cuts that are not believed; of some it is their power alone, without which they were learnt from."""
+    """Cuts that are not believed; of some it is their power alone, without which they were learned from."""
     own_cuts: tuple[CutEvidence, ...]
     """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
 
@@ -66,7 +66,7 @@ class NextCut:
     cuts_left: int
     """Number of test cuts that are still to be made."""
     cut_range: CutRange
-    """Speeds and depths that machine and tool bear."""
+    """Speeds and depths that machine and tool allow."""
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:

@@ -17,13 +17,13 @@ from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_SUGGESTION_SAMPLES = 300
-"""Number of draws that chances are worked out from."""
+"""Number of samples that chances are worked out from."""
 TRIED_DEPTH_SHARES = (1.0, 0.85, 0.7, 0.5, 0.35)
-"""Shares of a depth that are looked at in turn where zero order is not exact; chosen."""
+"""Shares of a depth that are checked in turn where the zero-order approximation is not exact; chosen."""
 MAX_FIRST_CUT_RISK, FIRST_CUT_DEPTH_FACTOR = 0.2, 1.5
-"""Greatest chance of chatter of a first test cut that is deeper than so many times the depth of its program."""
+"""Greatest chance of chatter of a first test cut that is deeper than this many times the depth of its program."""
 FIRST_CUT_DEPTH_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
-"""Shares of a depth that are looked at in turn for such a first cut; chosen."""
+"""Shares of a depth that are checked in turn for such a first cut; chosen."""
 MIN_REPEAT_PROBABILITY = 0.05
 """Chance that a word "chatter" is wrong, from which it is asked for again while another cut is left; chosen, see
 docs/cuts.md: the last of five cuts gains 4 % of the optimum, a word that is wrong costs 20 %."""
@@ -44,7 +44,7 @@ class Suggestion:
     chatter_probability: float
     """Chance that it chatters."""
     gain: float
-    """Expected gain of removal rate, relative to the best heard stable so far; inf where there is none."""
+    """Expected gain of removal rate, relative to the best recorded stable so far; inf where there is none."""
     most_informative: str
     """Name of what it tells most of (as in `SpindleSamples.ratios`)."""
     repeats: str = ""
@@ -66,12 +66,12 @@ def suggest_cut(
 ) -> Suggestion | None:
     """Suggest the next test cut, or None if nothing more can be gained.
 
-    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
-    are not believed. One of those that lies within the grid is made again, once, but for a stable one with the last
-    cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut is
-    worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its chance
-    to be right says. A diagram by zero order proposes; what is chosen was judged by semi-discretisation. programmed:
-    depth of the program (m); the first cut is about as deep, or chatters hardly.
+    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts
+    that are not believed. One of those that lies within the grid is made again, once, but for a stable one with the
+    last cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut
+    is worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its
+    chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by
+    semi-discretization. programmed: depth of the program (m); the first cut is about as deep, or chatters hardly.
     """
     best, few = (
         find_best_removal_rate([cut for cut in cuts if cut not in rejected]),

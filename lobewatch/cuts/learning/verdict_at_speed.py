@@ -27,7 +27,7 @@ from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program
 
 INTERVAL_QUANTILES = (0.025, 0.975)
-"""Quantiles that 95 % of draws lie between."""
+"""Quantiles that 95 % of samples lie between."""
 
 
 def evaluate_at_speed(
@@ -115,12 +115,12 @@ def _factor_range(values: Floats) -> FactorRange:
 
 
 class LobesAtSpeed(NamedTuple):
-    """Lobes of a cut by zero order with the spindle at speed."""
+    """Lobes of a cut by the zero-order approximation with the spindle at speed."""
 
     n_cuts: int
-    """Number of test cuts that they were learnt from."""
+    """Number of test cuts that they were learned from."""
     lobes: StabilityLobes
-    """Lobes in the middle of what was learnt."""
+    """Lobes in the learned median."""
     band: LimitBand
     """Band of the limits that the cuts have left open."""
 

@@ -77,6 +77,18 @@ OPTION_NAMES: Mapping[str, str] = {
     "rotate_structure.degrees": "--askew",
     "rotate_structure.direction": "--direction",
     "screen.ScreenServer": "--screen",
+    # lobewatch.verdicts, cuts, monitoring
+    "Circumstances.direction": "--direction",
+    "Circumstances.tool": "--tool",
+    "Conditions.reclamped": "--reclamped",
+    "Logbook.verdicts": "lobewatch check",
+    "TapSession.run": "lobewatch tap",
+    "add_event.new_baseline": "--new-baseline",
+    "folder_updates.add_event": "lobewatch event",
+    "folder_updates.exclude_entry": "lobewatch exclude",
+    "operator_entries.acknowledge_alarms": "lobewatch ack",
+    "pocket_depth.find_pocket_depths": "lobewatch suggest",
+    "program_learning.find_next_cut": "lobewatch suggest",
 }
 """Option or command for each field or function that a message names."""
 

@@ -8,6 +8,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
+
 ChannelQuantity = Literal["force", "acceleration"]
 MIN_ADC_BITS = 8
 """No converter for sensors has fewer."""
@@ -99,7 +101,7 @@ class Channel:
         low, high = self.rails
         return low, high + 1 - self.effective_code_step(codes)
 
-    def encode(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
+    def encode(self, values: Floats) -> Codes:
         """ADC codes of values (N or m/s^2), rounded and clipped at the rails as the converter does."""
         return np.clip(np.rint(values / self.scale), *self.rails).astype(np.int32)
 
@@ -122,7 +124,7 @@ class Block:
 
     first_scan: int
     """Index of the first scan since the start of the stream."""
-    codes: NDArray[np.int32]
+    codes: Codes
     """ADC codes, shape (n_channels, n_scans)."""
     overload: int = 0
     """Bit i set: the device reports channel i overloaded."""

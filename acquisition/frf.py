@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 
 FrfQuantity = Literal["receptance", "mobility", "accelerance"]
@@ -29,11 +30,11 @@ class Frf:
     [0.0745, 0.0225]
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Frequency lines, rising, >= 0 (Hz), shape (n,)."""
-    receptance: NDArray[np.complex128]
+    receptance: Complexes
     """Displacement over force (m/N), shape (n,)."""
-    coherence: NDArray[np.float64] | None = None
+    coherence: Floats | None = None
     """Ordinary coherence, 0 to 1, shape (n,); None where it is not known."""
     n_averages: int = 1
     """Number of hits averaged."""
@@ -81,12 +82,12 @@ class Frf:
             raise ValueError("coherence must lie between 0 and 1")
 
     @property
-    def mobility(self) -> NDArray[np.complex128]:
+    def mobility(self) -> Complexes:
         """Velocity over force (m/s/N), shape (n,)."""
         return 2j * np.pi * self.frequency * self.receptance
 
     @property
-    def accelerance(self) -> NDArray[np.complex128]:
+    def accelerance(self) -> Complexes:
         """Acceleration over force (m/s^2/N), shape (n,)."""
         return -((2 * np.pi * self.frequency) ** 2) * self.receptance
 
@@ -96,7 +97,7 @@ class Frf:
         return self.coherence is not None and self.n_averages >= 3
 
     @property
-    def random_error(self) -> NDArray[np.float64] | None:
+    def random_error(self) -> Floats | None:
         """Normalised random error of |H|, sqrt((1 - g2)/(2 n g2)), shape (n,); None below three averages.
 
         Source: Bendat & Piersol, Random Data, H1 estimate. One or two hits give a coherence of no meaning.

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Channel, ChannelQuantity
 from acquisition.errors import DataError
 
@@ -124,9 +125,9 @@ class Hit:
     (0.0, True)
     """
 
-    force: NDArray[np.float64]
+    force: Floats
     """Hammer force (N), shape (n,); empty where no sensor measured it."""
-    acceleration: NDArray[np.float64]
+    acceleration: Floats
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
     """Samples a second (Hz)."""
@@ -136,7 +137,7 @@ class Hit:
     """Scans missing inside the record."""
     channels: tuple[Channel, ...] | None = None
     """Force and response channel, or the response channel alone, where the hit came from a DAQ."""
-    codes: NDArray[np.int32] | None = None
+    codes: Codes | None = None
     """Raw ADC codes, a row a channel, force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
@@ -191,12 +192,12 @@ class Hit:
         return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
     @property
-    def signals(self) -> NDArray[np.float64]:
+    def signals(self) -> Floats:
         """All that was measured, a row a channel: force (N) first, acceleration (m/s^2) last."""
         return np.stack([self.force, self.acceleration] if self.has_force else [self.acceleration])
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Floats:
         """Time from the trigger (s), shape (n,)."""
         return (np.arange(self.acceleration.size) - self.pre_trigger) / self.sample_rate
 

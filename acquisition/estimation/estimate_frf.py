@@ -8,13 +8,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Flags, Floats
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
 from acquisition.hits.pulse import window_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
-Spectra = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]
+Spectra = tuple[Floats, Floats, Complexes]
 
 EXCITATION_FLOOR = np.finfo(np.float64).eps ** 2
 """Share of the largest force power at or below which a line holds rounding alone: of few codes it can be exactly 0."""
@@ -49,7 +50,7 @@ def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: 
     """The same from the mean, or the sum, of the spectra of these hits."""
     s_ff, s_xx, s_fx = spectra
     excited = s_ff > EXCITATION_FLOOR * np.max(s_ff)
-    forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
+    forms: dict[Estimator, Callable[[], Complexes]] = {
         "H1": lambda: s_fx * _divide_where_excited(np.ones_like(s_ff), s_ff, excited),
         "H2": lambda: _divide_where_excited(s_xx * s_fx, np.abs(s_fx) ** 2, excited),
         "Hv": lambda: np.sqrt(_divide_where_excited(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
@@ -61,9 +62,7 @@ def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: 
     return from_accelerance(frequency, forms[estimator](), coherence, len(hits), find_usable_band(frequency, s_ff))
 
 
-def _divide_where_excited(
-    dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArray[np.bool_]
-) -> NDArray[Any]:
+def _divide_where_excited(dividend: NDArray[Any], power: Floats, excited: Flags) -> NDArray[Any]:
     """dividend / power at excited lines with any, else 0."""
     return np.asarray(np.divide(dividend, power, out=np.zeros_like(dividend), where=excited & (power > 0)))
 
@@ -111,7 +110,7 @@ def _get_response_skew(hit: Hit) -> float:
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
-def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
+def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: Floats) -> tuple[float, float]:
     """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
     weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
     return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])
@@ -213,12 +212,12 @@ class RunningMean:
         return kept
 
 
-def _is_in_usable_band(frf: Frf) -> NDArray[np.bool_]:
+def _is_in_usable_band(frf: Frf) -> Flags:
     low, high = frf.usable_band or (0.0, np.inf)
     return np.asarray((frf.frequency >= low) & (frf.frequency <= high))
 
 
-def propagate_force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator[NDArray[np.complex128]]:
+def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Complexes]:
     """Errors that noise of the hammer brings into H1 at these lines (Hz), as shares of it; an array for each hit.
 
     Column t of that of hit i, shape (n, samples in its force window + 1), is the error that one standard deviation of
@@ -236,8 +235,8 @@ def propagate_force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -
 
 
 def propagate_force_noise_through(
-    rows: NDArray[np.complex128] | NDArray[np.float64], hits: Sequence[Hit], frequency: NDArray[np.float64]
-) -> Iterator[NDArray[np.complex128]]:
+    rows: Complexes | Floats, hits: Sequence[Hit], frequency: Floats
+) -> Iterator[Complexes]:
     """What linear maps (k, n) make of each array of `propagate_force_noise`, without making that: shape (k, samples + 1)."""
     parts = [window_force(hit) for hit in hits]
     time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
@@ -48,7 +48,7 @@ def infer_averages(frf: Frf) -> int | None:
     return round(1 + middle) if high < MAX_QUARTILE_RATIO * low and middle > 1.5 else None
 
 
-def _compute_block_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _compute_block_means(values: Floats) -> Floats:
     """Means over some lines each."""
     return np.asarray(
         values[: values.size // COHERENCE_BLOCK_LINES * COHERENCE_BLOCK_LINES]

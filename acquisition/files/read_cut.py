@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
 from acquisition.files.contents.contents import Contents, Signal
@@ -25,7 +25,7 @@ MICROPHONE_SENSOR = "microphone"
 
 def resolve_cut_signals(
     contents: Contents, description: Description, ledger: ImportReport
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64] | None] | None:
+) -> tuple[Floats, float, Floats | None] | None:
     """What heard a cut, its sample rate (Hz), and the speed of the spindle where the file has it (rpm, shape (n,)).
 
     None where the ledger says what is missing or wrong.

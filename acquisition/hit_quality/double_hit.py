@@ -7,8 +7,8 @@ from statistics import NormalDist
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hits.pulse import Pulse
 
 DOUBLE_HIT_SHARE = 0.025
@@ -71,7 +71,7 @@ def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
     return best if best.share else None
 
 
-def _remove_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
+def _remove_main_pulse(pulse: Pulse, width: int) -> Floats:
     """The force with a straight line where the main pulse stands, half its width on either side included."""
     low, high = max(pulse.start - width // 2, 0), min(pulse.end + width // 2, pulse.recorded.size)
     force = pulse.force
@@ -82,7 +82,7 @@ def _remove_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
     return force
 
 
-def _fit_bump_heights(force: NDArray[np.float64], foot: float) -> NDArray[np.float64]:
+def _fit_bump_heights(force: Floats, foot: float) -> Floats:
     """Least-squares height of a raised cosine of this foot width (samples) around every sample, and how far its middle
     stands above the higher of both sides, shape (2, n)."""
     half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
@@ -118,7 +118,7 @@ NOISE_LIMIT_MARGIN = 1.25
 REWEIGHTING_ROUNDS = 4
 """Rounds in which errors that stand out lose weight."""
 
-Samples = NDArray[np.float64]
+Samples = Floats
 
 
 def find_second_input(decay: Samples, sample_rate: float, noise: float) -> float | None:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
@@ -169,7 +169,7 @@ def _is_swapped(hit: Hit) -> bool:
     return bool(sided and swings and _measure_energy_duration(force) > 3 * _measure_energy_duration(response))
 
 
-def _measure_energy_duration(signal: NDArray[np.float64]) -> int:
+def _measure_energy_duration(signal: Floats) -> int:
     """Number of samples that hold the middle 90 % of the energy."""
     energy = np.cumsum(signal**2)
     low, high = np.searchsorted(energy, [0.05 * energy[-1], 0.95 * energy[-1]])
@@ -228,7 +228,7 @@ def _evaluate_decay(hit: Hit) -> dict[HitFlags, str]:
     return {HitFlags.NOT_DECAYED: text} if share else {}
 
 
-def _compute_residual_share(response: NDArray[np.float64], before: int) -> float:
+def _compute_residual_share(response: Floats, before: int) -> float:
     """rms of the last tenth over that of the loudest; 0 where it is small, or noise as before the hit."""
     levels = [float(np.std(tenth)) for tenth in np.array_split(response, 10)]
     quiet = response[:before]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline
 
@@ -66,7 +66,7 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     return None
 
 
-def _count_flat_top(above: NDArray[np.float64], half: float) -> int:
+def _count_flat_top(above: Floats, half: float) -> int:
     """Samples of a flat top whose noise stays within +-half of it; 0 where the top is round.
 
     Of a round top, whatever its width, the band below the maximum holds 1/sqrt(3) of the samples that one three
@@ -80,7 +80,7 @@ def _count_flat_top(above: NDArray[np.float64], half: float) -> int:
     return inside if flat else 0
 
 
-def _find_finest_step(above: NDArray[np.float64]) -> float:
+def _find_finest_step(above: Floats) -> float:
     """Smallest step between two values: that of the converter; at least that of four written digits."""
     top = float(above.max())
     for part in (above[:STEP_SEARCH_SAMPLES], above):
@@ -90,7 +90,7 @@ def _find_finest_step(above: NDArray[np.float64]) -> float:
     return max(step, MIN_STEP_SHARE * top)
 
 
-def _count_at_rail(above: NDArray[np.float64], step: float) -> int:
+def _count_at_rail(above: Floats, step: float) -> int:
     """Samples at the maximum where it stands three times in a row; 0 where it does so because the steps are coarse.
 
     The three steps below the one that holds a round top together hold at least as many samples as that one.
@@ -114,7 +114,7 @@ MIN_HUM_SAMPLES = 8
 """Samples before the hit that are too few to tell."""
 
 
-def fit_mains_hum(hit: Hit, before: int) -> NDArray[np.float64] | None:
+def fit_mains_hum(hit: Hit, before: int) -> Floats | None:
     """Tones at 50 or 60 Hz and their multiples in the response (m/s^2), shape (n,); None where there is no hum.
 
     before: samples that stand before the hit. Hum goes on through the hit with one phase: the same tones must stand in
@@ -137,7 +137,7 @@ def is_like_hum(hit: Hit) -> bool:
     return any(_is_mostly_tone(tone, hit.acceleration, last) for tone in tones)
 
 
-def _fit_tones(hit: Hit, mains: float, *parts: slice) -> NDArray[np.float64]:
+def _fit_tones(hit: Hit, mains: float, *parts: slice) -> Floats:
     """Multiples of this frequency (Hz) that fit these parts together, over the whole record."""
     angle = (
         2
@@ -153,5 +153,5 @@ def _fit_tones(hit: Hit, mains: float, *parts: slice) -> NDArray[np.float64]:
     return np.asarray(waves @ np.linalg.lstsq(columns, values, rcond=None)[0][:-1])
 
 
-def _is_mostly_tone(tone: NDArray[np.float64], signal: NDArray[np.float64], part: slice) -> bool:
+def _is_mostly_tone(tone: Floats, signal: Floats, part: slice) -> bool:
     return bool(np.var((signal - tone)[part]) <= MAX_UNEXPLAINED_VARIANCE * np.var(signal[part]))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.hit import Hit, TapInputs
 from acquisition.source import Source
@@ -35,11 +36,11 @@ class RestDetector:
         self._rms = rms
         self._seen: deque[float] = deque(maxlen=patience)
 
-    def is_at_rest(self, response: NDArray[np.int32]) -> bool:
+    def is_at_rest(self, response: Codes) -> bool:
         """Whether the structure is at rest over these samples."""
         return bool(np.std(response) <= max(MAX_REST_RMS_RATIO * self._rms, MAX_REST_CODES))
 
-    def update(self, response: NDArray[np.int32]) -> bool:
+    def update(self, response: Codes) -> bool:
         """The same, for the next of successive stretches that rest is waited for in."""
         self._seen.append(float(np.std(response)))
         if len(self._seen) == self._seen.maxlen:
@@ -117,8 +118,8 @@ class HitSearch:
         self._rate, self._trigger = sample_rate, trigger
         self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
         self._gap = 1 if trigger.quantity == "force" else trigger.pre_trigger
-        self._codes: NDArray[np.int32] = np.empty((len(self._used), 0), np.int32)
-        self._added: list[NDArray[np.int32]] = []
+        self._codes: Codes = np.empty((len(self._used), 0), np.int32)
+        self._added: list[Codes] = []
         self._size = 0
         self._from = 0
         self._quiet = 0
@@ -161,7 +162,7 @@ class HitSearch:
         self._added.append(block.codes if is_all else block.codes[list(self._inputs.rows)])
         self._size = end
 
-    def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
+    def _next_record(self) -> tuple[Codes, int, int] | None:
         """The next complete record, the scans lost in it and its overloads; None until more blocks have come."""
         if self._crossing is None and not self._trigger_on_crossing():
             self._forget(self._from - self._trigger.pre_trigger)
@@ -182,7 +183,7 @@ class HitSearch:
         self._codes = np.concatenate([self._codes, *self._added], axis=1)
         self._added.clear()
 
-    def _heard(self, start: int, end: int | None = None) -> NDArray[np.float64]:
+    def _heard(self, start: int, end: int | None = None) -> Floats:
         """Codes of what triggers, positive for a hit: the acceleration swings to either side of its rest."""
         codes = self._codes[0, start:end] - self._middle
         swings = self._trigger.quantity == "acceleration"
@@ -320,7 +321,7 @@ def _find_hit_starts(record: Hit) -> NDArray[np.intp]:
     return np.array(kept)
 
 
-def _compute_stretch_rms(response: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+def _compute_stretch_rms(response: Floats, width: int) -> Floats:
     """rms about its mean of each stretch of so many samples; at least one."""
     count = max(response.size // width, 1)
     return np.array([float(np.std(part)) for part in np.array_split(response[: count * width], count)])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, find_pulse
 
@@ -13,7 +13,7 @@ MAX_CONTACT_TIME = 1.5e-3
 its force then moves no mode (`modal.decay_spectra`)."""
 
 
-def extract_free_decay(hit: Hit) -> NDArray[np.float64]:
+def extract_free_decay(hit: Hit) -> Floats:
     """Acceleration (m/s^2) from HIT_ENDS after the hit began to the end of the record, less what it is at rest."""
     before = count_pre_hit_samples(hit)
     rest = float(np.mean(extract_baseline(hit.acceleration, before)))
@@ -73,12 +73,12 @@ def _locate_hit(hit: Hit) -> tuple[int, int]:
     return pulse.start, pulse.end
 
 
-def _compute_rms_envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+def _compute_rms_envelope(signal: Floats, width: int) -> Floats:
     pieces = signal[: signal.size // width * width].reshape(-1, width)
     return np.asarray(np.sqrt(np.mean(pieces**2, axis=1)))
 
 
-def _fit_time_constant(signal: NDArray[np.float64], width: int) -> float:
+def _fit_time_constant(signal: Floats, width: int) -> float:
     """Of the later half of a ringing (samples)."""
     rms = _compute_rms_envelope(signal, width)
     late = rms[rms.size // 2 :] if rms.size >= 4 else rms

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 
 PULSE_END_SHARE = 0.05
@@ -22,7 +22,7 @@ SEARCH_BLOCK_SIZE = 1024
 class Pulse:
     """The main force pulse of a hit."""
 
-    recorded: NDArray[np.float64]
+    recorded: Floats
     """Force as it was recorded (N), shape (n,)."""
     offset: float
     """Mean of its baseline (N)."""
@@ -38,7 +38,7 @@ class Pulse:
     """rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
     @property
-    def force(self) -> NDArray[np.float64]:
+    def force(self) -> Floats:
         """Force with the baseline's mean taken off (N), shape (n,)."""
         return self.recorded - self.offset
 
@@ -59,7 +59,7 @@ def find_pulse(hit: Hit) -> Pulse | None:
     return Pulse(hit.force, offset, top, peak, start, end, rms)
 
 
-def _count_above(foot: float, signal: NDArray[np.float64]) -> int:
+def _count_above(foot: float, signal: Floats) -> int:
     """How many samples stand before the first one below the foot; looked for piece by piece, as pulses are short."""
     for at in range(0, signal.size, SEARCH_BLOCK_SIZE):
         below = np.flatnonzero(signal[at : at + SEARCH_BLOCK_SIZE] < foot)
@@ -82,13 +82,13 @@ def count_pre_hit_samples(hit: Hit) -> int:
     return _pre_hit_counts[hit]
 
 
-def _count_before_force(force: NDArray[np.float64]) -> int:
+def _count_before_force(force: Floats) -> int:
     above = force[: int(np.argmax(force)) + 1] - np.median(force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
 
 
-def _count_before_response(response: NDArray[np.float64]) -> int:
+def _count_before_response(response: Floats) -> int:
     size = np.abs(response - np.median(response))
     return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
 
@@ -96,7 +96,7 @@ def _count_before_response(response: NDArray[np.float64]) -> int:
 _pre_hit_counts: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()
 
 
-def extract_baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:
+def extract_baseline(signal: Floats, before: int) -> Floats:
     """The first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
     quiet = signal[: int(0.8 * before)]
     return quiet if quiet.size >= 8 else signal[-max(signal.size // 10, 8) :]
@@ -108,9 +108,9 @@ class WindowedForce:
 
     samples: slice
     """Place in the hit."""
-    force: NDArray[np.float64]
+    force: Floats
     """Baseline's mean taken off, times window (N), shape (m,)."""
-    window: NDArray[np.float64]
+    window: Floats
     """Weight of each sample, 0 to 1, shape (m,)."""
     noise: float
     """rms of the baseline (N)."""

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
 from acquisition.files.contents.description import Description, ImportReport
@@ -101,9 +101,9 @@ def resolve_frf(contents: Contents, description: Description, ledger: ImportRepo
 
 
 def _make_frf(
-    frequency: NDArray[np.float64],
-    values: NDArray[np.complex128],
-    coherence: NDArray[np.float64] | None,
+    frequency: Floats,
+    values: Complexes,
+    coherence: Floats | None,
     n_averages: int,
     form: FrfQuantity,
 ) -> Frf:
@@ -116,7 +116,7 @@ def _make_frf(
     return from_accelerance(frequency, values, coherence, n_averages)
 
 
-def _compute_complex_values(candidate: FrfCandidate, ledger: ImportReport) -> NDArray[np.complex128] | None:
+def _compute_complex_values(candidate: FrfCandidate, ledger: ImportReport) -> Complexes | None:
     """Complex values in the unit of the file."""
     first, second = candidate.signal, candidate.partner
     if first.role == "frf":
@@ -157,7 +157,7 @@ def _is_same_unit(one: str, other: str) -> bool:
 
 def _make_even_frequency(
     signals: Sequence[Signal], frf: FrfCandidate, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
+) -> Floats | None:
     """Frequencies of the lines of an FRF (Hz), as a person says."""
     n, step, start = frf.signal.values.size, description.spacing, description.start or 0.0
     if step is None:
@@ -180,7 +180,7 @@ def _may_be_axis(signal: Signal, n: int) -> bool:
 
 def _resolve_frequency(
     contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
+) -> Floats | None:
     """Of an FRF (Hz)."""
     axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
     if axis is None:
@@ -215,7 +215,7 @@ def _find_coherence(contents: Contents, number: int, frf: Signal) -> Signal | No
     return coherences[number] if len(coherences) > 1 and coherences[number] in beside else beside[0]
 
 
-def _resolve_coherence(signal: Signal | None, ledger: ImportReport) -> NDArray[np.float64] | None:
+def _resolve_coherence(signal: Signal | None, ledger: ImportReport) -> Floats | None:
     """Values of a coherence; a line where it lies beyond 0 to 1 is trusted with nothing."""
     if signal is None:
         ledger.add_fact("coherence", "none", "file")

@@ -7,8 +7,8 @@ from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import format_signal_names
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, report_flaws
 from acquisition.files.contents.description import Description, Fact, ImportReport
@@ -32,7 +32,7 @@ MIN_UNEVEN_STEPS = 20
 """Steps that are uneven, at least, where few digits are the reason; a lost sample makes one so."""
 
 
-def measure_step(time: NDArray[np.float64]) -> tuple[float, str]:
+def measure_step(time: Floats) -> tuple[float, str]:
     """The step of an even axis, and what is wrong with it; the text is empty where nothing is."""
     if time.size < 2 or not np.all(np.isfinite(time)):
         return 0.0, "its time is no row of finite numbers"
@@ -50,7 +50,7 @@ def measure_step(time: NDArray[np.float64]) -> tuple[float, str]:
     )
 
 
-def infer_printed_step(time: NDArray[np.float64]) -> float | None:
+def infer_printed_step(time: Floats) -> float | None:
     """The step of an even axis that was printed with few digits: each time lies within half its last one of it.
 
     None where no even axis is printed so, or where the steps are uneven in a few places only.
@@ -71,7 +71,7 @@ def _get_last_digit_exponent(value: float) -> int:
     return exponent if isinstance(exponent, int) else 0
 
 
-def make_hit_from_motion(force: NDArray[np.float64], response: NDArray[np.float64], rate: float, quantity: str) -> Hit:
+def make_hit_from_motion(force: Floats, response: Floats, rate: float, quantity: str) -> Hit:
     """A hit from its force (N) and a response in SI of this quantity; an overload is looked for in what was recorded.
 
     Differentiated in the frequency domain, times 2 pi i f: the FRF is that of the recorded motion to rounding, as all
@@ -144,9 +144,7 @@ def _resolve_hit(signals: Sequence[Signal], description: Description, ledger: Im
     return hit
 
 
-def _resolve_force(
-    forces: Sequence[Signal], description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
+def _resolve_force(forces: Sequence[Signal], description: Description, ledger: ImportReport) -> Floats | None:
     """Force (N), empty where none was measured; None where it is missing, or its unit."""
     if description.without_force:
         return np.empty(0)
@@ -236,7 +234,7 @@ def _compute_rate_from_time(times: Sequence[Signal], ledger: ImportReport) -> fl
     return 1 / (steps[0] * unit.factor)
 
 
-def _resolve_step(time: NDArray[np.float64], ledger: ImportReport) -> float:
+def _resolve_step(time: Floats, ledger: ImportReport) -> float:
     """Of an even axis; 0 where it is none, which the ledger then says."""
     step, fault = measure_step(time)
     if not fault:

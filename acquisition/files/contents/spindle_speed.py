@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import find_column
 from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description, ImportReport
@@ -22,7 +22,7 @@ NEIGHBOR_TURNS = 5
 """Turns on each side that a turn is compared with; chosen."""
 
 
-def compute_speed_from_pulses(signal: NDArray[np.float64], sample_rate: float, pulses: int = 1) -> NDArray[np.float64]:
+def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
     """Spindle speed at each sample (rpm), shape (n,), from a tachometer in any unit, shape (n,); sample_rate in Hz.
 
     pulses: in a turn; from one turn to the next the speed is constant, NaN before the first, after the last and where
@@ -56,7 +56,7 @@ def compute_speed_from_pulses(signal: NDArray[np.float64], sample_rate: float, p
     return speed
 
 
-def _find_rising_edges(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _find_rising_edges(signal: Floats) -> Floats:
     """Where pulses begin, in samples and parts of them."""
     low, high = float(np.min(signal)), float(np.max(signal))
     if not high > low:
@@ -93,9 +93,7 @@ def split_speed_column(
     return rest, columns[0] if columns else None
 
 
-def resolve_speed(
-    signal: Signal, sample_rate: float, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
+def resolve_speed(signal: Signal, sample_rate: float, description: Description, ledger: ImportReport) -> Floats | None:
     """Spindle speed at each sample (rpm), NaN where it is not known; None where the ledger says what is wrong."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
     if signal.role == "speed" and (unit is None or unit.quantity != "frequency"):
@@ -111,8 +109,8 @@ def resolve_speed(
 
 
 def _convert_speed(
-    signal: Signal, values: NDArray[np.float64], factor: float, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
+    signal: Signal, values: Floats, factor: float, description: Description, ledger: ImportReport
+) -> Floats | None:
     """factor: rpm per unit."""
     if description.pulses is not None:
         ledger.faults.append(

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import infer_role, split_heading
 from acquisition.files.contents.contents import Contents, Role, Signal, list_array_signals
 
@@ -51,7 +52,7 @@ def _infer_window(before: Any, behind: Any) -> str:
     return _fit_exponential(time[loud], np.log(ratio))
 
 
-def _fit_exponential(time: NDArray[np.float64], level: NDArray[np.float64]) -> str:
+def _fit_exponential(time: Floats, level: Floats) -> str:
     """level: logarithm of the window."""
     slope, start = np.polyfit(time, level, 1)
     if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:

@@ -38,7 +38,8 @@ from .files.file_source import FileSource
 from .files.read_recording import inspect_file, list_formats, read_frf, read_hits, read_recording
 from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
-from .hit import Hit, HitFlags
+from .hit import Hit
+from .hit_fault import HitFlags
 from .hit_quality.evaluate_hit import HitVerdict, average_good_hits, check_hit, evaluate_hit
 from .hits.capture_hits import HitSearch, Trigger, capture_hits
 from .hits.free_decay import estimate_decay_time, extract_free_decay

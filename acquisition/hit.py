@@ -1,9 +1,7 @@
-"""One hammer hit, its faults, and the input channels it is recorded with."""
+"""One hammer hit and the input channels that it is recorded with."""
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -16,94 +14,6 @@ from acquisition.errors import DataError
 
 MAX_SI_VALUE = 1e50
 """Largest size of a value in SI units: no measurement is larger, and powers of larger ones may be infinite."""
-
-
-class HitFlags(enum.Flag):
-    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure.
-
-    >>> flags = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
-    >>> flags.words
-    'double hit, overload (force)'
-    >>> HitFlags.from_words("double hit") in flags, bool(HitFlags.OK)
-    (True, False)
-    """
-
-    OK = 0
-    """Nothing is wrong."""
-    DOUBLE_HIT = enum.auto()
-    """The hammer has touched twice."""
-    OVERLOAD_FORCE = enum.auto()
-    """The force stands at a rail of its converter."""
-    OVERLOAD_RESPONSE = enum.auto()
-    """The response stands at a rail of its converter."""
-    TOO_SOFT = enum.auto()
-    """The peak of the force is near the noise, or below 2 % of its range."""
-    NOT_DECAYED = enum.auto()
-    """The response still rings when the record ends."""
-    LOST_SCANS = enum.auto()
-    """Scans are missing inside the record."""
-    NO_HIT = enum.auto()
-    """No pulse stands out of the noise."""
-    SWAPPED_CHANNELS = enum.auto()
-    """The pulse is on the channel of the response."""
-    TOO_HARD = enum.auto()
-    """The peak of the force is above 90 % of its range, not clipped."""
-    NARROW_BAND = enum.auto()
-    """The force does not reach to the end of the band that is followed."""
-    INCONSISTENT = enum.auto()
-    """The FRF of this hit is not that of the good ones."""
-    UNDONE = enum.auto()
-    """The operator has taken it back."""
-    NOT_EVALUATED = enum.auto()
-    """It could not be judged."""
-
-    @property
-    def words(self) -> str:
-        """The verdict alone, e.g. "double hit, overload (force)"."""
-        return ", ".join(_FLAG_TEXTS[flag][0] for flag in self) or "good"
-
-    @property
-    def cure(self) -> str:
-        """What to do about it, a sentence a fault; empty when all is well."""
-        return " ".join(_FLAG_TEXTS[flag][1] for flag in self)
-
-    @classmethod
-    def from_words(cls, words: str) -> HitFlags:
-        """The flags whose `words` these are; ValueError for unknown ones."""
-        by_words = {verdict: flag for flag, (verdict, _) in _FLAG_TEXTS.items()}
-        flags = cls.OK
-        for word in filter(None, words.removeprefix("good").split(", ")):
-            if word not in by_words:
-                raise ValueError(f"{word!r} is no hit verdict; known are {', '.join(by_words)}")
-            flags |= by_words[word]
-        return flags
-
-    def __str__(self) -> str:
-        """Verdict and cure in words."""
-        return " ".join(f"{word}: {cure}" for word, cure in (_FLAG_TEXTS[flag] for flag in self)) or "good"
-
-
-_FLAG_TEXTS: Mapping[HitFlags, tuple[str, str]] = {
-    HitFlags.DOUBLE_HIT: ("double hit", "Let the hammer bounce back after the first touch."),
-    HitFlags.OVERLOAD_FORCE: ("overload (force)", "Hit softer or choose a larger force range."),
-    HitFlags.OVERLOAD_RESPONSE: ("overload (response)", "Hit softer or choose a larger acceleration range."),
-    HitFlags.TOO_SOFT: ("too soft", "Hit harder."),
-    HitFlags.NOT_DECAYED: (
-        "not decayed",
-        "Use a longer record; wait until the tool is still before the next hit.",
-    ),
-    HitFlags.LOST_SCANS: (
-        "lost scans",
-        "Hit again; if it stays, lower the sample rate or use another cable.",
-    ),
-    HitFlags.NO_HIT: ("no hit", "Check the hammer cable and the trigger level."),
-    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "Swap the two cables."),
-    HitFlags.TOO_HARD: ("too hard", "Hit softer or choose a larger force range."),
-    HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
-    HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
-    HitFlags.UNDONE: ("undone", "Taken back by the operator."),
-    HitFlags.NOT_EVALUATED: ("not judged", "Hit again; if it stays, check both sensors and their cables."),
-}
 
 
 def describe_invalid_value(value: complex) -> str:
@@ -151,9 +61,8 @@ class Hit:
             object.__setattr__(self, name, values)
             bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
             if bad.size:
-                raise ValueError(
-                    f"{name} is {describe_invalid_value(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}"
-                )
+                flaw = describe_invalid_value(values[bad[0]])
+                raise ValueError(f"{name} is {flaw} at {bad.size} samples, first at sample {bad[0]}")
         same = self.force.shape in (self.acceleration.shape, (0,))
         if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
             raise ValueError(
@@ -172,13 +81,13 @@ class Hit:
         pre_trigger: int = 0,
         lost_scans: int = 0,
         overload: int = 0,
-        beside: Hit | None = None,
+        cross_hit: Hit | None = None,
     ) -> Hit:
         """A hit from ADC codes, a row a channel, force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
-        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, beside)
+        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, cross_hit)
 
     @property
     def has_force(self) -> bool:
@@ -218,9 +127,9 @@ class TapInputs:
         A hammer in x is felt by a second sensor along y too, where there is one: it stands before the last.
         """
         first, *last = select_input_channels(channels, quantity, direction)
-        along_y = (i for i, channel in enumerate(channels) if (channel.quantity, channel.direction) == _Y_RESPONSE)
-        across = [i for i in along_y if direction == "x" and last and i not in last]
-        rows = (first, *across[:1], *last)
+        kinds = [(channel.quantity, channel.direction) for channel in channels]
+        cross = [i for i, kind in enumerate(kinds) if kind == ("acceleration", "y") and i not in last]
+        rows = (first, *(cross[:1] if direction == "x" and last else ()), *last)
         return cls(rows, tuple(channels[row] for row in rows))
 
     def make_hit(
@@ -233,17 +142,14 @@ class TapInputs:
     ) -> Hit:
         """The hit that codes are, a row each; bit i of overload is that of row i."""
 
-        def felt_by(response: int, beside: Hit | None = None) -> Hit:
+        def make_of(response: int, cross_hit: Hit | None = None) -> Hit:
             rows = [0, response] if len(self.rows) > 1 else [response]
             mask = (overload >> response & 1) << 1 | (overload & 1 if len(rows) > 1 else 0)
             sensors = tuple(self.channels[row] for row in rows)
-            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, beside)
+            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, cross_hit)
 
         last = len(self.rows) - 1
-        return felt_by(last, felt_by(1) if last > 1 else None)
-
-
-_Y_RESPONSE = ("acceleration", "y")
+        return make_of(last, make_of(1) if last > 1 else None)
 
 
 def select_input_channels(
@@ -256,14 +162,14 @@ def select_input_channels(
     """
     forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
     responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
-    several, seen = len(responses) > 1, direction[-1:] or "x"
+    several, axis = len(responses) > 1, direction[-1:] or "x"
     if several:
-        responses = [i for i in responses if direction and channels[i].direction == seen]
+        responses = [i for i in responses if direction and channels[i].direction == axis]
     if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
         return (*forces, *responses) if quantity == "force" else (*responses,)
     listed = ", ".join(channel.name for channel in channels) or "nothing"
     needed = "one force and one acceleration channel are needed"
     if quantity == "acceleration":
         needed = "one acceleration channel is needed to tap without a force sensor"
-    which = f', of several that with direction = "{seen}"' if several else ""
+    which = f', of several that with direction = "{axis}"' if several else ""
     raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")

@@ -13,7 +13,8 @@ from typing import Any, Self
 from acquisition.channel import TapDirection, parse_direction
 from acquisition.errors import DataError, check_name
 from acquisition.frf import Frf
-from acquisition.hit import Hit, HitFlags
+from acquisition.hit import Hit
+from acquisition.hit_fault import HitFlags
 
 CONDITION_RANGES = {
     "temperature_c": (-40.0, 150.0),

@@ -109,7 +109,7 @@ DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
 """Decimal signs of a text by what a person calls them."""
 
 
-def inspect_file(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Recording:
+def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> Recording:
     """A recorded file as it is understood, what is missing or wrong in it told as its `complaint`.
 
     DataError for a file that is damaged or of no format that is known.
@@ -128,44 +128,49 @@ def inspect_file(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Rec
     """
     path = Path(path)
     file_format = detect_format(path)
-    held = read_contents(file_format, path, said)
+    held = read_contents(file_format, path, description)
     if isinstance(held, Contents):
         contents = (
             held
-            if said.force is None
-            else append_force_signals(held, _read_force_contents(said.force, said), said.force)
+            if description.force is None
+            else append_force_signals(held, _read_force_contents(description.force, description), description.force)
         )
-        return _convert_errors(file_format, path, lambda: resolve_recording(path, file_format.title, contents, said))
+        return _convert_errors(
+            file_format, path, lambda: resolve_recording(path, file_format.title, contents, description)
+        )
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
-    options = said.list_signal_options()
+    options = description.list_signal_options()
     complaint = f"a {file_format.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
     recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), complaint)
     return recording if about is None else _add_circumstances(recording, about)
 
 
-def read_contents(file_format: Format, path: Path, said: Description) -> Contents | list[Hit] | Frf:
+def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:
     """What a file of this format holds, behind the lines that are passed over of a text; DataError where it is none."""
-    read_from, option = file_format.read_from, f"--skip {said.skip}" if said.skip else f"--decimal {said.decimal}"
-    if not said.skip and not said.decimal:
+    read_from, option = (
+        file_format.read_from,
+        f"--skip {description.skip}" if description.skip else f"--decimal {description.decimal}",
+    )
+    if not description.skip and not description.decimal:
         return _convert_errors(file_format, path, lambda: file_format.read(path))
     if read_from is None:
         raise DataError(f"{path}: {option}: a {file_format.title} is no text of lines; leave the option out")
-    if said.decimal not in DECIMAL_SIGNS:
+    if description.decimal not in DECIMAL_SIGNS:
         raise DataError(f"{path}: {option}: is no decimal sign; give comma or point")
-    sign = DECIMAL_SIGNS[said.decimal]
-    return _convert_errors(file_format, path, lambda: read_from(path, said.skip or 0, sign))
+    sign = DECIMAL_SIGNS[description.decimal]
+    return _convert_errors(file_format, path, lambda: read_from(path, description.skip or 0, sign))
 
 
-def _read_force_contents(path: Path, said: Description) -> Contents:
+def _read_force_contents(path: Path, description: Description) -> Contents:
     file_format = detect_format(path)
-    held = read_contents(file_format, path, said if file_format.read_from else EMPTY_DESCRIPTION)
+    held = read_contents(file_format, path, description if file_format.read_from else EMPTY_DESCRIPTION)
     if not isinstance(held, Contents):
         raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
     return held
 
 
-def read_hits(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit]:
+def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit]:
     """The hits in a recorded file of any known format, bad ones too (see `check_hit`); DataError where there are none.
 
     >>> from tempfile import TemporaryDirectory
@@ -180,13 +185,13 @@ def read_hits(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[H
     >>> f"{hit.sample_rate:.0f} Hz, {hit.force.max():.0f} N, {abs(hit.acceleration).max():.1f} m/s^2"
     '10240 Hz, 199 N, 102.1 m/s^2'
     """
-    recording = read_recording(path, said)
+    recording = read_recording(path, description)
     if isinstance(recording, Frf):
         raise DataError(f"{path}: holds an FRF, not the hits it was made from")
     return recording
 
 
-def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
+def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> Frf:
     """The FRF that a recorded file holds, or that estimated (H1) from its good hits.
 
     DataError where it holds neither, or no good hit.
@@ -205,7 +210,7 @@ def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
     file_format = detect_format(path)
     if file_format.read_frf is not None:
         return file_format.read_frf(path)
-    recording = read_recording(path, said)
+    recording = read_recording(path, description)
     if isinstance(recording, Frf):
         return recording
     try:
@@ -217,9 +222,9 @@ def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
     return frf
 
 
-def read_recording(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
+def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
     """Hits where the file holds time histories, an FRF where it holds one; DataError where it holds neither."""
-    recording = inspect_file(path, said).require_valid()
+    recording = inspect_file(path, description).require_valid()
     return list(recording.hits) if recording.frf is None else recording.frf
 
 

@@ -125,7 +125,7 @@ def infer_role(name: str, unit: str) -> Role:
     return by_name  # type: ignore[return-value]
 
 
-def assign_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: ImportReport) -> tuple[Signal, ...]:
+def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: ImportReport) -> tuple[Signal, ...]:
     """The signals with the roles and units that `columns` gives them, in its order; what it leaves out is left out.
 
     "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
@@ -134,45 +134,45 @@ def assign_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Im
     named = list[Signal]()
     in_order = not any("=" in text for text in columns)
     if in_order and len(columns) < len(signals):
-        ledger.faults.append(
+        report.faults.append(
             f"--columns names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}; name all in "
             'their order, "-" for what is left out, or each as in "real=2"'
         )
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
-        signal = _select_signal(signals, name.strip(), number, ledger)
+        signal = _select_signal(signals, name.strip(), number, report)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
-            ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(COLUMN_ROLES)}")
+            report.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(COLUMN_ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = infer_decibel_unit(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
-                ledger.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
+                report.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
     return tuple(named)
 
 
-def _select_signal(signals: Sequence[Signal], name: str, number: int, ledger: ImportReport) -> Signal | None:
+def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal | None:
     if not name and number < len(signals):
         return signals[number]
     if name:
-        return find_column(signals, name, "--columns", ledger)
-    ledger.faults.append(f"--columns: no column {number + 1} in the file, which holds {format_signal_names(signals)}")
+        return find_column(signals, name, "--columns", report)
+    report.faults.append(f"--columns: no column {number + 1} in the file, which holds {format_signal_names(signals)}")
     return None
 
 
-def find_column(signals: Sequence[Signal], name: str, option: str, ledger: ImportReport) -> Signal | None:
-    """That of a name, heading, unit or number; None where there is none or are several, which the ledger says."""
+def find_column(signals: Sequence[Signal], name: str, option: str, report: ImportReport) -> Signal | None:
+    """That of a name, heading, unit or number; None where there is none or are several, which the report says."""
     meant = _match_columns(signals, name)
     if len(meant) == 1:
         return meant[0]
     names = format_signal_names(signals)
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
-        ledger.faults.append(f"{option}: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
+        report.faults.append(f"{option}: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
     else:
-        ledger.faults.append(f"{option}: nothing called {name!r} in the file, which holds {names}")
+        report.faults.append(f"{option}: nothing called {name!r} in the file, which holds {names}")
     return None
 
 

@@ -65,24 +65,24 @@ class Recording:
 
 def resolve_recording(path: Path, title: str, contents: Contents, description: Description) -> Recording:
     """Hits where signals over time are all there is, else the FRF."""
-    ledger = ImportReport()
-    signals = assign_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    report = ImportReport()
+    signals = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
     contents = replace(contents, signals=signals)
-    frf, hits = (None, []) if ledger.faults else _resolve_frf_or_hits(contents, description, ledger)
+    frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, description, report)
     if len(contents.machines) > 1:
-        ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
+        report.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
-        ledger.add_fact("window", window)
+        report.add_fact("window", window)
     for note in contents.notes:
-        ledger.add_fact("note", note)
+        report.add_fact("note", note)
     return Recording(
         path,
         title,
         tuple(hits),
         frf,
-        tuple(ledger.facts),
-        ledger.format_problems(),
+        tuple(report.facts),
+        report.format_problems(),
         contents.created,
         contents.tool,
         contents.direction,
@@ -91,25 +91,25 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
 
 
 def _resolve_frf_or_hits(
-    contents: Contents, description: Description, ledger: ImportReport
+    contents: Contents, description: Description, report: ImportReport
 ) -> tuple[Frf | None, list[Hit]]:
-    """Neither where something is missing or wrong, which the ledger then says."""
+    """Neither where something is missing or wrong, which the report then says."""
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
     if find_frf_candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _report_useless_options(description, ("rate", "full_scale", "force"), "an FRF", ledger)
-        return resolve_frf(contents, description, ledger), []
+        _report_useless_options(description, ("rate", "full_scale", "force"), "an FRF", report)
+        return resolve_frf(contents, description, report), []
     if not signals:
-        ledger.faults.append("it holds no columns of numbers")
+        report.faults.append("it holds no columns of numbers")
     elif over_frequency or not _is_over_time(signals):
-        ledger.add_missing(
+        report.add_missing(
             f"what its columns are ({format_signal_names(signals)})",
             FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE,
         )
     else:
-        _report_useless_options(description, ("averages",), "hits, and they are counted", ledger)
-        _report_useless_options(description, ("spacing", "start"), "signals over time", ledger)
-        return None, resolve_hits(contents, description, ledger)
+        _report_useless_options(description, ("averages",), "hits, and they are counted", report)
+        _report_useless_options(description, ("spacing", "start"), "signals over time", report)
+        return None, resolve_hits(contents, description, report)
     return None, []
 
 
@@ -118,8 +118,8 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
     return over_time or any(signal.per_full_scale for signal in signals)
 
 
-def _report_useless_options(description: Description, names: Sequence[str], content: str, ledger: ImportReport) -> None:
+def _report_useless_options(description: Description, names: Sequence[str], content: str, report: ImportReport) -> None:
     """Options that say nothing of what the file holds."""
     for name in names:
         if getattr(description, name) not in ((), None):
-            ledger.faults.append(f"--{name.replace('_', '-')}: the file holds {content}; leave the option out")
+            report.faults.append(f"--{name.replace('_', '-')}: the file holds {content}; leave the option out")

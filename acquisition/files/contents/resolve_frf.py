@@ -71,32 +71,32 @@ def find_frf_candidates(signals: Sequence[Signal]) -> list[FrfCandidate]:
     return listed
 
 
-def resolve_frf(contents: Contents, description: Description, ledger: ImportReport) -> Frf | None:
-    """The FRF; None where something is missing or wrong, which the ledger then says."""
+def resolve_frf(contents: Contents, description: Description, report: ImportReport) -> Frf | None:
+    """The FRF; None where something is missing or wrong, which the report then says."""
     listed = find_frf_candidates(contents.signals)
     if not listed:
-        ledger.add_missing("what its columns are", FRF_COLUMNS_EXAMPLE)
+        report.add_missing("what its columns are", FRF_COLUMNS_EXAMPLE)
         return None
-    signal = choose_signal([candidate.signal for candidate in listed], description.response, "FRFs", ledger)
-    n_averages = _resolve_averages(contents, description, ledger)
+    signal = choose_signal([candidate.signal for candidate in listed], description.response, "FRFs", report)
+    n_averages = _resolve_averages(contents, description, report)
     candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
     coherence = _find_coherence(contents, listed.index(candidate), candidate.signal)
     axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == candidate.signal.record]
-    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, ledger)
+    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, report)
     candidate = FrfCandidate(*used[: len(candidate.parts)])
-    values = _compute_complex_values(candidate, ledger)
-    unit = resolve_frf_unit(candidate.signal, description, ledger)
-    frequency = _resolve_frequency(contents, candidate, axes, description, ledger)
-    shares = _resolve_coherence(used[-1] if coherence else None, ledger)
-    report_flaws(candidate.parts, ledger, int(frequency is None or frequency[0] == 0))
-    if frequency is None or values is None or unit is None or not ledger.is_clean:
+    values = _compute_complex_values(candidate, report)
+    unit = resolve_frf_unit(candidate.signal, description, report)
+    frequency = _resolve_frequency(contents, candidate, axes, description, report)
+    shares = _resolve_coherence(used[-1] if coherence else None, report)
+    report_flaws(candidate.parts, report, int(frequency is None or frequency[0] == 0))
+    if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
     shares = None if shares is None else shares[first:]
     try:
         return _make_frf(frequency[first:], values[first:] * unit[1], shares, n_averages, FRF_FORM_BY_MOTION[unit[0]])
     except ValueError as error:
-        ledger.faults.append(str(error))
+        report.faults.append(str(error))
         return None
 
 
@@ -116,21 +116,21 @@ def _make_frf(
     return from_accelerance(frequency, values, coherence, n_averages)
 
 
-def _compute_complex_values(candidate: FrfCandidate, ledger: ImportReport) -> Complexes | None:
+def _compute_complex_values(candidate: FrfCandidate, report: ImportReport) -> Complexes | None:
     """Complex values in the unit of the file."""
     first, second = candidate.signal, candidate.partner
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
-            ledger.faults.append(f"{first.name} holds real numbers; an FRF is complex")
+            report.faults.append(f"{first.name} holds real numbers; an FRF is complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
         partner = "imaginary part" if first.role == "real" else "phase"
-        ledger.add_missing(
+        report.add_missing(
             f"the {partner} of {first.name}", '--columns "frequency,real,imag" or "frequency,magnitude,phase"'
         )
         return None
     if first.role == "real" and second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
-        ledger.faults.append(
+        report.faults.append(
             f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}; they must be the same"
         )
         return None
@@ -138,11 +138,11 @@ def _compute_complex_values(candidate: FrfCandidate, ledger: ImportReport) -> Co
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLE_UNITS.get(second.unit.lower(), "")
     if not angle:
-        ledger.add_missing("the unit of its phase", '--columns "frequency,magnitude,phase [deg]"')
+        report.add_missing("the unit of its phase", '--columns "frequency,magnitude,phase [deg]"')
         return None
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     if not is_decibel(first.unit) and np.any(first.values < 0):
-        ledger.add_missing(
+        report.add_missing(
             f"whether {first.name}, which falls below 0, is in dB", '--columns "frequency,db,phase [deg]"'
         )
         return None
@@ -156,19 +156,19 @@ def _is_same_unit(one: str, other: str) -> bool:
 
 
 def _make_even_frequency(
-    signals: Sequence[Signal], frf: FrfCandidate, description: Description, ledger: ImportReport
+    signals: Sequence[Signal], frf: FrfCandidate, description: Description, report: ImportReport
 ) -> Floats | None:
     """Frequencies of the lines of an FRF (Hz), as a person says."""
     n, step, start = frf.signal.values.size, description.spacing, description.start or 0.0
     if step is None:
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         by_name = f'--columns "frequency [Hz]={axis},{frf.format_columns_option()}", or [rad/s]; or ' if axis else ""
-        ledger.add_missing("the frequencies of its lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
+        report.add_missing("the frequencies of its lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
         return None
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
-        ledger.faults.append(f"--spacing {step:g}, --start {start:g}: give a spacing > 0 Hz and a start >= 0 Hz")
+        report.faults.append(f"--spacing {step:g}, --start {start:g}: give a spacing > 0 Hz and a start >= 0 Hz")
         return None
-    ledger.add_fact("lines", f"{n}, {start:.4g} to {start + step * (n - 1):.6g} Hz", "option")
+    report.add_fact("lines", f"{n}, {start:.4g} to {start + step * (n - 1):.6g} Hz", "option")
     return np.asarray(start + step * np.arange(n), dtype=np.float64)
 
 
@@ -179,26 +179,26 @@ def _may_be_axis(signal: Signal, n: int) -> bool:
 
 
 def _resolve_frequency(
-    contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, ledger: ImportReport
+    contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, report: ImportReport
 ) -> Floats | None:
     """Of an FRF (Hz)."""
     axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
     if axis is None:
-        return _make_even_frequency(contents.signals, frf, description, ledger)
-    report_flaws([axis], ledger)
+        return _make_even_frequency(contents.signals, frf, description, report)
+    report_flaws([axis], report)
     if description.spacing is not None or description.start is not None:
-        ledger.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
+        report.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
         return None
     if not axis.unit and is_angular(axis):
-        ledger.add_missing(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},..."')
+        report.add_missing(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},..."')
         return None
     unit = parse_unit(axis.unit) if axis.unit else None
     if axis.unit and (unit is None or unit.quantity != "frequency"):
-        ledger.faults.append(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
+        report.faults.append(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
         return None
-    ledger.add_fact("lines", f"{axis.values.size}, {_format_range(axis, unit.factor if unit else 1.0)}")
+    report.add_fact("lines", f"{axis.values.size}, {_format_range(axis, unit.factor if unit else 1.0)}")
     if unit is None:
-        ledger.add_fact("frequency", "in Hz", "default")
+        report.add_fact("frequency", "in Hz", "default")
     return np.asarray(axis.values, dtype=np.float64) * (unit.factor if unit else 1.0)
 
 
@@ -215,18 +215,18 @@ def _find_coherence(contents: Contents, number: int, frf: Signal) -> Signal | No
     return coherences[number] if len(coherences) > 1 and coherences[number] in beside else beside[0]
 
 
-def _resolve_coherence(signal: Signal | None, ledger: ImportReport) -> Floats | None:
+def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | None:
     """Values of a coherence; a line where it lies beyond 0 to 1 is trusted with nothing."""
     if signal is None:
-        ledger.add_fact("coherence", "none", "file")
+        report.add_fact("coherence", "none", "file")
         return None
     values = np.asarray(signal.values.real, dtype=np.float64)
     beyond = ~((values >= 0) & (values <= 1 + 1e-9))
     if np.mean(beyond) > MAX_INVALID_COHERENCE_SHARE:
-        ledger.add_fact("coherence", f"{signal.name} is beyond 0 to 1 at {beyond.sum()} lines: left out")
+        report.add_fact("coherence", f"{signal.name} is beyond 0 to 1 at {beyond.sum()} lines: left out")
         return None
     taken = f"; beyond 0 to 1 at {beyond.sum()} lines, there taken as 0" if beyond.any() else ""
-    ledger.add_fact("coherence", f"{signal.name}{taken}")
+    report.add_fact("coherence", f"{signal.name}{taken}")
     return np.where(beyond, 0.0, values)
 
 
@@ -234,17 +234,17 @@ MAX_INVALID_COHERENCE_SHARE = 0.02
 """Share of the lines that may have a coherence that is none, as the first lines of some analysers have."""
 
 
-def _resolve_averages(contents: Contents, description: Description, ledger: ImportReport) -> int:
+def _resolve_averages(contents: Contents, description: Description, report: ImportReport) -> int:
     if description.averages is not None and description.averages < 1:
-        ledger.faults.append(f"--averages {description.averages}: give the number of hits averaged, 1 or more")
+        report.faults.append(f"--averages {description.averages}: give the number of hits averaged, 1 or more")
     elif None not in (description.averages, contents.averages) and description.averages != contents.averages:
-        ledger.add_contradiction("--averages", description.averages, contents.averages)
+        report.add_contradiction("--averages", description.averages, contents.averages)
     elif contents.averages is not None:
-        ledger.add_fact("averages", str(contents.averages))
+        report.add_fact("averages", str(contents.averages))
         return contents.averages
     elif description.averages is not None:
-        ledger.add_fact("averages", str(description.averages), "option")
+        report.add_fact("averages", str(description.averages), "option")
         return description.averages
     else:
-        ledger.add_fact("averages", "1 (--averages)", "default")
+        report.add_fact("averages", "1 (--averages)", "default")
     return 1

@@ -98,64 +98,64 @@ MAX_RATE_DIFFERENCE = 1e-4
 """Relative difference of two sample rates that are taken for one: that of a rate with five digits."""
 
 
-def resolve_hits(contents: Contents, description: Description, ledger: ImportReport) -> list[Hit]:
-    """Those of each record; empty where something is missing or wrong, which the ledger then says."""
+def resolve_hits(contents: Contents, description: Description, report: ImportReport) -> list[Hit]:
+    """Those of each record; empty where something is missing or wrong, which the report then says."""
     hits = list[Hit]()
     for record in dict.fromkeys(signal.record for signal in contents.signals):
         of_one = ImportReport()
         hit = _resolve_hit([signal for signal in contents.signals if signal.record == record], description, of_one)
         if not of_one.is_clean or hit is None:
-            ledger.merge(replace(of_one, facts=[]))
+            report.merge(replace(of_one, facts=[]))
             return []
-        ledger.facts += of_one.facts if not hits else []
+        report.facts += of_one.facts if not hits else []
         parts = split_record(hit)
         if len(parts) > 1:
-            ledger.add_fact("hits", f"{len(parts)} in one record, each of {parts[0].acceleration.size} samples")
+            report.add_fact("hits", f"{len(parts)} in one record, each of {parts[0].acceleration.size} samples")
         hits += parts
     return hits
 
 
-def _resolve_hit(signals: Sequence[Signal], description: Description, ledger: ImportReport) -> Hit | None:
-    scaled = convert_to_sensor_units(apply_full_scale(signals, description, ledger), description, ledger)
+def _resolve_hit(signals: Sequence[Signal], description: Description, report: ImportReport) -> Hit | None:
+    scaled = convert_to_sensor_units(apply_full_scale(signals, description, report), description, report)
     if scaled is None:
         if sum(signal.role != "time" for signal in signals) > 2 and description.response is None:
-            ledger.add_missing("which of its responses is meant", "--response 1")
-        resolve_rate(signals, (), description, ledger)
+            report.add_missing("which of its responses is meant", "--response 1")
+        resolve_rate(signals, (), description, report)
         return None
     signals = scaled
-    forces, responses = _split_by_kind(signals, description, ledger)
+    forces, responses = _split_by_kind(signals, description, report)
     choice = ImportReport()
     response = choose_signal(responses, description.response, "responses", choice) if responses else None
-    rate, used = resolve_rate(signals, [*forces, *([response] if response else [])], description, ledger)
-    ledger.merge(choice)
+    rate, used = resolve_rate(signals, [*forces, *([response] if response else [])], description, report)
+    report.merge(choice)
     forces, response = (used[:-1], used[-1]) if response else (forces, None)
-    force = _resolve_force(forces, description, ledger)
-    unit = resolve_response_unit(response or responses[0], description, ledger) if responses else None
-    _check_gravity_offset([response] if response else responses, ledger)
-    if force is None or response is None or unit is None or not ledger.is_clean:
+    force = _resolve_force(forces, description, report)
+    unit = resolve_response_unit(response or responses[0], description, report) if responses else None
+    _check_gravity_offset([response] if response else responses, report)
+    if force is None or response is None or unit is None or not report.is_clean:
         return None
     try:
         hit = make_hit_from_motion(force, response.values * unit[1], rate, unit[0])
     except ValueError as error:
-        ledger.faults.append(str(error))
+        report.faults.append(str(error))
         return None
     if unit[0] != "acceleration":
-        ledger.add_fact("note", f"its {unit[0]} is differentiated")
+        report.add_fact("note", f"its {unit[0]} is differentiated")
     return hit
 
 
-def _resolve_force(forces: Sequence[Signal], description: Description, ledger: ImportReport) -> Floats | None:
+def _resolve_force(forces: Sequence[Signal], description: Description, report: ImportReport) -> Floats | None:
     """Force (N), empty where none was measured; None where it is missing, or its unit."""
     if description.without_force:
         return np.empty(0)
     if len(forces) != 1:
         return None
-    to_newton = resolve_force_unit(forces[0], description, ledger)
+    to_newton = resolve_force_unit(forces[0], description, report)
     return None if to_newton is None else np.asarray(forces[0].values * to_newton)
 
 
 def _split_by_kind(
-    signals: Sequence[Signal], description: Description, ledger: ImportReport
+    signals: Sequence[Signal], description: Description, report: ImportReport
 ) -> tuple[list[Signal], list[Signal]]:
     """Forces and responses; what neither unit nor name tells is asked about."""
     needs_force = not description.without_force
@@ -165,22 +165,22 @@ def _split_by_kind(
     channels = [channel for channel in signals if channel.role != "time"]
     names = format_signal_names(channels)
     if len(channels) < 1 + needs_force:
-        ledger.faults.append(
+        report.faults.append(
             f"it holds {names or 'nothing'} over time; a hit needs "
             + (f"a force and a response (--force FILE; {NO_FORCE_ADVICE})" if needs_force else "a response")
         )
         return [], []
     if unclear and ((needs_force and not forces) or not responses):
-        ledger.add_missing(f"what its columns are ({format_signal_names(signals)})", HIT_COLUMNS_EXAMPLE)
+        report.add_missing(f"what its columns are ({format_signal_names(signals)})", HIT_COLUMNS_EXAMPLE)
         return forces, responses
     if needs_force and not forces:
-        ledger.faults.append(f"no force channel among {names}; one is needed ({NO_FORCE_ADVICE})")
+        report.faults.append(f"no force channel among {names}; one is needed ({NO_FORCE_ADVICE})")
     if needs_force and len(forces) > 1:
-        ledger.add_missing(
+        report.add_missing(
             f"which force of {format_signal_names(forces)} goes with which response", HIT_COLUMNS_EXAMPLE
         )
     if not responses:
-        ledger.faults.append(f"no channel of a response among {names}")
+        report.faults.append(f"no channel of a response among {names}")
     return forces, responses
 
 
@@ -193,40 +193,40 @@ def infer_kind(signal: Signal) -> str:
 
 
 def resolve_rate(
-    signals: Sequence[Signal], used: Sequence[Signal], description: Description, ledger: ImportReport
+    signals: Sequence[Signal], used: Sequence[Signal], description: Description, report: ImportReport
 ) -> tuple[float, list[Signal]]:
     """Samples a second (Hz), 0 where that is missing or wrong; and the signals that are used, in one length."""
     times = [signal for signal in signals if signal.role == "time"]
-    used, times = cut_to_shortest(used, times, ledger)
+    used, times = cut_to_shortest(used, times, report)
     of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
     if len({signal.values.size for signal in of_one_length}) > 1:
-        ledger.faults.append(f"its channels differ in length: {format_signal_names(of_one_length)}")
+        report.faults.append(f"its channels differ in length: {format_signal_names(of_one_length)}")
         return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
-        ledger.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
+        report.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
         return 0.0, used
     size = of_one_length[0].values.size
     beside = [time for time in times if time.values.size == size]
-    report_flaws([*used, *beside], ledger)
-    by_axis = _compute_rate_from_time(beside, ledger)
-    return _agree_on_rate(rates[0] if rates else by_axis, description.rate, ledger), used
+    report_flaws([*used, *beside], report)
+    by_axis = _compute_rate_from_time(beside, report)
+    return _agree_on_rate(rates[0] if rates else by_axis, description.rate, report), used
 
 
-def _compute_rate_from_time(times: Sequence[Signal], ledger: ImportReport) -> float | None:
+def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> float | None:
     """That of the time columns, which must agree; None where there is none whose unit is known."""
     if not times or any(time.flaws for time in times):
         return None
     size = times[0].values.size
     if size < 8:
-        ledger.faults.append(f"{size} samples; at least 8 are needed")
+        report.faults.append(f"{size} samples; at least 8 are needed")
         return None
-    steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), ledger) for time in times]
+    steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), report) for time in times]
     if not all(steps):
         return None
     starts = [time.values[0] for time in times]
     if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * size > steps[0]:
-        ledger.faults.append(f"its time axes differ: they begin at {starts} with steps of {steps}")
+        report.faults.append(f"its time axes differ: they begin at {starts} with steps of {steps}")
         return None
     unit = parse_unit(times[0].unit)
     if unit is None or unit.quantity != "time":
@@ -234,60 +234,60 @@ def _compute_rate_from_time(times: Sequence[Signal], ledger: ImportReport) -> fl
     return 1 / (steps[0] * unit.factor)
 
 
-def _resolve_step(time: Floats, ledger: ImportReport) -> float:
-    """Of an even axis; 0 where it is none, which the ledger then says."""
+def _resolve_step(time: Floats, report: ImportReport) -> float:
+    """Of an even axis; 0 where it is none, which the report then says."""
     step, fault = measure_step(time)
     if not fault:
         return step
     printed = infer_printed_step(time) if step > 0 else None
     if printed is None:
-        ledger.faults.append(f"{fault}; where the time alone is wrong leave it out of --columns and give --rate")
+        report.faults.append(f"{fault}; where the time alone is wrong leave it out of --columns and give --rate")
         return 0.0
-    if FEW_DIGITS_FACT not in ledger.facts:
-        ledger.facts.append(FEW_DIGITS_FACT)
+    if FEW_DIGITS_FACT not in report.facts:
+        report.facts.append(FEW_DIGITS_FACT)
     return printed
 
 
-def _agree_on_rate(in_file: float | None, given: float | None, ledger: ImportReport) -> float:
+def _agree_on_rate(in_file: float | None, given: float | None, report: ImportReport) -> float:
     if given is not None and not (np.isfinite(given) and given > 0):
-        ledger.faults.append(f"--rate {given:g}: give the samples a second, > 0 Hz")
+        report.faults.append(f"--rate {given:g}: give the samples a second, > 0 Hz")
         return 0.0
     if in_file is not None and given is not None and abs(given / in_file - 1) > 0.01:
-        ledger.add_contradiction("--rate", f"{given:g}", f"{in_file:g} Hz")
+        report.add_contradiction("--rate", f"{given:g}", f"{in_file:g} Hz")
         return 0.0
     if in_file is not None:
-        ledger.add_fact("sample rate", f"{in_file:.8g} Hz")
+        report.add_fact("sample rate", f"{in_file:.8g} Hz")
         return in_file
     if given is not None:
-        ledger.add_fact("sample rate", f"{given:.8g} Hz", "option")
+        report.add_fact("sample rate", f"{given:.8g} Hz", "option")
         return given
-    if not ledger.faults:
-        ledger.add_missing("its sample rate, or the unit of its time", "--rate 51200")
+    if not report.faults:
+        report.add_missing("its sample rate, or the unit of its time", "--rate 51200")
     return 0.0
 
 
-def _check_gravity_offset(responses: Sequence[Signal], ledger: ImportReport) -> None:
+def _check_gravity_offset(responses: Sequence[Signal], report: ImportReport) -> None:
     """A resting sensor that shows 9.8 in a column called g holds m/s^2."""
     for signal in responses:
         offset = abs(float(np.median(signal.values))) if signal.values.size else 0.0
         if signal.unit.lower() == "g" and abs(offset - STANDARD_GRAVITY) < 0.5:
-            ledger.faults.append(
+            report.faults.append(
                 f"unit of {signal.name} in doubt (called g, rests at {offset:.2f}, which is gravity in m/s^2)"
             )
 
 
-def apply_full_scale(signals: Sequence[Signal], description: Description, ledger: ImportReport) -> list[Signal]:
+def apply_full_scale(signals: Sequence[Signal], description: Description, report: ImportReport) -> list[Signal]:
     """Values that are shares of a full scale, in their unit."""
     shares = [signal for signal in signals if signal.per_full_scale]
     if not shares:
         if description.full_scale:
-            ledger.faults.append("--full-scale: its values are no shares of a full scale; leave it out")
+            report.faults.append("--full-scale: its values are no shares of a full scale; leave it out")
         return list(signals)
     if len(description.full_scale) != len(shares):
-        ledger.add_missing(
+        report.add_missing(
             f"the full scale of its {len(shares)} channels, in their order and units", "--full-scale 500,50"
         )
         return list(signals)
-    ledger.add_fact("full scale", ", ".join(f"{factor:g}" for factor in description.full_scale), "option")
+    report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in description.full_scale), "option")
     scale = dict(zip((id(signal) for signal in shares), description.full_scale, strict=True))
     return [replace(signal, values=signal.values * scale.get(id(signal), 1.0)) for signal in signals]

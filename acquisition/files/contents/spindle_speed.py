@@ -75,51 +75,51 @@ SPEED_ROLES = ("speed", "tacho")
 
 
 def split_speed_column(
-    signals: Sequence[Signal], description: Description, ledger: ImportReport
+    signals: Sequence[Signal], description: Description, report: ImportReport
 ) -> tuple[list[Signal], Signal | None]:
     """The signals without that of the speed, and that one; None where there is none."""
     columns = [signal for signal in signals if signal.role in SPEED_ROLES]
     if description.tacho:
-        named = find_column(signals, description.tacho, "--tacho", ledger)
+        named = find_column(signals, description.tacho, "--tacho", report)
         columns = [] if named is None else [named]
     if len(columns) > 1:
         names = " and ".join(signal.name for signal in columns)
-        ledger.add_missing(f"which of {names} is the speed of the spindle", f'--tacho "{columns[0].name}"')
+        report.add_missing(f"which of {names} is the speed of the spindle", f'--tacho "{columns[0].name}"')
     rest = [
         signal for signal in signals if not (signal.role in SPEED_ROLES or any(signal is column for column in columns))
     ]
     if description.pulses is not None and not columns:
-        ledger.faults.append(f"--pulses {description.pulses}: no column is a tachometer; name it with --tacho")
+        report.faults.append(f"--pulses {description.pulses}: no column is a tachometer; name it with --tacho")
     return rest, columns[0] if columns else None
 
 
-def resolve_speed(signal: Signal, sample_rate: float, description: Description, ledger: ImportReport) -> Floats | None:
-    """Spindle speed at each sample (rpm), NaN where it is not known; None where the ledger says what is wrong."""
+def resolve_speed(signal: Signal, sample_rate: float, description: Description, report: ImportReport) -> Floats | None:
+    """Spindle speed at each sample (rpm), NaN where it is not known; None where the report says what is wrong."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
     if signal.role == "speed" and (unit is None or unit.quantity != "frequency"):
-        ledger.add_missing(f"the unit of the speed in {signal.name}", f'--columns "speed [rpm]={signal.name}"')
+        report.add_missing(f"the unit of the speed in {signal.name}", f'--columns "speed [rpm]={signal.name}"')
         return None
     if unit is not None and unit.quantity == "frequency":
-        return _convert_speed(signal, values, 60 * unit.factor, description, ledger)
+        return _convert_speed(signal, values, 60 * unit.factor, description, report)
     try:
         return compute_speed_from_pulses(values, sample_rate, 1 if description.pulses is None else description.pulses)
     except ValueError as error:
-        ledger.faults.append(f"{signal.name}: {error}")
+        report.faults.append(f"{signal.name}: {error}")
         return None
 
 
 def _convert_speed(
-    signal: Signal, values: Floats, factor: float, description: Description, ledger: ImportReport
+    signal: Signal, values: Floats, factor: float, description: Description, report: ImportReport
 ) -> Floats | None:
     """factor: rpm per unit."""
     if description.pulses is not None:
-        ledger.faults.append(
+        report.faults.append(
             f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit}); leave it out"
         )
         return None
     speed = np.abs(values) * factor
     if not np.any(speed > 0):
-        ledger.faults.append(
+        report.faults.append(
             f"{signal.name}: stands at 0 {signal.unit} all along; name another column, or leave it out"
         )
         return None

@@ -13,20 +13,24 @@ from acquisition.channel import Channel, ChannelQuantity
 from acquisition.errors import DataError
 
 MAX_SI_VALUE = 1e50
-"""Largest size of a value in SI units: no measurement is larger, and powers of larger ones may be infinite."""
+"""Largest absolute value in SI units. No measurement is larger, and powers of larger values may be infinite."""
 
 
 def describe_invalid_value(value: complex) -> str:
-    """What is wrong with a value that is not within LARGEST."""
     return f"larger than {MAX_SI_VALUE:g}" if np.isfinite(value) else "not finite"
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """Force and response of one hammer hit on one time axis; the response alone where no force was measured.
+    """Force and response of one hammer hit on one time axis; only the response where no force was measured.
 
-    Raises ValueError where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
+    Raises
+    ------
+    ValueError
+        Where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
 
+    Examples
+    --------
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
@@ -40,19 +44,19 @@ class Hit:
     acceleration: Floats
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
-    """Samples a second (Hz)."""
+    """Sample rate (Hz)."""
     pre_trigger: int = 0
-    """Number of samples before the trigger."""
+    """Number of samples before the trigger; 0 where unknown."""
     lost_scans: int = 0
-    """Scans missing inside the record."""
+    """Number of scans missing inside the record."""
     channels: tuple[Channel, ...] | None = None
-    """Force and response channel, or the response channel alone, where the hit came from a DAQ."""
+    """Force and response channel, or only the response channel, where the hit came from a DAQ."""
     codes: Codes | None = None
-    """Raw ADC codes, a row a channel, force first; None where the recording has none."""
+    """Raw ADC codes, shape (channels, n), force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
     cross_hit: Hit | None = None
-    """The same blow as a second sensor felt it, across to the first; None where there is none."""
+    """Same impact as a second sensor across to the first measured it; None without one."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""
@@ -83,7 +87,25 @@ class Hit:
         overload: int = 0,
         cross_hit: Hit | None = None,
     ) -> Hit:
-        """A hit from ADC codes, a row a channel, force first, scaled by the sensitivities of its channels."""
+        """Return a hit from ADC codes, scaled by the sensitivities of its channels.
+
+        Parameters
+        ----------
+        codes : array_like, shape (channels, n)
+            ADC codes, force first.
+        channels
+            Channel of each row.
+        sample_rate
+            Sample rate (Hz).
+        pre_trigger
+            Number of samples before the trigger.
+        lost_scans
+            Number of scans missing inside the record.
+        overload
+            Overloads that the device reports, a bit per row.
+        cross_hit
+            Same impact as a second sensor measured it.
+        """
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
@@ -96,13 +118,13 @@ class Hit:
 
     @property
     def sensors(self) -> tuple[Channel, ...]:
-        """Channels of all that felt the blow, that of the response last; empty where it came from no DAQ."""
+        """Channels of all sensors of the impact, the response last; empty where it came from no DAQ."""
         channels = self.channels or ()
         return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
     @property
     def signals(self) -> Floats:
-        """All that was measured, a row a channel: force (N) first, acceleration (m/s^2) last."""
+        """Measured signals, shape (channels, n): force (N) first, acceleration (m/s^2) last."""
         return np.stack([self.force, self.acceleration] if self.has_force else [self.acceleration])
 
     @property
@@ -113,18 +135,32 @@ class Hit:
 
 @dataclass(frozen=True)
 class TapInputs:
-    """Inputs of a device that a tap test reads: the force first, the response of the driving point last."""
+    """Inputs of a device that a tap test reads: force first, response of the driving point last."""
 
     rows: tuple[int, ...]
-    """Index of each among the channels of the device."""
+    """Index of each input among the channels of the device."""
     channels: tuple[Channel, ...]
-    """Sensor on each."""
+    """Sensor on each input."""
 
     @classmethod
     def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
-        """Those of a tap in a direction, as `select_input_channels` has it; DataError where they are not there.
+        """Select the inputs of a tap test in one direction.
 
-        A hammer in x is felt by a second sensor along y too, where there is one: it stands before the last.
+        A hit in x is also recorded by a second sensor along y, if there is one. It comes before the last input.
+
+        Parameters
+        ----------
+        channels
+            Channels of the device.
+        quantity
+            Quantity that triggers; "acceleration" without a force sensor.
+        direction
+            Direction of the hit at the tool tip.
+
+        Raises
+        ------
+        DataError
+            Where the needed inputs do not exist.
         """
         first, *last = select_input_channels(channels, quantity, direction)
         kinds = [(channel.quantity, channel.direction) for channel in channels]
@@ -140,7 +176,21 @@ class TapInputs:
         lost_scans: int = 0,
         overload: int = 0,
     ) -> Hit:
-        """The hit that codes are, a row each; bit i of overload is that of row i."""
+        """Return the hit of some ADC codes.
+
+        Parameters
+        ----------
+        codes : ndarray, shape (inputs, n)
+            ADC codes.
+        sample_rate
+            Sample rate (Hz).
+        pre_trigger
+            Number of samples before the trigger.
+        lost_scans
+            Number of scans missing inside the record.
+        overload
+            Overloads that the device reports, a bit per row.
+        """
 
         def make_of(response: int, cross_hit: Hit | None = None) -> Hit:
             rows = [0, response] if len(self.rows) > 1 else [response]
@@ -155,10 +205,11 @@ class TapInputs:
 def select_input_channels(
     channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
 ) -> tuple[int, ...]:
-    """Index of the force and of the acceleration channel; of the latter alone where that triggers.
+    """Return the index of the force channel and of the acceleration channel; only the latter where it triggers.
 
-    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction
-    (of a tap across, "xy", that of y). DataError unless there is one of each that is needed.
+    direction: of the hit. With several accelerations, that of this direction is used (of "xy", that of y). Raises
+    DataError
+    unless there is exactly one of each that is needed.
     """
     forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
     responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]

@@ -11,8 +11,10 @@ _RINGS = "The last tenth of the record still rings with {share:.1%} of the loude
 
 
 class HitFlags(enum.Flag):
-    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure.
+    """Faults of a hit; falsy for a good hit. `str()` gives words and remedies.
 
+    Examples
+    --------
     >>> flags = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
     >>> flags.words
     'double hit, overload (force)'
@@ -21,15 +23,15 @@ class HitFlags(enum.Flag):
     """
 
     OK = 0
-    """Nothing is wrong."""
+    """No fault."""
     DOUBLE_HIT = enum.auto()
-    """The hammer has touched twice."""
+    """The hammer touched twice."""
     OVERLOAD_FORCE = enum.auto()
-    """The force stands at a rail of its converter."""
+    """The force is clipped."""
     OVERLOAD_RESPONSE = enum.auto()
-    """The response stands at a rail of its converter."""
+    """The response is clipped."""
     TOO_SOFT = enum.auto()
-    """The peak of the force is near the noise, or below 2 % of its range."""
+    """The peak of the force is near the noise, or small against its range."""
     NOT_DECAYED = enum.auto()
     """The response still rings when the record ends."""
     LOST_SCANS = enum.auto()
@@ -39,15 +41,15 @@ class HitFlags(enum.Flag):
     SWAPPED_CHANNELS = enum.auto()
     """The pulse is on the channel of the response."""
     TOO_HARD = enum.auto()
-    """The peak of the force is above 90 % of its range, not clipped."""
+    """The peak of the force is near the end of its range, not clipped."""
     NARROW_BAND = enum.auto()
-    """The force does not reach to the end of the band that is followed."""
+    """The force does not reach to the end of the required frequency band."""
     INCONSISTENT = enum.auto()
-    """The FRF of this hit is not that of the good ones."""
+    """The FRF of this hit differs from the mean of the good hits."""
     UNDONE = enum.auto()
-    """The operator has taken it back."""
+    """The operator took the hit back."""
     NOT_EVALUATED = enum.auto()
-    """It could not be judged."""
+    """The evaluation failed."""
 
     @property
     def words(self) -> str:
@@ -187,7 +189,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
 }
 """Fault of each flag.
 
-The limits are chosen. A peak below 2 % of the force range shows the steps of the converter, and above 90 % the sensor may
+The limits are chosen. A peak below 2 % of the force range shows the steps of the converter. Above 90 % the sensor may
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
 noise. A hit 30 % away from the mean would move a mean of ten hits by 3 %. Its distance must also be 4 times what the
 scatter of the hits would give.

@@ -1,1 +1,1 @@
-"""From hits to an averaged FRF."""
+"""Estimate averaged FRFs from hits and correct them."""

@@ -1,1 +1,1 @@
-"""Whether a hit is good."""
+"""Evaluate whether a hit is good."""

@@ -1,1 +1,1 @@
-"""From a stream of scans to single hits, and what a hit is made of: rest, pulse, ringing, window."""
+"""Capture single hits from a stream of scans and split them into rest, pulse and decay."""

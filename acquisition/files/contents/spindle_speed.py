@@ -71,36 +71,36 @@ def _find_rising_edges(signal: Floats) -> Floats:
 
 
 SPEED_ROLES = ("speed", "tacho")
-"""Roles of a column of the speed."""
+"""Roles of a column of the spindle speed."""
 
 
 def split_speed_column(
     signals: Sequence[Signal], description: Description, report: ImportReport
 ) -> tuple[list[Signal], Signal | None]:
-    """The signals without that of the speed, and that one; None where there is none."""
+    """Return the signals without the spindle speed, and the signal of the speed; None without one."""
     columns = [signal for signal in signals if signal.role in SPEED_ROLES]
     if description.tacho:
-        named = find_column(signals, description.tacho, "--tacho", report)
+        named = find_column(signals, description.tacho, "tacho", report)
         columns = [] if named is None else [named]
     if len(columns) > 1:
         names = " and ".join(signal.name for signal in columns)
-        report.add_missing(f"which of {names} is the speed of the spindle", f'--tacho "{columns[0].name}"')
+        report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
     rest = [
-        signal for signal in signals if not (signal.role in SPEED_ROLES or any(signal is column for column in columns))
+        signal for signal in signals if signal.role not in SPEED_ROLES and not any(signal is other for other in columns)
     ]
     if description.pulses is not None and not columns:
-        report.faults.append(f"--pulses {description.pulses}: no column is a tachometer; name it with --tacho")
+        report.reject("pulses", description.pulses, "no column is a tachometer; name it with Description.tacho")
     return rest, columns[0] if columns else None
 
 
 def resolve_speed(signal: Signal, sample_rate: float, description: Description, report: ImportReport) -> Floats | None:
-    """Spindle speed at each sample (rpm), NaN where it is not known; None where the report says what is wrong."""
+    """Return the spindle speed at each sample (rpm), NaN where unknown; None where the report says what is wrong."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
-    if signal.role == "speed" and (unit is None or unit.quantity != "frequency"):
-        report.add_missing(f"the unit of the speed in {signal.name}", f'--columns "speed [rpm]={signal.name}"')
-        return None
     if unit is not None and unit.quantity == "frequency":
         return _convert_speed(signal, values, 60 * unit.factor, description, report)
+    if signal.role == "speed":
+        report.add_missing(f"the unit of the speed in {signal.name}", "columns", f' "speed [rpm]={signal.name}"')
+        return None
     try:
         return compute_speed_from_pulses(values, sample_rate, 1 if description.pulses is None else description.pulses)
     except ValueError as error:
@@ -111,16 +111,14 @@ def resolve_speed(signal: Signal, sample_rate: float, description: Description, 
 def _convert_speed(
     signal: Signal, values: Floats, factor: float, description: Description, report: ImportReport
 ) -> Floats | None:
-    """factor: rpm per unit."""
+    """Convert a speed with a factor (rpm per unit)."""
     if description.pulses is not None:
-        report.faults.append(
-            f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit}); leave it out"
-        )
+        fault = f"{signal.name} is the speed itself ({signal.unit}); leave it out"
+        report.reject("pulses", description.pulses, fault)
         return None
     speed = np.abs(values) * factor
     if not np.any(speed > 0):
-        report.faults.append(
-            f"{signal.name}: stands at 0 {signal.unit} all along; name another column, or leave it out"
-        )
+        fault = f"stands at 0 {signal.unit} all along; name another column, or leave it out"
+        report.faults.append(f"{signal.name}: {fault}")
         return None
     return np.where(speed > 0, speed, np.nan)

@@ -76,7 +76,7 @@ def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
         raise ValueError("which is no number")
     if use == "doubtful":
         either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
-        raise ValueError(f"which may be {either} (--decimal comma or --decimal point)")
+        raise ValueError(f"which may be {either} (Description.decimal comma or Description.decimal point)")
     return word.replace(sign, "")
 
 

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from acquisition import Frf, Hit, Remark, remove_sensor_mass
-from acquisition.estimation import compute_cross_spectra, propagate_force_noise_through
+from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.bands.extraction import Extraction, FittedBand
 from modal.modes.mode import Mode
 from modal.quality.trust import Trust, assess_trust

@@ -10,6 +10,23 @@ import re
 from collections.abc import Mapping
 
 OPTION_NAMES: Mapping[str, str] = {
+    # acquisition.files
+    "Description.averages": "--averages",
+    "Description.columns": "--columns",
+    "Description.decimal": "--decimal",
+    "Description.force": "--force",
+    "Description.force_unit": "--force-unit",
+    "Description.full_scale": "--full-scale",
+    "Description.pulses": "--pulses",
+    "Description.quantity": "--quantity",
+    "Description.rate": "--rate",
+    "Description.response": "--response",
+    "Description.sensitivity": "--sensitivity",
+    "Description.sensor": "--sensor",
+    "Description.skip": "--skip",
+    "Description.spacing": "--spacing",
+    "Description.start": "--start",
+    "Description.tacho": "--tacho",
     "Description.unit": "--unit",
     # lobewatch.machine
     "CutEntry.at": "--date",

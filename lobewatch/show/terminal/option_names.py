@@ -10,6 +10,23 @@ import re
 from collections.abc import Mapping
 
 OPTION_NAMES: Mapping[str, str] = {
+    # acquisition.files
+    "Description.averages": "--averages",
+    "Description.columns": "--columns",
+    "Description.decimal": "--decimal",
+    "Description.force": "--force",
+    "Description.force_unit": "--force-unit",
+    "Description.full_scale": "--full-scale",
+    "Description.pulses": "--pulses",
+    "Description.quantity": "--quantity",
+    "Description.rate": "--rate",
+    "Description.response": "--response",
+    "Description.sensitivity": "--sensitivity",
+    "Description.sensor": "--sensor",
+    "Description.skip": "--skip",
+    "Description.spacing": "--spacing",
+    "Description.start": "--start",
+    "Description.tacho": "--tacho",
     "Description.unit": "--unit",
     # lobewatch.machine
     "CutEntry.at": "--date",
@@ -57,6 +74,38 @@ OPTION_NAMES: Mapping[str, str] = {
     "list_comparison_files.beside": "--beside",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
     "session.TapSession": "lobewatch tap",
+    # acquisition.devices, lobewatch.tap, lobewatch.sensors
+    "Description.pulses": "--pulses",
+    "Description.sensor": "--sensor",
+    "Description.tacho": "--tacho",
+    "EmulationSetup.tcp": "--tcp",
+    "MountingVariation.bad_share": "--bad-clampings",
+    "MountingVariation.scatter": "--scatter",
+    "MountingVariation.temperature_swing": "--temperature",
+    "ScreenServer.listen": "--listen",
+    "acquire_cut.file": "--file",
+    "acquire_cut.port": "--port",
+    "acquisition.measure_rate": "lobewatch sensors",
+    "acquisition.scan_ports": "lobewatch ports",
+    "folder_files.make_machine_folder.template": "lobewatch init --example",
+    "plan_session.port": "--port",
+    "plan_session.resume=False": "--new",
+    "record_cut.patience": "--seconds",
+    "rotate_structure.degrees": "--askew",
+    "rotate_structure.direction": "--direction",
+    "screen.ScreenServer": "--screen",
+    # lobewatch.verdicts, cuts, monitoring
+    "Circumstances.direction": "--direction",
+    "Circumstances.tool": "--tool",
+    "Conditions.reclamped": "--reclamped",
+    "Logbook.verdicts": "lobewatch check",
+    "TapSession.run": "lobewatch tap",
+    "add_event.new_baseline": "--new-baseline",
+    "folder_updates.add_event": "lobewatch event",
+    "folder_updates.exclude_entry": "lobewatch exclude",
+    "operator_entries.acknowledge_alarms": "lobewatch ack",
+    "pocket_depth.find_pocket_depths": "lobewatch suggest",
+    "program_learning.find_next_cut": "lobewatch suggest",
 }
 """Option or command for each field or function that a message names."""
 

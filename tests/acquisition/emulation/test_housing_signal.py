@@ -1,4 +1,4 @@
-"""What is heard on the housing: the way there, other machines, folding."""
+"""Signal at the spindle housing: transfer path, disturbances, aliasing."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ RATE = 102400.0
 
 
 def tone(frequency: float) -> TipMotion:
-    """1 m/s^2 along x in the middle of 0.5 s."""
+    """Return a tone of 1 m/s^2 along x, 0.5 s long, with silence around it."""
     time = np.arange(int(0.5 * RATE)) / RATE
     wave = np.sin(2 * np.pi * frequency * time) * np.interp(time, [0, 0.1, 0.4, 0.5], [0, 1, 1, 0])
     return TipMotion(RATE, np.stack([wave, np.zeros(time.size)]))
 
 
 def amplitude(heard: NDArray[np.float64], frequency: float, sample_rate: float = 25600.0) -> float:
-    """Of a line in the middle (m/s^2)."""
+    """Return the amplitude of a line (m/s^2) from the middle part."""
     piece = heard[heard.size // 2 - 2048 : heard.size // 2 + 2048]
     time = np.arange(piece.size) / sample_rate
     window = np.hanning(piece.size)

@@ -1,4 +1,4 @@
-"""A whole tap test through each device that a library of its maker reads, the library made of software."""
+"""Complete tap test through each device that a vendor library reads, with emulated libraries."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def libraries(wiring: Wiring) -> dict[str, ModuleType]:
 
 
 def machine_with(driver: str) -> MachineFolder:
-    """A new machine with this driver, in the working directory."""
+    """Make a machine with this driver in the working directory."""
     make_machine_folder(Path("trial"), "new_machine.toml")
     toml = Path("trial/machine.toml")
     range_v = 10 if driver in ("audio", "uldaq", "ljm") else 5
@@ -66,7 +66,7 @@ range_v = {range_v}
 
 
 def hammered(folder: MachineFolder, structure: Structure) -> Callable[[float], Callable[[int, int], Volts]]:
-    """Voltages of the sensors while somebody taps the structure."""
+    """Return the sensor voltages of a tapped structure."""
     sensitivities = np.array([[sensor.channel.sensitivity] for sensor in folder.machine.daq.settings.inputs])
 
     def at(rate: float) -> Callable[[int, int], Volts]:

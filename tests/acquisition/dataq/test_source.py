@@ -1,4 +1,4 @@
-"""The DATAQ source against the emulator: real bytes through a pseudo-terminal and through TCP, every fault."""
+"""DATAQ source against the emulator: real bytes through a pseudo-terminal and through TCP, every fault."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ Make = Callable[..., DataqEmulator]
 
 @pytest.fixture(autouse=True)
 def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An emulated device is quiet at once."""
+    """Shorten the silence after which an emulated device counts as stopped."""
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
 
 
 @pytest.fixture
 def signal_at(structure: Structure) -> SignalAt:
-    """Somebody who taps `structure`; the same taps at each start."""
+    """Return the signal of a tapped `structure`, with the same taps at each start."""
     how = Hammering(double_hits=0.0, overloads=0.0)
     return lambda rate: HammeredStructure(structure, rate, np.random.default_rng(1), how)
 
@@ -77,13 +77,13 @@ def emulated(signal_at: SignalAt) -> Make:
 
 
 def expected(signal_at: SignalAt, count: int) -> NDArray[np.int32]:
-    """Codes of the first scans (2, n)."""
+    """Return the codes of the first scans (2, n)."""
     blocks = SimulatedSource(signal_at(RATE), tuple(one.channel for one in INPUTS), RATE, count).blocks()
     return np.concatenate([block.codes for block in blocks], axis=1)
 
 
 def take(source: DataqSource, count: int) -> list[Block]:
-    """Blocks with at least so many scans."""
+    """Return blocks with at least this many scans."""
     taken: list[Block] = []
     for block in source.blocks():
         taken.append(block)
@@ -93,7 +93,7 @@ def take(source: DataqSource, count: int) -> list[Block]:
 
 
 def check_against(blocks: list[Block], truth: NDArray[np.int32]) -> None:
-    """Every scan stands where it belongs."""
+    """Check that every scan is at its place."""
     for block in blocks:
         end = min(block.first_scan + block.codes.shape[1], truth.shape[1])
         assert np.array_equal(block.codes[:, : end - block.first_scan], truth[:, block.first_scan : end])
@@ -126,7 +126,7 @@ def test_scans_arrive_unchanged_and_complete(
 def test_what_a_slow_device_sends_after_its_stop_is_not_taken_for_the_next_stream(
     emulated: Make, signal_at: SignalAt
 ) -> None:
-    traits = {"echoes_stop": True, "stop_takes": 0.4}
+    traits = {"echoes_stop": True, "stop_delay": 0.4}
     with emulated(**traits) as device, DataqSource(device.port, INPUTS, RATE, digital_word=False) as source:
         for _ in range(2):
             source.start()
@@ -244,7 +244,7 @@ def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytes
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.5)
     monkeypatch.setattr("acquisition.dataq.protocol.MAX_DRAIN_TIME", 0.2)
     with (
-        emulated(streaming_at_connect=True, deaf=True) as device,
+        emulated(streaming_at_connect=True, ignores_commands=True) as device,
         pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),
     ):
         DataqSource(device.port, INPUTS, RATE)
@@ -298,7 +298,7 @@ def test_a_halved_rate_is_that_of_the_clock_not_of_the_formula(signal_at: Signal
 
 
 def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -> None:
-    """A ramp shows the instant of each conversion: input 5 comes a third of a scan after input 0."""
+    """Use a ramp to show each conversion time: input 5 comes a third of a scan after input 0."""
 
     def ramp(rate: float) -> SignalFunction:
         return lambda first, n: np.tile((first + np.arange(n)) / rate, (2, 1))
@@ -315,7 +315,7 @@ def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -
 
 @pytest.mark.parametrize("bits", [12, 14, 16])
 def test_an_overload_is_found_at_the_resolution_of_the_rate(bits: int) -> None:
-    """A sine of 102 % of the range, in words whose lower bits are 0."""
+    """Use a sine of 102 % of the range, in words whose lower bits are 0."""
 
     def loud(rate: float) -> SignalFunction:
         return lambda first, n: np.tile(2.04 * np.sin(2 * np.pi * 300 / rate * (first + np.arange(n))), (2, 1))
@@ -389,7 +389,7 @@ def test_a_port_in_use_is_refused_with_the_cure(emulated: Make) -> None:
 
 
 def test_a_clock_shows_the_loss_of_whole_scans(emulated: Make, signal_at: SignalAt) -> None:
-    """Three packets, 32 scans, in the middle of a hit: neither the digital word alone nor the rate shows them."""
+    """Lose three packets, 32 scans, within a hit: neither the digital word nor the rate shows them."""
     crossing = int(np.argmax(expected(signal_at, 20_480)[0] * INPUTS[0].channel.scale > 20))
     for clock, told in ((False, HitFlags.OK), (True, HitFlags.LOST_SCANS)):
         with (

@@ -1,4 +1,4 @@
-"""Curves of the screen: the spectrum of the force in dB below its largest value."""
+"""Curves of the screen: force spectrum in dB below its largest value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RATE = 25600.0
 
 
 def test_the_force_spectrum_of_a_half_sine_is_that_of_the_closed_form() -> None:
-    """|F| of a half sine of duration T is |cos(pi f T) / (1 - (2 f T)^2)| of that at 0 Hz (a table of transforms)."""
+    """Compare with |cos(pi f T) / (1 - (2 f T)^2)| of the value at 0 Hz, from a table of transforms."""
     duration = 1.01e-3
     time = np.arange(4096) / RATE - 0.01
     force = np.where((time > 0) & (time < duration), 200 * np.sin(np.pi * time / duration), 0.0)

@@ -1,4 +1,4 @@
-"""The TAPS/1 source against the emulator: real bytes through a pseudo-terminal and through TCP."""
+"""TAPS/1 source against the emulator: real bytes through a pseudo-terminal and through TCP."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_lost_frames_are_counted_exactly_and_mark_the_hits(
 
 
 def last(blocks: list[Block]) -> int:
-    """The scan after the last one."""
+    """Return the index of the scan after the last one."""
     return int(blocks[-1].first_scan + blocks[-1].codes.shape[1])
 
 
@@ -261,7 +261,7 @@ def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
 def test_frames_hold_ten_milliseconds_but_never_more_than_fits(
     n_channels: int, bits: int, rate: float, scans: int, channels: Pair
 ) -> None:
-    """Eight channels of 32 bits fill 32 bytes a scan: (8192 - 28) // 32 of them fit."""
+    """Eight channels of 32 bits fill 32 bytes per scan: (8192 - 28) // 32 of them fit."""
     many = (channels * 4)[:n_channels]
     fine = tuple(replace(channel, adc_bits=bits) for channel in many)
     zeros = np.zeros((n_channels, 1))

@@ -1,4 +1,4 @@
-"""The serial port below every driver: a late consumer, two programs, a pulled cable, a device that comes back."""
+"""Serial ports: a late consumer, two programs, a pulled cable, a device that comes back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pty = pytest.importorskip("pty", reason="pseudo-terminals are needed")
 
 HOLDER = """
 import sys
-from acquisition.ports.serial_link import SerialLink
+from acquisition.ports import SerialLink
 link = SerialLink(sys.argv[1])
 print("open", flush=True)
 input()
@@ -29,7 +29,7 @@ input()
 
 
 class Cable:
-    """The device's end of a pseudo-terminal."""
+    """Device end of a pseudo-terminal."""
 
     def __init__(self) -> None:
         import tty

@@ -1,4 +1,4 @@
-"""A cut from a stream: waited for, taken with the air around it, and faults of the sensor told."""
+"""Recording of a cut from a stream: awaited, taken with the air around it, and sensor faults reported."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 class Stream:
-    """Blocks of a signal, as fast as they are asked for; with the surface of a device that matters here."""
+    """Blocks of a signal as fast as they are read, with the interface of a device that matters here."""
 
     identity, follows_clock, loss_detection, fault = DeviceIdentity("stream"), False, "", ""
 
@@ -44,7 +44,7 @@ class Stream:
 
 
 def sound(*parts: tuple[float, bool]) -> Floats:
-    """Seconds of air or cut."""
+    """Return seconds of air or cut."""
     random, found = np.random.default_rng(0), []
     for seconds, is_cut in parts:
         time = np.arange(round(seconds * RATE)) / RATE

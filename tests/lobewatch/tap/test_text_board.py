@@ -1,4 +1,4 @@
-"""A whole tap test on a board that prints lines, through a pseudo-terminal."""
+"""Complete tap test on a board that prints lines, through a pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DIGITAL = "sensitivity_mv_per_g = 100\nrange_v = 1.6"
 
 
 def daq(sample_rate: int, *sensors: str, more: str = "") -> str:
-    """[daq] of a board that prints what these sensors say, in this order; more: keys."""
+    """Return [daq] of a board that prints these sensors in this order. more: further keys."""
     channels = (
         f'[[daq.channel]]\ninput = {i}\nquantity = "{"force" if "per_n" in sensor else "acceleration"}"\n{sensor}\n'
         for i, sensor in enumerate(sensors)
@@ -77,7 +77,7 @@ def test_a_whole_tap_test(
 def test_a_digital_sensor_of_five_dollars(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The z-axis of an ADXL345 by its data sheet: 430 ug per root Hz up to 1600 Hz, steps of 7.8 mg, gravity."""
+    """Use the z-axis of an ADXL345 by its data sheet: 430 ug per root Hz up to 1600 Hz, steps of 7.8 mg, gravity."""
     monkeypatch.chdir(tmp_path)
     make_machine_folder(Path("trial"), "new_machine.toml")
     toml, rate, step = Path("trial/machine.toml"), 3200.0, 7.8e-3 * STANDARD_GRAVITY

@@ -1,4 +1,4 @@
-"""Stories of an emulated spindle: each is told as it is meant, and recognised by the watch and the forecast."""
+"""Wear scenarios of an emulated spindle: each develops as intended and is recognized by monitoring and forecast."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ NOW = datetime(2025, 12, 20, tzinfo=UTC)
 def planned(
     folder: MachineFolder, story: WearScenario, seed: int = 1, scatter: float = 0.001, **more: Any
 ) -> list[PlannedTap]:
-    """The tests in x."""
+    """Return the tests in x."""
     taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, MountingVariation(**more), NOW)
     return [tap for tap in taps if tap.direction == "x"]
 
 
 def judged(taps: list[PlannedTap]) -> Trend:
-    """What is made of the true frequencies, which scatter."""
+    """Return the status that follows from the true frequencies with scatter."""
     warmth = [tap.conditions.specified.get("temperature_c", math.nan) for tap in taps]
     series = [TapValue(tap.date, tap.truth.frequency, 0.01, warm) for tap, warm in zip(taps, warmth, strict=True)]
     return fit_trend(series, taps[-1].date)
@@ -43,7 +43,7 @@ def open_fall(trend: Trend) -> SeriesChange:
 
 
 def reached(trend: Trend, percent: float) -> tuple[float, float, float]:
-    """Months after the last test at which it has fallen by so much more."""
+    """Return the months after the last test at which the frequency has dropped by this share more."""
     assert trend.forecast is not None
     last = days_since_epoch(trend.points[-1].time)
     level = float(trend.forecast.fitted[-1]) - percent

@@ -1,4 +1,4 @@
-"""Boards that print: what is read of their lines and frames, and what is lost."""
+"""Boards that print their samples: decoded lines and frames, and lost scans."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ FRAME = FrameFormat(b"\xaa\xbb", counter=True)
 
 
 def ramp(first: int, count: int) -> NDArray[np.float64]:
-    """N and m/s^2 by which each scan is known."""
+    """Return N and m/s^2 that identify each scan."""
     scans = np.arange(first, first + count) % 4000
     return np.array([scans * 0.5 - 500.0, 300.0 - scans * 0.25])
 
 
 def falling(first: int, count: int) -> NDArray[np.float64]:
-    """The m/s^2 of `ramp` alone."""
+    """Return only the m/s^2 of `ramp`."""
     return ramp(first, count)[1:]
 
 
@@ -42,7 +42,7 @@ def falling(first: int, count: int) -> NDArray[np.float64]:
 def printed(
     printing: OutputFormat | None = None, traits: TextBoardTraits | None = None, alone: bool = False
 ) -> Iterator[TextBoardSource]:
-    """A source that listens to an emulated board, as fast as it prints; alone: of an acceleration and no force."""
+    """Return a source that listens to an emulated board without a clock. alone: acceleration without force."""
     inputs = (SensorInput(0, ACCELERATION),) if alone else INPUTS
     sensitivities = tuple(sensor.channel.sensitivity for sensor in inputs)
     signal = falling if alone else ramp

@@ -1,4 +1,4 @@
-"""Devices that a library of their maker reads, against libraries made of software."""
+"""Devices read through a vendor library, tested against emulated libraries."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ AUDIO_SCALE = 2**23 / 846000
 
 
 def ramp(_rate: float) -> Callable[[int, int], Volts]:
-    """Voltages by which each scan is known: rising in the first row, falling twice as fast in the second."""
+    """Return voltages that identify each scan: rising in the first row, falling twice as fast in the second."""
     return lambda first, count: np.array([1e-6, -2e-6])[:, None] * np.arange(first, first + count)
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of device in the tests."""
+    """Kind of device in the tests."""
 
     port: str
     libraries: Callable[[Wiring], dict[str, ModuleType]]
@@ -57,7 +57,7 @@ KINDS = {
 def inputs(
     range_v: float, numbers: tuple[int, int] = (0, 1), iepe: bool = True, alone: bool = False
 ) -> tuple[SensorInput, ...]:
-    """alone: the acceleration and no force."""
+    """Return the inputs. alone: acceleration without force."""
     force = SensorInput(numbers[0], Channel("force", 2.25e-3, range_v), iepe)
     acceleration = SensorInput(numbers[1], Channel("acceleration", 1.02e-3, range_v), iepe)
     return (acceleration,) if alone else (force, acceleration)
@@ -70,7 +70,7 @@ def wiring() -> Wiring:
 
 @pytest.fixture
 def plugged(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -> Callable[..., LibraryDevice]:
-    """Opens a device of a kind whose library is there."""
+    """Return a function that opens a device of a kind whose library is installed."""
 
     def open_it(name: str, port: str = "", range_v: float = 0.0, rate: float | None = None, **more: Any) -> Any:
         kind = KINDS[name]
@@ -198,7 +198,7 @@ def test_the_rate_is_one_that_the_device_has(name: str, asked: float, actual: fl
         ("audio", {"rate": 51200.0}, ValueError, "sample_rate_hz=51200: 485B39 .* has no such rate"),
         ("audio", {"range_v": 5.0}, ValueError, "range_v=5: the calibration of 485B39 says 9.916 V for input 0"),
         ("audio", {"numbers": (0, 2)}, ValueError, "input=2: 485B39 .* has the inputs 0 to 1"),
-        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 cannot be opened .*invalid.*lobewatch ports"),
+        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 cannot be opened .*invalid.*acquisition.scan_ports"),
         ("nidaqmx", {"numbers": (0, 4)}, ValueError, "input=4: NI 9234 has the inputs 0 to 3"),
         ("mcc172", {"port": "mcc172:first"}, ValueError, "address of the board, 0 to 7"),
         ("mcc172", {"port": "mcc172:3"}, DeviceError, "Addr 3: Board not responding"),
@@ -269,7 +269,7 @@ def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPat
 
 
 def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -> None:
-    """53 134 counts per m/s^2; 10 mV for each is 1.578765 V of full scale."""
+    """Check 53 134 counts per m/s^2: at 10 mV each they are 1.578765 V of full scale."""
     audio, scale = find_driver("audio"), 2**23 / 53134 * 0.01
     name = "333D01 10165435313412345190301"
     monkeypatch.setitem(sys.modules, "sounddevice", fake_sounddevice(wiring, (name,), scale))
@@ -287,7 +287,7 @@ def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytes
 
 
 def test_calibrations_in_names() -> None:
-    """Numbers worked out by hand from the format."""
+    """Check numbers worked out by hand from the format."""
     normal = parse_name_calibration(f"Microphone (2- {NAME})")
     assert normal is not None
     assert (normal.model, normal.serial, normal.date) == ("485B39", "012345", "2026-01-15")

@@ -1,4 +1,4 @@
-"""An emulated spindle whose modes lie askew, tapped in x, y and across through the bytes of a device."""
+"""Emulated spindle with rotated principal directions, tapped in x, y and xy through the bytes of a device."""
 
 from __future__ import annotations
 

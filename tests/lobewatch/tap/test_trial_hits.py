@@ -1,4 +1,4 @@
-"""Trial hits: ring-down, record length, trigger level and range."""
+"""Trial hits: decay time, record length, trigger level and range."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def hit(
     response: float = 500.0,
     second: float = 0.0,
 ) -> Hit:
-    """A pulse and the ringing of a mode at 60 Hz with this time constant, and of a faster one at 900 Hz; noise."""
+    """Make a pulse with a mode at 60 Hz of this time constant, a faster one at 900 Hz, and noise."""
     random = np.random.default_rng(3)
     time = np.arange(round(seconds * RATE)) / RATE - 0.02
     force = peak * np.where(np.abs(time - 5e-4) < 1e-3, np.cos(np.pi * (time - 5e-4) / 2e-3) ** 2, 0.0)
@@ -43,7 +43,7 @@ def baseline(channels: Pair, noise: float = 0.05) -> Hit:
 
 @pytest.mark.parametrize(("tau", "bound"), [(0.02, 0.1), (0.05, 0.1), (0.2, 0.15), (0.5, 0.25)])
 def test_the_slowest_decay_is_found(channels: Pair, tau: float, bound: float) -> None:
-    """In a record of 0.25 s: one that outlasts it is extrapolated; the longer record of the next hit refines it."""
+    """Check that a decay longer than the record of 0.25 s is extrapolated, and refined by the next longer record."""
     assert estimate_decay_time(hit(channels, tau)) == pytest.approx(tau, rel=bound)
 
 

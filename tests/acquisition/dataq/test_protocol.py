@@ -1,4 +1,4 @@
-"""The dialogue with a DATAQ device as (sent, received) pairs, byte for byte, and the facts of its protocol."""
+"""Commands to a DATAQ device as (sent, received) pairs, byte for byte, and the facts of its protocol."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ GOODBYE: list[Pair] = [(b"stop\r", b"")]
 
 
 class ScriptedLink:
-    """A SerialLink that expects what is written and answers from a script."""
+    """SerialLink that expects what is written and answers from a script."""
 
     port = "COM9"
     overruns = 0

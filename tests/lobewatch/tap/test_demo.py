@@ -1,4 +1,4 @@
-"""The demo's plan: what ages, what scatters, and that the device behind it is the one that others tap."""
+"""Plan of the demo: wear, scatter, and the device behind it, which is the same that others tap."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plan(folder: MachineFolder, scatter: float, seed: int = 1) -> list[PlannedTa
 
 
 def frequencies(taps: list[PlannedTap]) -> NDArray[np.float64]:
-    """Of the truths (Hz), shape (months, 2): x and y."""
+    """Return the true frequencies (Hz), shape (months, 2): x and y."""
     assert [tap.direction for tap in taps] == ["x", "y"] * MONTHS
     return np.reshape([tap.truth.frequency for tap in taps], (MONTHS, 2))
 
@@ -89,7 +89,7 @@ def test_a_device_in_step_gives_the_samples_of_one_that_runs_free(structure: Str
 
 
 def codes(source: TapsSource) -> NDArray[np.int32]:
-    """What comes first."""
+    """Return the first codes."""
     with source:
         source.start()
         blocks = list(takewhile(lambda block: block.first_scan < SCANS, source.blocks()))

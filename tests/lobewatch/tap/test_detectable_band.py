@@ -1,4 +1,4 @@
-"""What an accelerometer alone can hear, said before the test."""
+"""Detectable band of an accelerometer, checked before a test without force."""
 
 from __future__ import annotations
 

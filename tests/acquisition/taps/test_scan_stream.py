@@ -1,4 +1,4 @@
-"""TAPS/1 streams that arrive damaged: refused or unchanged, never wrong samples (collisions of CRC-32 apart)."""
+"""Damaged TAPS/1 streams: rejected or unchanged, never wrong samples (except for collisions of CRC-32)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SESSION = 3
 
 
 def scans(first: int, n: int = SCANS) -> NDArray[np.int32]:
-    """Scans that tell their index."""
+    """Return scans that tell their index."""
     index = np.arange(first, first + n, dtype=np.int32)
     return np.stack([index, -7 * index])
 

@@ -1,4 +1,4 @@
-"""The device of a live tap test: unplugged in every state, found again, faults it reports, samples that end."""
+"""Device of a live tap test: unplugged at any step, found again, reported faults, samples that end."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def test_samples_that_end_are_told(
 def test_samples_that_end_with_the_last_hit_are_enough(
     folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
-    """As those of a recorded tap test do: the time to take the last hit back is over with them."""
+    """Check that samples which end with the last hit leave no time to take it back, as in a recorded test."""
     session: TapSession = session_of(
         folder, lambda: simulated(tapper(), channels, ended=lambda: session.state.good == 10)
     )

@@ -1,4 +1,4 @@
-"""Drivers of other packages that fail or hang: their package is named, all others go on, nothing waits for ever."""
+"""Drivers of other packages that fail or hang: their package is named, and all others go on."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ METADATA = "Metadata-Version: 2.1\nName: bad-daq\nVersion: 1.0\n"
 
 
 class UnprintableError(Exception):
-    """An error whose text cannot be had."""
+    """Error whose text cannot be read."""
 
     def __str__(self) -> str:
         raise RuntimeError
 
 
 class Stranger(BaseException):
-    """No Exception at all."""
+    """Exception that is no Exception."""
 
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """A pseudo-terminal at which nobody answers."""
+    """Open a pseudo-terminal at which nobody answers."""
     ends = os.openpty()
     tty.setraw(ends[1])
     yield os.ttyname(ends[1])
@@ -56,7 +56,7 @@ def port() -> Iterator[str]:
 
 @pytest.fixture
 def bad_daq(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package bad-daq is installed that brings the driver "bad"."""
+    """Install a package bad-daq that brings the driver "bad"."""
     folder = tmp_path / "bad_daq-1.0.dist-info"
     folder.mkdir()
     (folder / "METADATA").write_text(METADATA, "utf-8")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition import Conditions
 from lobes import SldHistory, StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.history.history import (
     ESTIMATE_UNITS,
     MAX_STORED_MODES,
@@ -73,9 +74,7 @@ def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
     return [Mode(frequency, damping, stiffness, phase_deg=phase) for frequency, damping, stiffness, phase in values]
 
 
-def _lobe_depths(
-    rows: Sequence[HistoryRow], machine: Machine, speeds: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -> dict[str, Floats]:
     """Return the limits of each row over speeds (m) by name of the cut; NaN without lobes."""
     nowhere = np.full(speeds.size, np.nan)
     diagrams = [compute_row_lobes(row, machine) for row in rows]
@@ -111,7 +110,7 @@ def _text_column(values: Any) -> NDArray[np.str_]:
     return np.array(list(values), dtype=np.str_)
 
 
-def _number_column(values: Sequence[Any], *width: int) -> NDArray[np.float64]:
+def _number_column(values: Sequence[Any], *width: int) -> Floats:
     return np.array(values, dtype=np.float64).reshape(len(values), *width)
 
 

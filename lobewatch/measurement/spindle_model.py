@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError, Frf
 from dsm import (
@@ -29,7 +28,6 @@ from dsm import (
 from lobewatch.machine import Machine
 from lobewatch.measurement.tap_measurement import Measurement
 
-_Float = NDArray[np.float64]
 MODEL_FRF_POINTS = 400
 """Points of each curve; chosen, finer than a screen."""
 MODEL_FRF_BAND = (0.3, 3.0)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import CROSS_TAP, DataError, Remark
 from dsm import Calibration
 from lobes import Cut, StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
@@ -245,7 +245,7 @@ def _direction_remarks(
     return (Remark("older-direction", newest.tool, text, f"tap direction {across.direction} again"),)
 
 
-def speed_grid(machine: Machine) -> NDArray[np.float64]:
+def speed_grid(machine: Machine) -> Floats:
     """Return the speeds of all diagrams of a machine.
 
     Parameters

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle_lobes, lower_envelope, stability_boundary, zero_order_lobes
 from lobes.tip_response import TipData
+from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine
 from lobewatch.tool.assembly import Assembly
 
@@ -69,7 +69,7 @@ def find_cut_table(machine: Machine, name: str) -> CutTable:
 
 
 def compute_lobe_chart(
-    method: LobeMethod, x: TipData | None, y: TipData | None, cuts: Sequence[Cut], speed_rpm: NDArray[np.float64]
+    method: LobeMethod, x: TipData | None, y: TipData | None, cuts: Sequence[Cut], speed_rpm: Floats
 ) -> StabilityLobes:
     """Compute the lowest lobes of a cut over its feed directions.
 
@@ -101,7 +101,7 @@ def compute_lobe_chart(
 
 
 def _compute_cut_lobes(
-    method: LobeMethod, x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: NDArray[np.float64]
+    method: LobeMethod, x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: Floats
 ) -> StabilityLobes:
     if method is LobeMethod.AVERAGE_ANGLE:
         return average_angle_lobes(x, y, cut, speed_rpm)

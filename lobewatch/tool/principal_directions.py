@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lobes import Cut, StabilityLobes, lower_envelope, project_modes, zero_order_lobes
+from lobewatch.arrays import Flags, Floats
 from modal import Mode
 
 MAX_PAIR_FREQUENCY_DISTANCE = 0.05
@@ -31,8 +32,6 @@ CLAMPING_FREQUENCY_TOLERANCE = 0.003
 """Relative distance of two frequencies that reclamping explains."""
 MAX_OPEN_SIGNS = 3
 """Largest number of unknown signs whose combinations are all computed; the others are positive."""
-
-Floats = NDArray[np.float64]
 
 
 class ModePair(NamedTuple):
@@ -56,7 +55,7 @@ class PrincipalDirections:
 
     stiffness: Floats
     """Measured stiffness (N/m), shape (n,)."""
-    is_y: NDArray[np.bool_]
+    is_y: Flags
     """Whether each mode was measured in y, shape (n,)."""
     pairs: tuple[ModePair, ...]
     """Modes of x with those of y that belong to them."""

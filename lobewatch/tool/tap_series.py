@@ -12,9 +12,9 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Remark
+from lobewatch.arrays import Floats
 from lobewatch.machine import TapEntry
 
 SERIES_CONDITIONS = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")}
@@ -222,7 +222,7 @@ def compute_frequency_scatter(series: Sequence[FollowedMode]) -> float | None:
     return float(_half_widths(np.log([[point.frequency] for point in series]))[0])
 
 
-def _half_widths(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _half_widths(values: Floats) -> Floats:
     """Return the half-widths of 95 % from successive differences of values, shape (n, k)."""
     steps = np.diff(values, axis=0)
     return np.asarray(np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975))

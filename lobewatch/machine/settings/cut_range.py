@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.drive_power import drive_depth_limit
 from lobewatch.machine.settings.machine_file import Machine
@@ -67,7 +67,7 @@ class CutRange:
         is_whole = (self.low_rpm, self.high_rpm) == (spindle.low_rpm, spindle.high_rpm)
         return f"{self.low_rpm:g}..{self.high_rpm:g} rpm{'' if is_whole else ', which the tool bears'}"
 
-    def depth_limits(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth_limits(self, speed_rpm: Floats) -> Floats:
         """Return the largest depth (mm) that tool and drive allow at each speed (rpm)."""
         return np.minimum(self.deepest_mm, 1e3 * drive_depth_limit(self.machine, self.table, speed_rpm))
 
@@ -81,7 +81,7 @@ class CutRange:
         is_reached = self.low_rpm <= speed_rpm <= self.high_rpm
         return is_reached and depth_mm <= float(self.depth_limits(np.array([speed_rpm]))[0])
 
-    def speeds(self, step: float) -> NDArray[np.float64]:
+    def speeds(self, step: float) -> Floats:
         """Return rising speeds (rpm) that can be set, at least a relative step apart."""
         if self.is_empty:
             return np.empty(0)

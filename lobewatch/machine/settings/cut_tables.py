@@ -55,7 +55,7 @@ class CutTable(TomlTable, frozen=True):
     """Table [reference_cut], and the shared part of a program.
 
     >>> pocket = CutTable(4, (2.0, 8.0), 16.0, "down", material="AA 7075")  # radial depth 2 to 8 mm
-    >>> pocket.immersion, pocket.feeds
+    >>> pocket.immersion, pocket.feed_axes
     (0.5, ('x', 'y'))
     """
 
@@ -128,9 +128,9 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     """Table [[program]]: a cut that the shop runs; NaN for a speed or depth that is requested.
 
     >>> program = ProgramTable(4, 8.0, 16.0, "down", material="AA 7075", name="A", speed_rpm=12000.0)
-    >>> program.is_open  # its depth is asked for
+    >>> program.is_incomplete  # the depth is requested
     True
-    >>> round(program.in_corner(20.0), 3)  # radial depth over diameter in a corner of 20 mm, 0.5 on the straight
+    >>> round(program.corner_immersion(20.0), 3)  # radial depth over diameter in a corner of 20 mm, 0.5 on the straight
     0.667
     """
 

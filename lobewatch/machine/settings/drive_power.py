@@ -6,15 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, CuttingCoefficients, max_depth_for_drive, mean_torque
+from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_tables import CutTable, DriveTable
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 
 
-def drive_depth_limit(machine: Machine, table: CutTable, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
+def drive_depth_limit(machine: Machine, table: CutTable, speed_rpm: Floats) -> Floats:
     """Return the largest depth of cut that the spindle drive allows.
 
     Parameters

@@ -23,9 +23,9 @@ from lobewatch.machine.folder_updates import exclude_entry, include_entry, make_
 from lobewatch.machine.journal.cut_entry import CutEntry, parse_cut_line
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.settings.requested_cut import find_by_name, find_cut_setting
-from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.machine.verify_files import verify
 from lobewatch.show.history import untapped_remarks
+from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""

@@ -15,7 +15,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.verify_files import verify
 
-VERSION_1 = Path(__file__).parents[3] / "data" / "version_1" / "machine"
+VERSION_1 = Path(__file__).parents[2] / "data" / "version_1" / "machine"
 MakeTap = Callable[..., TapTest]
 
 

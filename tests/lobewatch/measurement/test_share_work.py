@@ -26,7 +26,7 @@ from lobewatch.measurement.software import CURRENT_SOFTWARE
 from tests.lobewatch.authority import certify
 from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
 
-PAGE = (Path(__file__).parents[4] / "docs" / "performance-replay.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "performance-replay.md").read_text("utf-8")
 SAID = Description(date_pattern="%Y-%m-%d")
 
 
@@ -121,7 +121,9 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
 
 @pytest.mark.parametrize("address", ["", "x", "foo://h:1", "tls://", "tcp://[::1", "tcp://h:port", "inproc://x"])
 def test_what_is_no_address_of_a_scheduler_is_one_sentence(address: str) -> None:
-    with pytest.raises(DataError, match=rf"^Workers.scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"):
+    with pytest.raises(
+        DataError, match=rf"^Workers.scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"
+    ):
         scheduler_remarks(address)
     with pytest.raises(DataError, match="is no address"):
         [*share_work(abs, [1], Workers(scheduler=address or "/"))]

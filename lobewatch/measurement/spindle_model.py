@@ -205,9 +205,11 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
     """
     frequency, stiffness = modes_at(state.spindle, count)
     shares = energy_shares(state.spindle, count)
-    in_bearings = np.sum(shares.bearings + shares.housings, axis=1)
-    columns = frequency, stiffness, in_bearings, np.sum(shares.segments, axis=1), np.sum(shares.joints, axis=1)
-    modes = tuple(ModelMode(*row) for row in np.column_stack(columns)[:count].tolist())
+    parts = shares.bearings + shares.housings, shares.segments, shares.joints
+    modes = tuple(
+        ModelMode(float(frequency[n]), float(stiffness[n]), *(float(np.sum(part[n])) for part in parts))
+        for n in range(count)
+    )
     return ModelSummary(
         state,
         modes,

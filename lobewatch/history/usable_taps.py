@@ -90,7 +90,9 @@ class UsableTaps:
     @property
     def fleet_scatter(self) -> FleetScatter | None:
         """First scatter of the fleet since the baseline; None without one."""
-        since = (told for told in self._all.fleet_scatters if self.baseline is None or told.time >= self.baseline)
+        since = (
+            scatter for scatter in self._all.fleet_scatters if self.baseline is None or scatter.time >= self.baseline
+        )
         return next(since, None)
 
     @property

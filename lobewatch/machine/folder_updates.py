@@ -207,7 +207,7 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
 
     Raises ValueError, and writes nothing, if there is no question about a key.
     """
-    questions = find_setting_questions(folder)
+    questions = _find_setting_questions(folder)
     accepted = list[str]()
     for key in keys:
         statements = [question.statement for question in questions if key in (question.key, question.statement)]
@@ -220,7 +220,7 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
     return accepted
 
 
-def find_setting_questions(folder: MachineFolder) -> list[ImplausibleSetting]:
+def _find_setting_questions(folder: MachineFolder) -> list[ImplausibleSetting]:
     """Return all open questions about the machine.toml of a folder."""
     template = find_template_bearings(folder.machine)
     return [*find_all_questions(folder.machine), *([template] if template else [])]

@@ -142,7 +142,7 @@ def fit_file_modes(
             state, tuple(modes_from_extraction(state, [hits])), (mode_edits_remark(by_hand),) if by_hand else ()
         )
 
-    extraction, modes, said = fit_without_sensor_mass(frf, sensor, fit)
+    extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
     frf = remove_sensor_mass(frf, mass)
     if window is not None and delay is not None:
@@ -161,7 +161,7 @@ def fit_file_modes(
         as_recorded=modes,
         fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
-        remarks=(*file_frf.remarks, *said, *windowed, *_fit_remarks(modes, frf, band)),
+        remarks=(*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band)),
         facts=file_frf.facts,
         by_hand=by_hand,
     )
@@ -175,8 +175,8 @@ def _fit_decay_modes(
         raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
     state = edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modes_from_decays(state))
-    said = (*([mode_edits_remark(by_hand)] if by_hand else []), *decay_remarks(sensor))
-    remarks = (*decays.remarks, *said, *_fit_remarks(modes, state.frf, band))
+    fit_remarks = (*([mode_edits_remark(by_hand)] if by_hand else []), *decay_remarks(sensor))
+    remarks = (*decays.remarks, *fit_remarks, *_fit_remarks(modes, state.frf, band))
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
 
 

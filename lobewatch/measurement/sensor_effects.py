@@ -52,15 +52,15 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
     bare = remove_sensor_mass(frf, sensor.mass)
     state, modes, remarks = fit(bare)
     if not _is_driving_point(modes):
-        said = mass_not_removed_remark(sensor, "not the driving point, a K is negative")
+        remark = _mass_not_removed_remark(sensor, "not the driving point, a K is negative")
         state, modes, remarks = fit(frf)
-        return FrfFit(state, modes, (*remarks, said))
+        return FrfFit(state, modes, (*remarks, remark))
     modes = tuple(with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
-    said = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} are taken off")
-    return FrfFit(state, modes, (*remarks, said, *_mounting_remarks(modes, bare, sensor)))
+    remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} are taken off")
+    return FrfFit(state, modes, (*remarks, remark, *_mounting_remarks(modes, bare, sensor)))
 
 
-def mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:
+def _mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:
     """Return the remark that the sensor mass stays in the FRF."""
     return Remark("sensor-mass-stays", "", f"{_format_sensor_mass(sensor)} are not taken off: {why}")
 
@@ -89,9 +89,9 @@ def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
     loadings = [
         (mode, mass_loading(mode, frf, TYPICAL_SENSOR_MASS)) for mode in _trusted_driving_point_modes(modes, frf)
     ]
-    felt = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
-    if felt:
-        mode, loading = min(felt, key=lambda pair: pair[1].frequency)
+    relevant = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
+    if relevant:
+        mode, loading = min(relevant, key=lambda pair: pair[1].frequency)
         fall = 1 - (1 - 2 * loading.frequency) ** -0.5  # also where the modal mass is far below 10 g
         stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < MAX_FIRST_ORDER_DROP else ""
         changes = f"the frequency by {-100 * fall:.2g} %{stiffness}"
@@ -139,4 +139,4 @@ def decay_remarks(sensor: SensorLoading) -> list[Remark]:
     """Return the remarks on what free decays cannot tell."""
     text = "no force was measured: frequency and damping are known, stiffness is not; no stability lobes, no depths"
     remark = Remark(NO_FORCE_CODE, "", text, "tap with a hammer that measures its force")
-    return [remark, *([mass_not_removed_remark(sensor, "what they do needs K")] if sensor.mass else [])]
+    return [remark, *([_mass_not_removed_remark(sensor, "what they do needs K")] if sensor.mass else [])]

@@ -199,8 +199,7 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
     named = (fit.tap_id, fit.time, fit.tool, fit.direction)
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
-    said = (*remarks, *trusted.remarks)
-    return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=said)
+    return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=(*remarks, *trusted.remarks))
 
 
 def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:

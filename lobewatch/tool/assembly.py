@@ -36,7 +36,7 @@ MIN_CROSS_PEAK_RATIO = 0.3
 """Peak of a checked cross mode over the largest peak."""
 
 
-def check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipModes, tuple[Remark, ...]]:
+def _check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipModes, tuple[Remark, ...]]:
     """Return the cross FRF modes if they fit those of x and y; else None with a remark.
 
     None without a remark if one of the three is missing.
@@ -179,7 +179,7 @@ def assemble(
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
     directions = tuple(name for name in ("x", "y") if modes.get(name))
-    signed, about_cross = check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
+    signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
     return Assembly(
         tool=newest.tool,
         time=newest.time,

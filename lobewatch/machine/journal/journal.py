@@ -106,7 +106,7 @@ class Journal:
         batch = {BATCH_KEY: first} if len(entries) > 1 else {}
         lines = [reading.lines[-1] if reading.lines else b""]
         for number, entry in enumerate(entries, first):
-            lines.append(encode_line(entry | batch, number, lines[-1]))
+            lines.append(_encode_line(entry | batch, number, lines[-1]))
         _append_lines(self.path, lines[1:])
         self.line_count = len(reading.lines) + len(entries)
         try:
@@ -124,10 +124,10 @@ class Journal:
         """Write both files with these entries in a new chain, and keep the old files."""
         for path in (self.path, self.copy_path):
             if path.exists():
-                back_up_bytes(path, read_regular_file(path), "damaged")
+                _back_up_bytes(path, read_regular_file(path), "damaged")
         lines: list[bytes] = []
         for number, entry in enumerate(entries, 1):
-            lines.append(encode_line(entry, number, lines[-1] if lines else b""))
+            lines.append(_encode_line(entry, number, lines[-1] if lines else b""))
         content = b"".join(line + b"\n" for line in lines)
         atomic_write(self.path, content)
         atomic_write(self.copy_path, content)
@@ -136,7 +136,7 @@ class Journal:
         """Repair the files after a crash: move a torn end to a file of its own, and update the copy."""
         whole = b"".join(line + b"\n" for line in reading.lines)
         if reading.torn:
-            back_up_bytes(self.path, reading.torn, "torn")
+            _back_up_bytes(self.path, reading.torn, "torn")
         for path in (self.path, self.copy_path):
             if (read_regular_file(path) if path.exists() else b"") != whole:
                 atomic_write(path, whole)
@@ -202,14 +202,14 @@ def _are_one_batch(lines: Sequence[bytes]) -> bool:
     return len(written) < 2
 
 
-def encode_line(entry: JournalEntry, number: int, last: bytes) -> bytes:
+def _encode_line(entry: JournalEntry, number: int, last: bytes) -> bytes:
     """Encode an entry without its line end; last: previous line, without its line end."""
     fields = {name: value for name, value in entry.items() if name != "crc"}
     fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
     return json.dumps(fields | {"crc": compute_crc(fields)}).encode()
 
 
-def back_up_bytes(path: Path, content: bytes, why: str) -> Path:
+def _back_up_bytes(path: Path, content: bytes, why: str) -> Path:
     """Write bytes to a new file PATH.1.REASON, PATH.2.REASON, ... before they are overwritten."""
     number = 1
     while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():

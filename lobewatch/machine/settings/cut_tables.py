@@ -43,7 +43,7 @@ def corner_engagement(tool: float, radial: float, corner: float) -> float:
     return math.acos(max(cosine, -1.0))
 
 
-def immersion_steps(least: float, most: float) -> tuple[float, ...]:
+def _immersion_steps(least: float, most: float) -> tuple[float, ...]:
     """Return rising immersions between two, at most `MAX_ENGAGEMENT_STEP` of engagement apart."""
     low, high = (math.acos(1 - 2 * immersion) for immersion in (least, most))
     steps = math.ceil((high - low) / MAX_ENGAGEMENT_STEP - 1e-9)
@@ -103,7 +103,7 @@ class CutTable(TomlTable, frozen=True):
     @property
     def immersions(self) -> tuple[float, ...]:
         """Rising immersions along the path (-)."""
-        return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
+        return _immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
 
     @property
     def deepest_mm(self) -> float:
@@ -166,7 +166,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         """Rising immersions along the path and into its corners (-)."""
         if self.corner_radius_mm is None:
             return super().immersions
-        return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.corner_immersion(self.corner_radius_mm))
+        return _immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.corner_immersion(self.corner_radius_mm))
 
     def corner_immersion(self, radius_mm: float) -> float:
         """Return the immersion of a straight cut with the same engagement as this one in a corner.

@@ -6,12 +6,15 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobewatch import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from modal import Mode, synthesize_frf
+
+pytestmark = pytest.mark.quick
 
 LINES = np.arange(4.0, 4000.0, 4.0)
 

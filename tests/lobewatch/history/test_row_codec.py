@@ -17,6 +17,8 @@ from lobewatch.verdicts.verdict import Stability, StoredVerdict
 from modal import Mode, synthesize_frf
 from tests.lobewatch.conftest import LINES, START, Shop
 
+pytestmark = pytest.mark.quick
+
 HASHES = {"A": "of A"}
 ROW = HistoryRow(
     "T",

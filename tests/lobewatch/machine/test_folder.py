@@ -16,6 +16,8 @@ from lobewatch.machine import BusyError
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 
+pytestmark = pytest.mark.quick
+
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 
 

@@ -77,7 +77,11 @@ def test_a_replay_on_a_cluster_finds_the_same_though_a_worker_is_killed(cluster:
     assert (
         refused[0]
         == refused[1]
-        == {files[4]: "Real holds 'x' in line 3, which is no number; mend it there, or leave Real out of --columns"}
+        == {
+            files[
+                4
+            ]: "Real holds 'x' in line 3, which is no number; mend it there, or leave Real out of Description.columns"
+        }
     )
 
 

@@ -14,6 +14,8 @@ from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement import Measurement, measure
 from modal import Mode, synthesize_frf
 
+pytestmark = pytest.mark.quick
+
 LINES = np.arange(0.5, 4000.0, 0.5)
 TRUE = Mode(1713.0, 0.03, 3.5e7)
 

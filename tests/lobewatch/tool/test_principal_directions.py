@@ -10,6 +10,8 @@ from lobes import project_modes
 from lobewatch.tool.principal_directions import HIDDEN_PEAK_RATIO, find_principal_directions
 from modal import Mode
 
+pytestmark = pytest.mark.quick
+
 PAIR = [Mode(1500.0, 0.03, 20e6), Mode(1575.0, 0.028, 22e6)]
 
 

@@ -140,6 +140,7 @@ def write_without_numbers(path: Path, lines: list[dict[str, object]]) -> None:
             file.write(last + b"\n")
 
 
+@pytest.mark.quick
 def test_a_missing_copy_is_named(folder: MachineFolder) -> None:
     (folder.path / NAMES[1]).unlink()
     assert "journal.copy.jsonl: is missing" in told(folder)
@@ -160,6 +161,7 @@ def test_a_file_of_another_size_or_missing_or_altered_is_left_out_and_named(fold
     assert told(folder) == ""
 
 
+@pytest.mark.quick
 def test_a_file_without_a_line_does_not_count_and_is_named(folder: MachineFolder) -> None:
     (folder.path / "taps" / "copy.h5").write_bytes((folder.path / "taps" / "tap_1.h5").read_bytes())
     assert ids(folder) == ["tap_0", "tap_1", "tap_2"]

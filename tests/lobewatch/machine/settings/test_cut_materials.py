@@ -9,6 +9,8 @@ import pytest
 
 from lobewatch.machine.settings.machine_file import parse_machine_file
 
+pytestmark = pytest.mark.quick
+
 EXAMPLE = """
 [machine]
 name = "m"

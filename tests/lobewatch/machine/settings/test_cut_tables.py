@@ -13,6 +13,8 @@ from lobewatch.machine.settings.cut_tables import corner_engagement
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.setting_questions import hash_programs
 
+pytestmark = pytest.mark.quick
+
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
 FIRST = "speed_rpm = 12600"
 

@@ -17,6 +17,8 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.verdicts.uncertainty import DEFAULT_TAP_SCATTER
 
+pytestmark = pytest.mark.quick
+
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
 FRESH = resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8")
 

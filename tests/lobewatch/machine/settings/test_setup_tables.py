@@ -11,6 +11,8 @@ import pytest
 from acquisition import Channel, DataError, SensorInput
 from lobewatch.machine.settings.machine_file import parse_machine_file
 
+pytestmark = pytest.mark.quick
+
 PLUGIN = Path(__file__).parents[3] / "plugins" / "dummy_device"
 HEAD = '[machine]\nname = "mill 3"\n'
 DAQ = """

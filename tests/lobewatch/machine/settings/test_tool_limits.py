@@ -14,6 +14,8 @@ from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.setting_questions import find_all_questions
 
+pytestmark = pytest.mark.quick
+
 HEAD = '[machine]\nname = "m"\n[speed]\nlow_rpm = 1000\nhigh_rpm = 24000\n'
 STEEL = 'material = "42CrMo4"\n'
 CARBIDE = 'tool_material = "carbide"\n'

@@ -107,7 +107,7 @@ def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCl
 
 
 def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="Workers.jobs 2 and Workers.scheduler tcp://x: give one of them"):
+    with pytest.raises(ValueError, match=r"Workers\.jobs 2 and Workers\.scheduler tcp://x: give one of them"):
         Workers(2, "tcp://x")
     monkeypatch.setattr("lobewatch.measurement.share_work.SCHEDULER_TIMEOUT", 0.3)
     with pytest.raises(DataError, match=r"Workers.scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):

@@ -147,7 +147,6 @@ def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
 
 
 def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
-    """Modes of a tap test without force."""
     state, remarks = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
     return FrfFit(state, tuple(modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
 

@@ -247,36 +247,43 @@ def assess_status(
 def _build_status(
     now: datetime,
     remarks: Sequence[Remark],
-    well: str = "",
+    default_step: str = "",
     series: Sequence[SeriesStatus] = (),
     last_tap: datetime | None = None,
     left: float | None = None,
     alarms: Sequence[Alarm] = (),
 ) -> MachineStatus:
-    """Build the status from its remarks; well: next step where no remark has one."""
+    """Build the status from its remarks; default_step: next step where no remark has one."""
     ordered = sort_by_severity(remarks)
-    said = add_acknowledgements(ordered, alarms, now)
+    acknowledged = add_acknowledgements(ordered, alarms, now)
     return MachineStatus(
-        now, ordered, find_next_step(ordered, well), said, sort_by_severity(alarms), tuple(series), last_tap, left
+        now,
+        ordered,
+        find_next_step(ordered, default_step),
+        acknowledged,
+        sort_by_severity(alarms),
+        tuple(series),
+        last_tap,
+        left,
     )
 
 
 def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:
-    rows, beside = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
+    rows, other_rows = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
     if scatter is None or sum(row.time <= scatter.time for row in rows) >= MIN_MONITORED_POINTS:
-        return build_series_history(rows, beside)
+        return build_series_history(rows, other_rows)
     return build_series_history(
-        rows, beside, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
+        rows, other_rows, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
     )
 
 
 def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStatus:
-    newest, frequency, fall = series.rows[-1], series.frequency, series.drop
+    newest, frequency, drop = series.rows[-1], series.frequency, series.drop
     first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
     of_limits, of_watch = (
-        [*_drop_limit_remarks(name, fall, machine.limits)],
+        [*_drop_limit_remarks(name, drop, machine.limits)],
         [*_trend_remarks(name, trend, path)] if trend else [],
     )
     remarks = [*_lost_mode_remarks(name, newest), *of_limits, *of_watch, *_value_change_remarks(name, series)]
@@ -290,7 +297,7 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
         if STATUS_BY_CODE[remark.code] is StatusLevel.ALARM and row is not None
     ]
     return SeriesStatus(
-        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), tuple(raised), series
+        newest.tool, newest.direction, newest.time, first.time, drop, trend, tuple(remarks), tuple(raised), series
     )
 
 

@@ -186,9 +186,9 @@ def is_early_alarm(ordered: Sequence[Remark]) -> bool:
     return worst_status(ordered) is StatusLevel.ALARM and codes.isdisjoint(LIMIT_CODES)
 
 
-def find_next_step(ordered: Sequence[Remark], well: str) -> str:
-    """Return the next step, one sentence; well: where no remark has one."""
-    return ordered[0].cure if ordered and ordered[0].cure else well
+def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:
+    """Return the next step, one sentence; default_step: where no remark has one."""
+    return ordered[0].cure if ordered and ordered[0].cure else default_step
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:

@@ -94,7 +94,7 @@ def _change_text(change: SeriesChange) -> str:
 
 @dataclass(frozen=True)
 class SeriesStatus:
-    """The status of one tool in one direction."""
+    """Status of one tool in one direction."""
 
     tool: str
     """Tool in the spindle."""
@@ -107,13 +107,13 @@ class SeriesStatus:
     drop: Estimate
     """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
-    """Points, alarm and forecast; None where no test of it can be compared with."""
+    """Points, changes and forecast; None without comparable tests."""
     remarks: tuple[Remark, ...]
-    """Reasons that it gives."""
+    """Remarks on the series."""
     triggered: tuple[TriggeredAlarm, ...]
-    """Those that trigger an alarm."""
+    """Triggered alarms."""
     history: SeriesHistory = field(compare=False, repr=False)
-    """Rows that all this follows from, and the history of their values."""
+    """Rows of the series, and the history of their values."""
 
     @property
     def name(self) -> str:
@@ -128,20 +128,20 @@ class SeriesStatus:
 
 @dataclass(frozen=True)
 class MachineStatus:
-    """The status of one machine."""
+    """Status of one machine."""
 
     time: datetime
-    """Time that it is the status at."""
+    """Time of the assessment."""
     reasons: tuple[Remark, ...]
-    """Reasons in order of severity, without what a person has said to them."""
+    """Remarks in order of severity, without acknowledgements."""
     next_step: str
     """Next step, one sentence."""
     remarks: tuple[Remark, ...]
-    """Reasons, those that are acknowledged with that in their text."""
+    """Remarks in order of severity, with acknowledgements in their text."""
     alarms: tuple[Alarm, ...] = ()
-    """Alarms that are open, in the order of their reasons."""
+    """Open alarms, in order of severity."""
     series: tuple[SeriesStatus, ...] = ()
-    """Series, the one that dropped most first."""
+    """Series, the largest drop first."""
     last_tap: datetime | None = None
     """Time of the newest tap test; None where there is none."""
     days_left: float | None = None
@@ -149,12 +149,12 @@ class MachineStatus:
 
     @property
     def status(self) -> StatusLevel:
-        """Status of the worst reason."""
+        """Status of the most severe remark."""
         return rules.worst_status(self.remarks)
 
     @property
     def is_early(self) -> bool:
-        """Whether its alarm is that of a drop short of every limit."""
+        """Whether the only alarm is a detected drop short of every limit."""
         return rules.is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:

@@ -18,18 +18,18 @@ from lobewatch.measurement.clock_questions import CLOCK_QUESTIONS, future_tap_re
 from lobewatch.monitoring.alarm import Alarm
 
 CodedT = TypeVar("CodedT", Remark, Alarm)
-"""What has the code of a reason."""
+"""Remark or alarm: both have a code."""
 
 
 class StatusLevel(StrEnum):
-    """The status of a machine, worst first."""
+    """Status of a machine (ISO 13374), worst first."""
 
     ALARM = "alarm"
     """Beyond a limit: a drop, a decay, or a program that is not stable any more."""
     UNKNOWN = "unknown"
-    """Damaged, unreadable or never tapped: nothing can be said."""
+    """Unknown: damaged, unreadable or never tapped."""
     WARN = "warn"
-    """In want of attention: a smaller drop, an uncertainty, damage, a test that is due."""
+    """Attention needed: a smaller drop, a doubtful program, damage, a test that is due."""
     GOOD = "good"
     """Nothing is known to be wrong."""
 

@@ -27,18 +27,18 @@ from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, fin
 
 @dataclass(frozen=True)
 class Advice:
-    """What goes beyond the verdict."""
+    """Settings to use instead of a program, and how far its frequency can drop."""
 
     best: Setting | None = None
-    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the largest
-    removal rate per time. None where the program is stable, nothing is safe, or nothing can be said."""
+    """Recommended setting: the nearest speed window at the depth of the program, else the largest removal rate. None if
+    the program is stable or there is no safe setting."""
     deepest_here: Setting | None = None
     """Deepest cut at the program's own speed, where `best` has another depth."""
     tolerable_drop: float = math.nan
-    """Tolerable frequency drop in the median estimate, relative; 0 where it is not stable now, inf where nothing
-    happens down to 80 %, NaN where the program could not be checked."""
+    """Tolerable relative frequency drop in the median estimate; 0 if not stable now, inf if stable down to 80 %, NaN if
+    not evaluated."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what the decay rests on, and what would have to be known of the tool."""
+    """Remarks on the assumptions of the frequency drop, and on missing tool data."""
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:

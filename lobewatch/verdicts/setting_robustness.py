@@ -31,9 +31,9 @@ class Setting:
     window_rpm: tuple[float, float]
     """Slowest and fastest speed around it at which the depth would be called stable too."""
     depth_margin: float
-    """Limit in the median estimate over depth, less 1."""
+    """Depth margin: median limit over depth, less 1."""
     drop_margin: float
-    """Frequency drop that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+    """Relative frequency drop up to which it is still called stable; 0.1 means 0.1 or more."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2

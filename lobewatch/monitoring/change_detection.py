@@ -154,11 +154,7 @@ def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
 
 
 def _merge_directions(
-    base: LevelModel,
-    alone: LikeliestChange,
-    common: LevelModel,
-    together: LikeliestChange,
-    shared: Indices,
+    base: LevelModel, alone: LikeliestChange, common: LevelModel, together: LikeliestChange, shared: Indices
 ) -> LikeliestChange:
     """Merge the change of one direction with that of the mean of both, whichever is surer.
 

@@ -15,12 +15,7 @@ from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.lobe_chart import find_cut_table
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import (
-    ProgramSamples,
-    build_median_row,
-    draw_samples,
-    find_worst_limit,
-)
+from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_samples, find_worst_limit
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch

@@ -227,11 +227,7 @@ def _recommend_setting(
 ) -> Recommendation:
     """Build the recommendation of a setting, evaluated as a program."""
     case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
-    at = {
-        "speed_rpm": setting.speed_rpm,
-        "depth_mm": setting.depth_mm,
-        "direction": result.samples.cuts[0].direction,
-    }
+    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": result.samples.cuts[0].direction}
     program = msgspec.structs.replace(table, **at)
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:

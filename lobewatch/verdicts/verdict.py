@@ -216,10 +216,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
 
 
 def _unknown_verdict(
-    table: ProgramTable,
-    reasons: tuple[Remark, ...],
-    assembly: Assembly | None = None,
-    further: tuple[Remark, ...] = (),
+    table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None, further: tuple[Remark, ...] = ()
 ) -> Verdict:
     """Build the verdict on a program that cannot be evaluated."""
     text = "; ".join(map(str, reasons)) or "no modes at the tool tip"

@@ -11,13 +11,7 @@ import scipy
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
-from lobewatch.cuts.chatter_detection.spectrum import (
-    SpectralPeaks,
-    Spectrum,
-    find_peaks,
-    fold_frequency,
-    join_peaks,
-)
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency, join_peaks
 
 COMB_TOLERANCE = 1.2
 """Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""

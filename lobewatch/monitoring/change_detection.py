@@ -6,10 +6,10 @@ Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process contr
 again.
 
 Two points running that are sure of a drop trigger an alarm; four running that are not close it. Nothing else does:
-no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of
-it, for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance
-rises would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on
-to be evaluated by its own monitor.
+no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of it,
+for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance rises
+would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on to be
+evaluated by its own monitor.
 """
 
 from __future__ import annotations

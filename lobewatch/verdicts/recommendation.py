@@ -30,13 +30,13 @@ class Advice:
     """Settings to use instead of a program, and how far its frequency can drop."""
 
     best: Setting | None = None
-    """Recommended setting: the nearest speed window at the depth of the program, else the largest removal rate. None if
-    the program is stable or there is no safe setting."""
+    """Recommended setting: the nearest speed window at the depth of the program, else the largest removal rate. None
+    if the program is stable or there is no safe setting."""
     deepest_here: Setting | None = None
     """Deepest cut at the program's own speed, where `best` has another depth."""
     tolerable_drop: float = math.nan
-    """Tolerable relative frequency drop in the median estimate; 0 if not stable now, inf if stable down to 80 %, NaN if
-    not evaluated."""
+    """Tolerable relative frequency drop in the median estimate; 0 if not stable now, inf if stable down to 80 %, NaN
+    if not evaluated."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on the assumptions of the frequency drop, and on missing tool data."""
 
@@ -125,7 +125,7 @@ TOOL_SPEED_REMEDIES = (
 MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """... where max_speed_rpm holds it down."""
 FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
-"""... or where a program is set to run at a speed that it does not bear."""
+"""... or where a program is set to run at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
 REQUESTED_KEYS = ("speed_rpm", "depth_mm")

@@ -134,7 +134,7 @@ LIKELY_SPEED_STEP = 0.002
 COARSE_SPEED_STEPS = 6
 """Steps between two speeds at which the multipliers are checked ..."""
 TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
-"""... and shares of the limit by zero order at which they are ..."""
+"""... and shares of the limit by the zero-order approximation at which they are ..."""
 FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
 """... and of the way from the last of these to the deepest that matters, where none of them chatters."""
 N_LIKELY_FEEDS = 2

@@ -45,7 +45,7 @@ ROBUST_DEPTH_FACTOR = 1.05
 MIN_DEPTH_MARGIN = 0.20
 """Depth that a recommended setting has of margin in the median estimate."""
 MIN_ROBUST_DROP = 0.01
-"""... and fall of the frequency that it must stand at least."""
+"""... and frequency drop that it must stand at least."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 """Frequency drop that a setting is checked with; more than the last is not told apart."""
 
@@ -113,7 +113,7 @@ def _last_stable_row(grown: Floats) -> int:
 N_TAP_INTERVALS = 2
 """Number of tap intervals that it must last ..."""
 DEFAULT_NEEDED_DROP = 0.02
-"""... or fall of the frequency that it must stand where no rate is known; chosen."""
+"""... or frequency drop that it must stand where no rate is known; chosen."""
 
 
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:

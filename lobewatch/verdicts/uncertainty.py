@@ -224,7 +224,7 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Return the largest wear factor on the cutting coefficients, of the program or of [uncertainty]."""
+    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
     said = table.wear if isinstance(table, ProgramTable) else None
     return WEAR_FACTORS[said or machine.doubt.wear]
 
@@ -282,7 +282,7 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Return the ranges of Kt and Kr/Kt: published, else by [uncertainty]."""
+    """Return the ranges of Kt and Kr/Kt: published, else by [doubt]."""
     median = machine.coefficients(table)
     if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100

@@ -47,7 +47,7 @@ from lobewatch.machine.journal.cut_entry import CutVerdict
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of what is left over that of the comb: above it, with sidebands, a cut chatters ..."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
-"""... without side bands above this ..."""
+"""... without sidebands above this ..."""
 MAX_STABLE_ENERGY = 2e-4
 """... and below this it is stable."""
 MIN_COMB_ENERGY = 1e-9

@@ -76,18 +76,18 @@ AIR_PIECE_LENGTH = 0.5
 """Length of the pieces of air in which tones are searched that come and go (s); each begins in the middle of the one
 before it; chosen ..."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
-"""... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
+"""... and the power of a tone there over that of the noise of this many bins on each side: noise reaches it near a peak
 once in 1000 airs of 10 s; chosen."""
 MAX_FOLDED_RATES = 2.0
 """Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
 UPPER_BAND_SHARE = 0.7
-"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
+"""... and is hardly louder there (`MAX_FOLDED_AMPLITUDE`) than the loudest harmonic above this share of half the sample rate ..."""
 MAX_HARMONICS = 16
 """... or than any, where fewer than this are below half the sample rate; chosen."""
 MIN_TOOTH_HARMONICS = 3
 """Harmonics of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
 FOLDED_PEAK_SLACK = 1e-3
-"""... and so much further off, relative: from few lines the speed is no better known."""
+"""... and this much further off, relative: from few peaks the speed is no better known."""
 MAX_FOLDED_AMPLITUDE = 1.5
 """Amplitude of a folded harmonic over that of the loudest harmonic, at most."""
 MAX_WAVERING_ENERGY = 0.05

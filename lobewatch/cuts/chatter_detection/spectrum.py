@@ -29,7 +29,7 @@ PADDING_FACTOR = 2
 NOISE_BINS = 64
 """Bins from which the noise is taken ..."""
 NOISE_QUANTILE = 0.25
-"""... as this quantile of their power: lines may fill the rest."""
+"""... as this quantile of their power: peaks may fill the rest."""
 MIN_PEAK_POWER = 25.0
 """A peak has this many times the power of the noise: noise reaches it once in 1e11 bins."""
 MIN_PEAK_DISTANCE = 1.5
@@ -37,11 +37,11 @@ MIN_PEAK_DISTANCE = 1.5
 SKIRT_BINS = 10.0
 """Distance up to which a peak has a skirt (bins): 5 of the window's own width ..."""
 SKIRT_AMPLITUDE_RATIO = 3.0
-"""... of lines so many times fainter: a tenth of its power."""
+"""... of peaks this many times fainter: a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
 """Standard error of the frequency of a peak, over the root of its clearness (bins) ..."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
-"""... and the part of it that stays however clear the line is (bins)."""
+"""... and the part of it that stays however clear the peak is (bins)."""
 
 
 @dataclass(frozen=True, eq=False)

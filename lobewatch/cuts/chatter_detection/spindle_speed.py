@@ -33,7 +33,7 @@ COMB_SPEED_TOLERANCE = 0.05
 USUAL_SPEED_TOLERANCE = 0.002
 """... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
 SAME_SPEED_TOLERANCE = 1e-3
-"""... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
+"""... and up to which it is the same as that of the votes, which know of sidebands; it is taken where it explains as
 many peaks: it has one unknown, they have one more for each family of sidebands."""
 MIN_SURE_VOTES = 6
 """Peaks that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all
@@ -55,14 +55,14 @@ MIN_OWN_PEAK_VOTES = 0.2
 MAX_SPEED_MISFIT = 4.0
 """A speed with a larger misfit is compared with others ..."""
 MAX_RIVAL_SPEEDS = 12
-"""... so many that have the most votes ..."""
+"""... this many that have the most votes ..."""
 VOTE_PEAK_WIDTH = 9
 """... of as many steps of the grid around each."""
 MIN_GRID_SHARE = 0.5
 """Share of the peaks that must belong to the harmonic grid, and must have a neighbour one or two turns or teeth away
 ..."""
 MIN_AGREEING_PEAKS = 3
-"""... and number of them that must agree: a pump that is switched on has lines of its own."""
+"""... and number of them that must agree: a pump that is switched on has peaks of its own."""
 
 
 def find_spindle_speed(
@@ -260,9 +260,9 @@ def find_distant_speed(
 ) -> float:
     """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    known_speed: the speed that was found; other_peaks: peaks that are no harmonics of it. Only a comb whose harmonics
-    they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of period two
-    makes; the mains hum at harmonics of theirs.
+    known_speed: the speed that was found; other_peaks: peaks that are no harmonics of it. Only a comb whose
+    harmonics they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of
+    period two makes; the mains hum at harmonics of theirs.
     """
     peaks, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth

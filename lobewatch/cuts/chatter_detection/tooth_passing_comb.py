@@ -20,7 +20,7 @@ COMB_SPEED_WAVER = 1e-4
 MAX_COMB_PEAKS = 40
 """Peaks that are checked ..."""
 MAX_COMB_ANCHORS = 16
-"""... and those that a comb is looked for from; chosen."""
+"""... and those that a comb is searched from; chosen."""
 COMB_FIT_STEPS = 3
 """Steps of the least squares."""
 MAX_COMB_CHANCE = 1e-4
@@ -51,8 +51,8 @@ def find_comb(
 ) -> SpindleSpeed | None:
     """Find the comb within `tolerance` (relative) of a frequency (Hz) that explains the most peaks, or None.
 
-    peaks: of all axes, without skirts; bin_width: of the spectrum (Hz). Each peak is a vote for the frequencies that it
-    is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
+    peaks: of all axes, without skirts; bin_width: of the spectrum (Hz). Each peak is a vote for the frequencies that
+    it is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
     """
     peaks = peaks.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too

@@ -99,8 +99,8 @@ FREQUENCY_ERROR_FACTOR = 1.5
 LIMIT_DEPTH_MARGIN = 1e-6
 """Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
 MAX_LABEL_DEVIATION = 2.0
-"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond
-it the verdict is more likely wrong."""
+"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
+the verdict is more likely wrong."""
 EQUAL_DEPTH_TOLERANCE = 1e-9
 """Difference of two depths that is none (m)."""
 

@@ -81,7 +81,8 @@ once in 1000 airs of 10 s; chosen."""
 MAX_FOLDED_RATES = 2.0
 """Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
 UPPER_BAND_SHARE = 0.7
-"""... and is hardly louder there (`MAX_FOLDED_AMPLITUDE`) than the loudest harmonic above this share of half the sample rate ..."""
+"""... and is hardly louder there (`MAX_FOLDED_AMPLITUDE`) than the loudest harmonic above this share of half the
+sample rate ..."""
 MAX_HARMONICS = 16
 """... or than any, where fewer than this are below half the sample rate; chosen."""
 MIN_TOOTH_HARMONICS = 3

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from lobewatch.monitoring.change_detection import N_CLOSING_POINTS, detect_changes, monitor_drops
 from lobewatch.monitoring.series_points import Readings
 
-
 Floats = NDArray[np.float64]
 
 

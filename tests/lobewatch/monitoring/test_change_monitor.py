@@ -21,7 +21,6 @@ from lobewatch.monitoring.change_detection import (
 )
 from lobewatch.monitoring.series_points import Readings, winsorize
 
-
 Floats = NDArray[np.float64]
 
 FALLING = np.fromstring(

@@ -3,8 +3,4 @@
 from .machine_status import MachineStatus, SeriesStatus
 from .status_rules import StatusLevel
 
-__all__ = [
-    "MachineStatus",
-    "SeriesStatus",
-    "StatusLevel",
-]
+__all__ = ["MachineStatus", "SeriesStatus", "StatusLevel"]

@@ -23,12 +23,12 @@ class Alarm(msgspec.Struct, frozen=True):
     """Code of the reason."""
     about: str
     """Series or program."""
-    triggered_by: str
+    triggered_by: str = msgspec.field(name="raised_by")
     """Identity of the tap test that triggered it."""
-    triggered_at: datetime
+    triggered_at: datetime = msgspec.field(name="raised")
     """Time of that tap test."""
     acknowledgement: Acknowledgement | None = None
-    """Newest word of a person on it; None where there is none."""
+    """Newest acknowledgement; None where there is none."""
 
     @property
     def id(self) -> str:

@@ -6,10 +6,10 @@ Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process contr
 again.
 
 Two points running that are sure of a drop trigger an alarm; four running that are not close it. Nothing else does:
-no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of
-it, for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance
-rises would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on
-to be evaluated by its own monitor.
+no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of it,
+for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance rises
+would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on to be
+evaluated by its own monitor.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ def find_newest_change(y: Floats) -> SeriesChange | None:
     base = build_level_model(Readings(y))
     for sign, change in zip((1, -1), _find_likeliest_changes(base, np.arange(y.size - 2, y.size)), strict=True):
         if (change.score >= SURE_CHANGE_SCORE).all():
-            fall = _fit_change(base, change, -1, sign)
-            return fall._replace(size=sign * fall.size)
+            drop = _fit_change(base, change, -1, sign)
+            return drop._replace(size=sign * drop.size)
     return None
 
 
@@ -137,28 +137,24 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
         readings.shared_points,
     )
     pairs = zip(_score_points(base), _score_points(common), strict=True)
-    falls, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
-    return ChangeMonitor(base, falls, 1), ChangeMonitor(base, rises, -1)
+    drops, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
+    return ChangeMonitor(base, drops, 1), ChangeMonitor(base, rises, -1)
 
 
 def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
     """Find the likeliest drop and rise up to each point."""
     first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
     last = np.arange(first - 1, base.y.size)
-    falls, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
+    drops, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
     if last.size:
-        for every, judged in zip((falls, rises), _find_likeliest_changes(base, last), strict=True):
+        for every, judged in zip((drops, rises), _find_likeliest_changes(base, last), strict=True):
             for values, part in zip(every, judged, strict=True):
                 values[last] = part
-    return falls, rises
+    return drops, rises
 
 
 def _merge_directions(
-    base: LevelModel,
-    alone: LikeliestChange,
-    common: LevelModel,
-    together: LikeliestChange,
-    shared: Indices,
+    base: LevelModel, alone: LikeliestChange, common: LevelModel, together: LikeliestChange, shared: Indices
 ) -> LikeliestChange:
     """Merge the change of one direction with that of the mean of both, whichever is surer.
 
@@ -183,8 +179,8 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
         for begin in range(0, last.size, SCORE_BLOCK_ROWS)
     ]
     points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
-    fall, rise = (_choose_likeliest(base, last + 1, points[i], sign * leans[i]) for i, sign in enumerate((-1, 1)))
-    return fall, rise
+    drop, rise = (_choose_likeliest(base, last + 1, points[i], sign * leans[i]) for i, sign in enumerate((-1, 1)))
+    return drop, rise
 
 
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
@@ -249,7 +245,7 @@ class Detection:
     @property
     def open_drops(self) -> tuple[DetectedDrop, ...]:
         """Falls whose alarm is open."""
-        return tuple(fall for fall in self.drops if fall.closed_at is None)
+        return tuple(drop for drop in self.drops if drop.closed_at is None)
 
     @property
     def needs_repeat(self) -> bool:
@@ -260,18 +256,18 @@ class Detection:
 def detect_changes(readings: Readings) -> Detection:
     """Detect all drops, and the newest rise, in a series."""
     count = readings.y.size
-    scores, falls, rise = np.full(count, np.nan), list[DetectedDrop](), None
+    scores, drops, rise = np.full(count, np.nan), list[DetectedDrop](), None
     begin = judged = 0
     while judged < count:
         down, up = monitor_drops_and_rises(readings.since(begin))
         end = count if up.first_alarm is None else begin + up.first_alarm + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
-        falls += _find_drops(down, begin, judged, end)
+        drops += _find_drops(down, begin, judged, end)
         judged = end
         if up.first_alarm is not None:
             seen = up.change_at(up.first_alarm)
             rise, begin = seen._replace(point=begin + seen.point), begin + up.first_alarm
-    return Detection(scores, tuple(falls), rise)
+    return Detection(scores, tuple(drops), rise)
 
 
 def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
@@ -279,8 +275,8 @@ def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Itera
     raised = next(watch.alarms_from(first - begin), None)
     while raised is not None and begin + raised < end:
         closed = _find_closing_point(watch, raised)
-        fall = watch.change_at(raised)
-        shifted = fall._replace(point=begin + fall.point)
+        drop = watch.change_at(raised)
+        shifted = drop._replace(point=begin + drop.point)
         yield DetectedDrop(begin + raised, None if closed is None else begin + closed, shifted)
         raised = None if closed is None else next(watch.alarms_from(closed + 1), None)
 

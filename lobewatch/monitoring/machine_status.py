@@ -18,37 +18,12 @@ from lobewatch.machine import LimitsTable, Machine
 from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
+from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.alarm import Alarm, TriggeredAlarm, add_acknowledgements
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SeriesChange
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
-from lobewatch.monitoring.status_rules import (
-    DOUBTFUL_DECAY,
-    EVENT_CALL,
-    FREQUENCY_ALARM,
-    FREQUENCY_DECAY,
-    FREQUENCY_ROSE,
-    FREQUENCY_WARNING,
-    MODE_LOST,
-    NEVER_TAPPED,
-    ONE_DIRECTION,
-    PROGRAM_DOUBTFUL,
-    PROGRAM_NOT_STABLE,
-    PROGRAM_UNKNOWN,
-    STATUS_BY_CODE,
-    UNREADABLE_NEXT_STEP,
-    VALUE_CHANGED,
-    StatusLevel,
-    add_file_remedy,
-    count_days_left,
-    date_remarks,
-    find_next_step,
-    is_early_alarm,
-    next_tap_step,
-    sort_by_severity,
-    unreadable_remark,
-    worst_status,
-)
+from lobewatch.monitoring.status_rules import StatusLevel
 from lobewatch.monitoring.trend import Trend
 from lobewatch.verdicts.verdict import Stability
 
@@ -63,23 +38,23 @@ RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (r
 def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
     """Remark on a newest test that does not show the followed mode."""
     if not newest.frequency.is_known and newest.direction != CROSS_TAP:
-        yield MODE_LOST.remark(name)
+        yield rules.MODE_LOST.remark(name)
 
 
 def _drop_limit_remarks(name: str, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
     """Remark on a frequency drop that has reached a limit of machine.toml."""
     if drop.value >= limits.frequency_alarm_percent:
-        yield FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
+        yield rules.FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
     elif drop.value >= limits.frequency_warn_percent:
-        yield FREQUENCY_WARNING.remark(name, drop=drop.value, limit=limits.frequency_warn_percent)
+        yield rules.FREQUENCY_WARNING.remark(name, drop=drop.value, limit=limits.frequency_warn_percent)
 
 
 def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
     """Remark on drops, doubtful drops and rises of the frequency; path: of the machine folder."""
     folder = shlex.quote(str(path))
-    event = EVENT_CALL.format(folder=folder)
+    event = rules.EVENT_CALL.format(folder=folder)
     if trend.open_drop is not None:
-        yield FREQUENCY_DECAY.remark(
+        yield rules.FREQUENCY_DECAY.remark(
             name,
             course=_course_text(trend.open_drop.change),
             since=trend.drop_since,
@@ -89,10 +64,10 @@ def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Ite
             folder=folder,
         )
     elif trend.detection.needs_repeat:
-        yield DOUBTFUL_DECAY.remark(name, folder=folder)
+        yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         rise = trend.detection.rise
-        yield FREQUENCY_ROSE.remark(name, change=_change_text(rise._replace(size=-rise.size)), event=event)
+        yield rules.FREQUENCY_ROSE.remark(name, change=_change_text(rise._replace(size=-rise.size)), event=event)
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -101,7 +76,7 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
         newest = series.values[value].find_newest_change()
         if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
             time, change = newest
-            yield VALUE_CHANGED.remark(
+            yield rules.VALUE_CHANGED.remark(
                 name, value=label, course=_course_text(change), since=time, change=_change_text(change)
             )
 
@@ -119,7 +94,7 @@ def _change_text(change: SeriesChange) -> str:
 
 @dataclass(frozen=True)
 class SeriesStatus:
-    """The status of one tool in one direction."""
+    """Status of one tool in one direction."""
 
     tool: str
     """Tool in the spindle."""
@@ -132,13 +107,13 @@ class SeriesStatus:
     drop: Estimate
     """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
-    """Points, alarm and forecast; None where no test of it can be compared with."""
+    """Points, changes and forecast; None without comparable tests."""
     remarks: tuple[Remark, ...]
-    """Reasons that it gives."""
+    """Remarks on the series."""
     triggered: tuple[TriggeredAlarm, ...]
-    """Those that trigger an alarm."""
+    """Triggered alarms."""
     history: SeriesHistory = field(compare=False, repr=False)
-    """Rows that all this follows from, and the history of their values."""
+    """Rows of the series, and the history of their values."""
 
     @property
     def name(self) -> str:
@@ -153,20 +128,20 @@ class SeriesStatus:
 
 @dataclass(frozen=True)
 class MachineStatus:
-    """The status of one machine."""
+    """Status of one machine."""
 
     time: datetime
-    """Time that it is the status at."""
+    """Time of the assessment."""
     reasons: tuple[Remark, ...]
-    """Reasons in order of severity, without what a person has said to them."""
+    """Remarks in order of severity, without acknowledgements."""
     next_step: str
     """Next step, one sentence."""
     remarks: tuple[Remark, ...]
-    """Reasons, those that are acknowledged with that in their text."""
+    """Remarks in order of severity, with acknowledgements in their text."""
     alarms: tuple[Alarm, ...] = ()
-    """Alarms that are open, in the order of their reasons."""
+    """Open alarms, in order of severity."""
     series: tuple[SeriesStatus, ...] = ()
-    """Series, the one that dropped most first."""
+    """Series, the largest drop first."""
     last_tap: datetime | None = None
     """Time of the newest tap test; None where there is none."""
     days_left: float | None = None
@@ -174,13 +149,13 @@ class MachineStatus:
 
     @property
     def status(self) -> StatusLevel:
-        """Status of the worst reason."""
-        return worst_status(self.remarks)
+        """Status of the most severe remark."""
+        return rules.worst_status(self.remarks)
 
     @property
     def is_early(self) -> bool:
-        """Whether its alarm is that of a drop short of every limit."""
-        return is_early_alarm(self.remarks)
+        """Whether the only alarm is a detected drop short of every limit."""
+        return rules.is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
         """Return the status of one series, or None.
@@ -217,66 +192,75 @@ def assess_status(
     """
     rows = history.current
     if not rows and files:
-        return _build_status(now, [unreadable_remark("; ".join(map(str, files)))], UNREADABLE_NEXT_STEP)
+        return _build_status(now, [rules.unreadable_remark("; ".join(map(str, files)))], rules.UNREADABLE_NEXT_STEP)
     if not rows:
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
-        return _build_status(now, [NEVER_TAPPED.remark("", since=since)])
+        return _build_status(now, [rules.NEVER_TAPPED.remark("", since=since)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.tap_interval_days
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
-    remarks += [add_file_remedy(remark) for remark in files if remark.code in STATUS_BY_CODE]
+    remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
     asked = {row.tap_id: row.questions for row in history.rows}
     remarks += question_remarks(asked, path, [row.tap_id for row in rows])
     programs = [*_program_remarks(rows, machine)]
     raised += [
-        _trigger_program_alarm(remark, rows) for remark in programs if STATUS_BY_CODE[remark.code] is StatusLevel.ALARM
+        _trigger_program_alarm(remark, rows)
+        for remark in programs
+        if rules.STATUS_BY_CODE[remark.code] is StatusLevel.ALARM
     ]
     remarks += [
         *programs,
-        *date_remarks(newest.tap_id, newest.time, interval, now, path),
+        *rules.date_remarks(newest.tap_id, newest.time, interval, now, path),
         *_direction_remarks(rows),
     ]
     series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
-    left = count_days_left(newest.time, interval, now)
+    left = rules.count_days_left(newest.time, interval, now)
     alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
-    return _build_status(now, remarks, next_tap_step(newest.time, interval), series, newest.time, left, alarms)
+    return _build_status(now, remarks, rules.next_tap_step(newest.time, interval), series, newest.time, left, alarms)
 
 
 def _build_status(
     now: datetime,
     remarks: Sequence[Remark],
-    well: str = "",
+    default_step: str = "",
     series: Sequence[SeriesStatus] = (),
     last_tap: datetime | None = None,
     left: float | None = None,
     alarms: Sequence[Alarm] = (),
 ) -> MachineStatus:
-    """Build the status from its remarks; well: next step where no remark has one."""
-    ordered = sort_by_severity(remarks)
-    said = add_acknowledgements(ordered, alarms, now)
+    """Build the status from its remarks; default_step: next step where no remark has one."""
+    ordered = rules.sort_by_severity(remarks)
+    acknowledged = add_acknowledgements(ordered, alarms, now)
     return MachineStatus(
-        now, ordered, find_next_step(ordered, well), said, sort_by_severity(alarms), tuple(series), last_tap, left
+        now,
+        ordered,
+        rules.find_next_step(ordered, default_step),
+        acknowledged,
+        rules.sort_by_severity(alarms),
+        tuple(series),
+        last_tap,
+        left,
     )
 
 
 def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:
-    rows, beside = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
+    rows, other_rows = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
     if scatter is None or sum(row.time <= scatter.time for row in rows) >= MIN_MONITORED_POINTS:
-        return build_series_history(rows, beside)
+        return build_series_history(rows, other_rows)
     return build_series_history(
-        rows, beside, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
+        rows, other_rows, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
     )
 
 
 def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStatus:
-    newest, frequency, fall = series.rows[-1], series.frequency, series.drop
+    newest, frequency, drop = series.rows[-1], series.frequency, series.drop
     first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
     of_limits, of_watch = (
-        [*_drop_limit_remarks(name, fall, machine.limits)],
+        [*_drop_limit_remarks(name, drop, machine.limits)],
         [*_trend_remarks(name, trend, path)] if trend else [],
     )
     remarks = [*_lost_mode_remarks(name, newest), *of_limits, *of_watch, *_value_change_remarks(name, series)]
@@ -287,10 +271,10 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
             (of_watch, series.first_falling),
         )
         for remark in remarks
-        if STATUS_BY_CODE[remark.code] is StatusLevel.ALARM and row is not None
+        if rules.STATUS_BY_CODE[remark.code] is StatusLevel.ALARM and row is not None
     ]
     return SeriesStatus(
-        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), tuple(raised), series
+        newest.tool, newest.direction, newest.time, first.time, drop, trend, tuple(remarks), tuple(raised), series
     )
 
 
@@ -300,11 +284,13 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
     for name, ruling in (rows[-1].verdicts or {}).items():
         tap, stability = to_tap.get(tools[name], ""), ruling.stability.value
         if ruling.stability is Stability.NOT_STABLE:
-            yield PROGRAM_NOT_STABLE.remark(name, tap and f"Do not run these programs. {tap}", stability=stability)
+            yield rules.PROGRAM_NOT_STABLE.remark(
+                name, tap and f"Do not run these programs. {tap}", stability=stability
+            )
         elif ruling.stability is Stability.UNKNOWN:
-            yield PROGRAM_UNKNOWN.remark(name, stability=stability)
+            yield rules.PROGRAM_UNKNOWN.remark(name, stability=stability)
         elif ruling.stability is Stability.DOUBTFUL:
-            yield PROGRAM_DOUBTFUL.remark(name, tap, stability=stability)
+            yield rules.PROGRAM_DOUBTFUL.remark(name, tap, stability=stability)
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
@@ -324,7 +310,7 @@ def _direction_remarks(rows: Sequence[HistoryRow]) -> Iterator[Remark]:
         tapped = {direction for name, direction in pairs if name == tool and _is_frequency_known(rows, name, direction)}
         if len(tapped) == 1:
             direction = tapped.pop()
-            yield ONE_DIRECTION.remark(tool, direction=direction, missing="y" if direction == "x" else "x")
+            yield rules.ONE_DIRECTION.remark(tool, direction=direction, missing="y" if direction == "x" else "x")
 
 
 def _is_frequency_known(rows: Sequence[HistoryRow], tool: str, direction: str) -> bool:

@@ -55,8 +55,8 @@ class ValueHistory:
     def trend(self) -> Trend | None:
         """Trend of the sure rows as on the day of the newest; None where none has a positive value."""
         taps = self.tap_values
-        beside = [] if self.other_direction is None else self.other_direction.tap_values
-        return fit_trend(taps, taps[-1].time, beside, self.scatter_prior) if taps else None
+        other_rows = [] if self.other_direction is None else self.other_direction.tap_values
+        return fit_trend(taps, taps[-1].time, other_rows, self.scatter_prior) if taps else None
 
     @property
     def tap_values(self) -> list[TapValue]:
@@ -165,14 +165,14 @@ class SeriesHistory:
 
 
 def build_series_history(
-    rows: Iterable[HistoryRow], beside: Iterable[HistoryRow] = (), scatter: SeriesScatterPrior = NO_SERIES_PRIOR
+    rows: Iterable[HistoryRow], other_rows: Iterable[HistoryRow] = (), scatter: SeriesScatterPrior = NO_SERIES_PRIOR
 ) -> SeriesHistory:
     """Build the history of a series from its rows, oldest first, one at least.
 
-    beside: rows of the same tool in the other direction; scatter: what is known of that of the frequency beforehand.
+    other_rows: rows of the same tool in the other direction; scatter: prior of the scatter of the frequency.
     """
     values = _build_value_histories(tuple(rows))
-    others = _build_value_histories(tuple(beside))
+    others = _build_value_histories(tuple(other_rows))
     values["frequency"] = replace(values["frequency"], other_direction=others["frequency"], scatter_prior=scatter)
     return SeriesHistory(values["frequency"].rows, values)
 

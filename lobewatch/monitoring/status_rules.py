@@ -18,18 +18,18 @@ from lobewatch.measurement.clock_questions import CLOCK_QUESTIONS, future_tap_re
 from lobewatch.monitoring.alarm import Alarm
 
 CodedT = TypeVar("CodedT", Remark, Alarm)
-"""What has the code of a reason."""
+"""Remark or alarm: both have a code."""
 
 
 class StatusLevel(StrEnum):
-    """The status of a machine, worst first."""
+    """Status of a machine (ISO 13374), worst first."""
 
     ALARM = "alarm"
     """Beyond a limit: a drop, a decay, or a program that is not stable any more."""
     UNKNOWN = "unknown"
-    """Damaged, unreadable or never tapped: nothing can be said."""
+    """Unknown: damaged, unreadable or never tapped."""
     WARN = "warn"
-    """In want of attention: a smaller drop, an uncertainty, damage, a test that is due."""
+    """Attention needed: a smaller drop, a doubtful program, damage, a test that is due."""
     GOOD = "good"
     """Nothing is known to be wrong."""
 
@@ -186,9 +186,9 @@ def is_early_alarm(ordered: Sequence[Remark]) -> bool:
     return worst_status(ordered) is StatusLevel.ALARM and codes.isdisjoint(LIMIT_CODES)
 
 
-def find_next_step(ordered: Sequence[Remark], well: str) -> str:
-    """Return the next step, one sentence; well: where no remark has one."""
-    return ordered[0].cure if ordered and ordered[0].cure else well
+def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:
+    """Return the next step, one sentence; default_step: where no remark has one."""
+    return ordered[0].cure if ordered and ordered[0].cure else default_step
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:

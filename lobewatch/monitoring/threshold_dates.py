@@ -21,12 +21,12 @@ class ThresholdDates(msgspec.Struct, frozen=True):
     is_measured: bool = False
     """Whether tap tests show it: it is reached already."""
     earliest: float | None = None
-    """At a probability of 10 %; None where not before `foretold_to`."""
+    """At a probability of 10 %; None where not before `forecast_end`."""
     probable: float | None = None
-    """At 50 %; None also."""
+    """At 50 %; None as for `earliest`."""
     latest: float | None = None
-    """At 90 %; None also."""
-    forecast_end: float | None = None
+    """At 90 %; None as for `earliest`."""
+    forecast_end: float | None = msgspec.field(default=None, name="foretold_to")
     """Last day that was checked; None where nothing can be forecast."""
 
     @property

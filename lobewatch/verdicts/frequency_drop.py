@@ -22,7 +22,7 @@ CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
 N_DROP_STEPS = 101
 """Number of looks between no fall and the largest of them ..."""
 N_DROP_PARTS = 8
-"""... in so many parts, up to the one with the first chatter."""
+"""... in this many parts, up to the one with the first chatter."""
 MAX_CACHED_CALIBRATIONS = 8
 """Number of calibrated models whose answers are kept, those asked for last."""
 

@@ -15,12 +15,7 @@ from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.lobe_chart import find_cut_table
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import (
-    ProgramSamples,
-    build_median_row,
-    draw_samples,
-    find_worst_limit,
-)
+from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_samples, find_worst_limit
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
@@ -28,7 +23,7 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
 """Shares of the median limit, as its own cutting coefficient moves it, at which each sample is checked ..."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
-"""... and shares at which those are looked at that are stable at all of these."""
+"""... and shares at which those are checked that are stable at all of these."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
 """Shares of the deepest of interest where there is no median limit."""
 N_REFINED_EXTREMES = 9
@@ -43,7 +38,7 @@ MAX_SIMILAR_FEEDS = 3
 RECHECKED_LIMIT_SHARES = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
 """Shares of the limit of each sample at which it is checked once more ..."""
 WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
-"""... in the directions of feed whose limit is at most so many times the lowest one, the lowest of them."""
+"""... in the directions of feed whose limit is at most this many times the lowest one, the lowest of them."""
 
 
 def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
@@ -115,10 +110,10 @@ LIMIT_QUANTILES = (0.01, 0.99)
 """Quantiles of the limit over the uncertainty that a band reaches between."""
 SKIPPED_CUT_MARGIN = 1.15
 """Factor that the limit of a cut on its path, were it as doubtful as the lowest, has of margin where it is passed
-over, unless the middle chatters in it at a depth this much larger somewhere within the uncertainty of the speed ..."""
+over, unless the median chatters in it at a depth this much larger somewhere within the uncertainty of the speed ..."""
 SKIPPED_SAMPLE_MARGIN = 1.6
-"""... and that of one draw in such a cut. Both are for the share of draws that chatter: before `stable` is said every
-sample is checked in every cut. In 408 results of random cuts, each fed in up to 24 ways, it missed 6 samples."""
+"""... and that of one sample in such a cut. Both matter only for the share of samples that chatter: before `stable` is
+said, every sample is checked in every cut. In 408 random cuts, each fed in up to 24 ways, it missed 6 samples."""
 
 
 class MonteCarloResult(NamedTuple):
@@ -185,8 +180,8 @@ def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits
     """Find the samples that chatter at a depth (m) in any of the cuts; exact where none does.
 
     limits: of the samples in the worst cut (m), shape (samples,). In another cut that is near (cuts,), a sample is
-    checked if its limit, scaled as in the worst cut, has less than `SKIPPED_SAMPLE_MARGIN`, and if the median chatters
-    around it (cuts,). All others are checked only if none of these chatters, in all cuts.
+    checked if its limit, scaled as in the worst cut, has less than `SKIPPED_SAMPLE_MARGIN`, and if the median
+    chatters around it (cuts,). All others are checked only if none of these chatters, in all cuts.
     """
     chatters = limits <= depth
     softness = limits / samples.limits[0] if np.isfinite(samples.limits[0]) else np.ones(limits.size)
@@ -229,8 +224,8 @@ def compute_limit_band(
 
     Each sample is worked out by the zero-order approximation. Of a line by another method it is the same line at the
     speed that belongs to the frequency of the sample, times what zero-order approximation says of the rest: that
-    holds to a per cent for a line by zero order, and for any method as to spindle speed, cutting coefficient, and
-    changes that all modes share.
+    holds to a per cent for a line by the zero-order approximation, and for any method as to spindle speed, cutting
+    coefficient, and changes that all modes share.
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))

@@ -31,9 +31,9 @@ N_LOWEST_PITCH_SAMPLES, PITCH_SAMPLE_STEP = 8, 40
 """Number of samples, those that equal pitch has the lowest limits in, and step between others, in which patterns are
 compared before the best are evaluated ..."""
 N_PITCH_FEEDS = 2
-"""... in so many ways of the cut, the worst ..."""
+"""... in this many ways of the cut, the worst ..."""
 PITCH_DEPTH_FACTOR = 2.0
-"""... down to so many times their lowest limit by zero order."""
+"""... down to this many times their lowest limit by the zero-order approximation."""
 MAX_PITCH_TRIES, MIN_CONFIRMED_SHARE = 3, 0.9
 """Number of patterns of a kind that are evaluated, and share of the depth that few samples allow, as much of which
 is good enough: below it the samples that chatter first join the few."""

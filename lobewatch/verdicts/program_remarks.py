@@ -88,7 +88,7 @@ def _number_text(value: float) -> str:
 NARROW_CUT_IMMERSION = 0.5
 """Radial depth over diameter below which a corner engages the tool far more than the straight before it ..."""
 ASSUMED_CORNER_FACTOR = 1.5
-"""... as one with so many times the radius of the tool does, which stands for corners."""
+"""... as one with this many times the radius of the tool does, which stands for corners."""
 MAX_HELIX_IMMERSION = 0.2
 """Radial depth over diameter below which a helix moves the limit."""
 CROSS_NOT_TAPPED_CODE = "cross-not-tapped"

@@ -126,8 +126,8 @@ class ProgramSamples:
         fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
         slower and faster, that counts too. Shape (cuts,).
         """
-        beside = self.uncertainty.speed + FREQUENCY_MARGIN
-        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - drop)
+        margin = self.uncertainty.speed + FREQUENCY_MARGIN
+        ends = (1 - margin) / apart, (1 + margin) * apart / (1 - drop)
         median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
         cut, row = np.divmod(np.arange(len(self.cuts) * N_MARGIN_SPEEDS), N_MARGIN_SPEEDS)
         grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))

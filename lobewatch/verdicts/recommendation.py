@@ -27,18 +27,18 @@ from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, fin
 
 @dataclass(frozen=True)
 class Advice:
-    """What goes beyond the verdict."""
+    """Settings to use instead of a program, and how far its frequency can drop."""
 
     best: Setting | None = None
-    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the largest
-    removal rate per time. None where the program is stable, nothing is safe, or nothing can be said."""
+    """Recommended setting: the nearest speed window at the depth of the program, else the largest removal rate. None
+    if the program is stable or there is no safe setting."""
     deepest_here: Setting | None = None
     """Deepest cut at the program's own speed, where `best` has another depth."""
     tolerable_drop: float = math.nan
-    """Tolerable frequency drop in the median estimate, relative; 0 where it is not stable now, inf where nothing
-    happens down to 80 %, NaN where the program could not be checked."""
+    """Tolerable relative frequency drop in the median estimate; 0 if not stable now, inf if stable down to 80 %, NaN
+    if not evaluated."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what the decay rests on, and what would have to be known of the tool."""
+    """Remarks on the assumptions of the frequency drop, and on missing tool data."""
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
@@ -125,7 +125,7 @@ TOOL_SPEED_REMEDIES = (
 MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """... where max_speed_rpm holds it down."""
 FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
-"""... or where a program is set to run at a speed that it does not bear."""
+"""... or where a program is set to run at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
 REQUESTED_KEYS = ("speed_rpm", "depth_mm")
@@ -227,11 +227,7 @@ def _recommend_setting(
 ) -> Recommendation:
     """Build the recommendation of a setting, evaluated as a program."""
     case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
-    at = {
-        "speed_rpm": setting.speed_rpm,
-        "depth_mm": setting.depth_mm,
-        "direction": result.samples.cuts[0].direction,
-    }
+    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": result.samples.cuts[0].direction}
     program = msgspec.structs.replace(table, **at)
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:

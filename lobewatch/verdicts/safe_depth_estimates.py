@@ -134,7 +134,7 @@ LIKELY_SPEED_STEP = 0.002
 COARSE_SPEED_STEPS = 6
 """Steps between two speeds at which the multipliers are checked ..."""
 TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
-"""... and shares of the limit by zero order at which they are ..."""
+"""... and shares of the limit by the zero-order approximation at which they are ..."""
 FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
 """... and of the way from the last of these to the deepest that matters, where none of them chatters."""
 N_LIKELY_FEEDS = 2
@@ -167,9 +167,9 @@ class LikelyDepths:
 
     def removal_peaks(self, count: int) -> list[tuple[float, float]]:
         """Return speeds (rpm) and depths (mm) of local maxima of the removal rate, then of others apart."""
-        chips = np.pad(self.depths * self.speeds, 1)
-        tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
-        order = np.argsort(-chips[1:-1], kind="stable")
+        removal_rates = np.pad(self.depths * self.speeds, 1)
+        tops = np.flatnonzero((removal_rates[1:-1] >= removal_rates[:-2]) & (removal_rates[1:-1] >= removal_rates[2:]))
+        order = np.argsort(-removal_rates[1:-1], kind="stable")
         taken: list[int] = []
         for places, apart in (
             (order[np.isin(order, tops)], MIN_PEAK_SPEED_DISTANCE),
@@ -201,8 +201,8 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     )
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    beside = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
-    steps, ahead = math.ceil((beside + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
+    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:
         lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
@@ -210,10 +210,10 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
 
     limit = np.min(by_cut, axis=0)
     if not all(map(is_force_constant, cuts)):
-        chips = speeds * around(limit)
+        removal_rates = speeds * around(limit)
         thinkable = speeds * np.minimum(
             deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe
-        ) >= MIN_REMOVAL_SHARE * np.max(chips)
+        ) >= MIN_REMOVAL_SHARE * np.max(removal_rates)
         wanted = scipy.ndimage.maximum_filter1d(thinkable, 4 * steps + 1)
         limit = _limits_by_multipliers(spindle, cuts, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
     return LikelyDepths(speeds, around(limit))

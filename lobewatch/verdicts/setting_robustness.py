@@ -31,9 +31,9 @@ class Setting:
     window_rpm: tuple[float, float]
     """Slowest and fastest speed around it at which the depth would be called stable too."""
     depth_margin: float
-    """Limit in the median estimate over depth, less 1."""
+    """Depth margin: median limit over depth, less 1."""
     drop_margin: float
-    """Frequency drop that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+    """Relative frequency drop up to which it is still called stable; 0.1 means 0.1 or more."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
@@ -45,7 +45,7 @@ ROBUST_DEPTH_FACTOR = 1.05
 MIN_DEPTH_MARGIN = 0.20
 """Depth that a recommended setting has of margin in the median estimate."""
 MIN_ROBUST_DROP = 0.01
-"""... and fall of the frequency that it must stand at least."""
+"""... and frequency drop that it must stand at least."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 """Frequency drop that a setting is checked with; more than the last is not told apart."""
 
@@ -113,7 +113,7 @@ def _last_stable_row(grown: Floats) -> int:
 N_TAP_INTERVALS = 2
 """Number of tap intervals that it must last ..."""
 DEFAULT_NEEDED_DROP = 0.02
-"""... or fall of the frequency that it must stand where no rate is known; chosen."""
+"""... or frequency drop that it must stand where no rate is known; chosen."""
 
 
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:

@@ -165,19 +165,19 @@ class SettingSearch:
         tops = [(_round_speed(speed), depth) for speed, depth in self.likely_depths.removal_peaks(MAX_SEARCHED_SPEEDS)][
             ::-1
         ]
-        depths, kept = DepthsBySpeed(), SharesBySpeed()
-        looked, left = set[float](), 0.0
+        depths, confirmed = DepthsBySpeed(), SharesBySpeed()
+        visited, left = set[float](), 0.0
         for _ in range(MAX_SETTING_TRIES):
             tops = [top for top in tops if self._is_free(top[0], taken)]
             depths = {speed: depth for speed, depth in depths.items() if self._is_free(speed, taken)}
-            speed = self._best_speed(depths, kept)
+            speed = self._best_speed(depths, confirmed)
             while tops and PROMISING_FACTOR * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
                 top, likely = tops.pop()
                 depths[top] = self.cut_range.round_down_depth(self._deepest_stable(top))
-                left, speed = max(left, depths[top] / likely), self._best_speed(depths, kept)
+                left, speed = max(left, depths[top] / likely), self._best_speed(depths, confirmed)
             if not depths.get(speed):
                 return
-            speed = self._climb(speed, depths, kept, looked)
+            speed = self._climb(speed, depths, confirmed, visited)
             if not self._is_free(speed, taken):
                 continue
             setting = self.verify(speed, depths[speed])
@@ -185,38 +185,38 @@ class SettingSearch:
                 del depths[speed]
                 yield setting
             else:
-                kept[speed] = kept.get(speed, 1.0) * setting / depths[speed]
+                confirmed[speed] = confirmed.get(speed, 1.0) * setting / depths[speed]
                 depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
         """Return whether a speed (rpm) lies in none of the pockets taken."""
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
-    def _climb(self, speed: float, depths: DepthsBySpeed, kept: SharesBySpeed, looked: set[float]) -> float:
+    def _climb(self, speed: float, depths: DepthsBySpeed, confirmed: SharesBySpeed, visited: set[float]) -> float:
         """Return the speed (rpm) of the largest removal rate after its neighbors have been tried, once a peak."""
-        for _ in range(0 if speed in looked else N_CLIMBS):
-            looked.add(speed)
-            if (beside := self._better_neighbor(speed, depths[speed])) in looked:
+        for _ in range(0 if speed in visited else N_CLIMBS):
+            visited.add(speed)
+            if (neighbor := self._better_neighbor(speed, depths[speed])) in visited:
                 break
-            looked.add(beside)
-            depths[beside] = self.cut_range.round_down_depth(self._deepest_stable(beside))
-            speed = self._best_speed(depths, kept)
+            visited.add(neighbor)
+            depths[neighbor] = self.cut_range.round_down_depth(self._deepest_stable(neighbor))
+            speed = self._best_speed(depths, confirmed)
         return speed
 
-    def _best_speed(self, depths: DepthsBySpeed, kept: SharesBySpeed) -> float:
+    def _best_speed(self, depths: DepthsBySpeed, confirmed: SharesBySpeed) -> float:
         """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
         while True:
             speed = max(
-                depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, kept), default=0.0
+                depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, confirmed), default=0.0
             )
             if not speed or self.critical[speed].chattered == self.chattered:
                 return speed
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
 
-    def _expected_share(self, speed: float, kept: SharesBySpeed) -> float:
+    def _expected_share(self, speed: float, confirmed: SharesBySpeed) -> float:
         """Return the share of its depth that is likely to be confirmed at a speed (rpm)."""
-        shares = [share for other, share in kept.items() if self.likely_depths.is_same_pocket(speed, other)]
-        return 1.0 if speed in kept or len(shares) < MIN_FAILED_SPEEDS else max(shares)
+        shares = [share for other, share in confirmed.items() if self.likely_depths.is_same_pocket(speed, other)]
+        return 1.0 if speed in confirmed or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
     def _better_neighbor(self, speed: float, depth_mm: float) -> float:
         """Return a neighboring speed (rpm) with a larger removal rate by the critical samples, or itself."""

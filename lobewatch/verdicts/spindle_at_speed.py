@@ -22,14 +22,14 @@ AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
 
 @dataclass(frozen=True, eq=False)
 class SpindleAtSpeed:
-    """What test cuts have shown of one program and its spindle; without any, the spindle is taken as tapped."""
+    """Spindle at speed, as learned from the test cuts of a program; without any, the spindle as tapped."""
 
     n_cuts: int = 0
     """Number of test cuts that it was learned from."""
     remarks: tuple[Remark, ...] = ()
-    """Cuts that contradict the others, and frequencies far from those at rest."""
+    """Remarks on rejected cuts and unusual frequencies."""
     uncertainty: Uncertainty | None = None
-    """Uncertainty that the cuts have left; None where none has shown anything."""
+    """Uncertainty after the cuts; None if nothing was learned."""
     factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
     """Frequency, damping ratio and stiffness in the median over those tapped, modes in x, then y, shape (n, 3)."""
     tangential: float = math.nan
@@ -39,7 +39,7 @@ class SpindleAtSpeed:
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """Intervals of 95 % before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
-    """Intervals of 95 % with the cuts, alike."""
+    """Intervals of 95 % with the cuts, by the same names."""
 
     def scale_modes(self, assembly: Assembly) -> Assembly:
         """Scale the modes of a tool to the learned median; unchanged where nothing was learned.

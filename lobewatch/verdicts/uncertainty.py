@@ -1,7 +1,6 @@
 """Uncertainty of a program by cause, and Monte Carlo samples drawn from it.
 
-Half-widths of independent uniform distributions; where test cuts have shown, the samples that they have left.
-Whatever is said of a program over its uncertainty comes from these samples.
+Half-widths of independent uniform distributions, or posterior samples where test cuts have been learned from.
 """
 
 from __future__ import annotations
@@ -18,24 +17,13 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, Uncerta
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import PrincipalDirections
 from lobewatch.tool.tap_series import Scatter
-from lobewatch.verdicts.uncertainty_causes import (
-    CLAMPING,
-    COEFFICIENTS,
-    CROSS,
-    PREDICTION,
-    SPEED,
-    TAP_TEST,
-    TEST_CUTS,
-    UNCERTAINTY_CAUSES,
-    UNTAPPED,
-    WEAR,
-)
+from lobewatch.verdicts import uncertainty_causes as causes
 from modal import Mode
 
 DEFAULT_TAP_SCATTER = Scatter(0.003, 0.10, 0.03)
 """Scatter from tap test to tap test, until a series tells its own; chosen."""
 MIN_SAMPLE_FACTOR = 0.02
-"""Least share of its middle value that anything is drawn with ..."""
+"""Smallest factor on a median value of a sample ..."""
 MAX_MODE_PHASE = np.radians(89)
 """... and largest phase (rad)."""
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
@@ -43,12 +31,12 @@ WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 
 
 class FactorRange(NamedTuple):
-    """Lowest and highest value of a number, as factors on its middle or on that at rest."""
+    """Lowest and highest value of a quantity, as factors on its median or on the value not rotating."""
 
     low: float
-    """Lowest factor; at most 1 where it is on the middle."""
+    """Lowest factor."""
     high: float
-    """Highest factor; at least 1 where it is on the middle."""
+    """Highest factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +59,9 @@ class LearnedSamples:
     def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
         """Build samples around a median (a row), at its speed; without: a cause that is left out."""
         take = np.arange(count) % len(self.tangential)
-        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUTS.name)
+        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != causes.TEST_CUTS.name)
         force, direction = (
-            1 + (factor[take] - 1) * (without != COEFFICIENTS.name) for factor in (self.tangential, self.ratio)
+            1 + (factor[take] - 1) * (without != causes.COEFFICIENTS.name) for factor in (self.tangential, self.ratio)
         )
         return replace(
             rows,
@@ -99,27 +87,33 @@ class Uncertainty:
     speed: float
     """Relative half-width of the spindle speed."""
     tangential: FactorRange
-    """Range of the cutting coefficient Kt over the middle."""
+    """Range of the cutting coefficient Kt over the median."""
     ratio: FactorRange
-    """Range of Kr/Kt, the direction of the force, over the middle."""
+    """Range of Kr/Kt, the direction of the force, over the median."""
     wear: float = 1.0
     """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the
     least is 1."""
     axes: PrincipalDirections | None = None
-    """Axes of the modes, and what is open of them; None where they count as known."""
+    """Principal directions of the modes and their open signs; None if they are known."""
     learned: LearnedSamples | None = None
-    """Samples that test cuts have left, which stand for the half-widths; None where none has shown anything."""
+    """Posterior samples of test cuts, used instead of the half-widths; None if nothing was learned."""
 
     def __post_init__(self) -> None:
         """Refuse causes without a record in `UNCERTAINTY_CAUSES`."""
-        if unknown := self.modes.keys() - UNCERTAINTY_CAUSES.keys():
+        if unknown := self.modes.keys() - causes.UNCERTAINTY_CAUSES.keys():
             raise ValueError(f"unknown causes of uncertainty: {', '.join(sorted(unknown))}")
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Names of all that it comes from."""
-        across = [CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
-        return (*self.modes, *across, SPEED.name, COEFFICIENTS.name, *([WEAR.name] if self.wear > 1 else []))
+        """Names of all causes."""
+        across = [causes.CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
+        return (
+            *self.modes,
+            *across,
+            causes.SPEED.name,
+            causes.COEFFICIENTS.name,
+            *([causes.WEAR.name] if self.wear > 1 else []),
+        )
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Sample systems within the uncertainty, reproducible by seed.
@@ -141,7 +135,7 @@ class Uncertainty:
             Sampled systems, `count` rows.
         """
         rows = self._sample_new_edges(median, count, seed, without)
-        if self.wear == 1 or without == WEAR.name:
+        if self.wear == 1 or without == causes.WEAR.name:
             return rows
         worn = np.empty(count)
         worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
@@ -150,7 +144,7 @@ class Uncertainty:
     def _sample_new_edges(self, median: MillingRows, count: int, seed: int, without: str) -> MillingRows:
         if self.learned is not None:
             rows = self.learned.build_rows(median, count, without)
-            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != SPEED.name)
+            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != causes.SPEED.name)
             return self._with_sampled_axes(
                 replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
             )
@@ -163,11 +157,11 @@ class Uncertainty:
             if cause != without:
                 factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
                 turned += moved[..., 3]
-        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != SPEED.name)
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != causes.SPEED.name)
         tangential, ratio = (
             span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._coefficient_ranges
         )
-        if without == COEFFICIENTS.name:
+        if without == causes.COEFFICIENTS.name:
             tangential, ratio = np.ones((2, count))
         rows = median[np.zeros(count, dtype=np.intp)]
         samples = replace(
@@ -184,13 +178,13 @@ class Uncertainty:
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
         """Sample the open principal directions."""
-        if self.axes is None or not self.axes.are_uncertain or without == CROSS.name:
+        if self.axes is None or not self.axes.are_uncertain or without == causes.CROSS.name:
             return rows
         return replace(rows, vector=self.axes.sample(len(rows), seed))
 
     def _correlated(self, cause: str, uniform: Floats) -> Floats:
         """Correlate the uniform numbers of the tap error, shape (count, n, 4)."""
-        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == TAP_TEST.name else uniform
+        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == causes.TAP_TEST.name else uniform
 
     @property
     def _coefficient_ranges(self) -> tuple[FactorRange, FactorRange]:
@@ -230,7 +224,7 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Return the largest wear factor on the cutting coefficients, of the program or of [uncertainty]."""
+    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
     said = table.wear if isinstance(table, ProgramTable) else None
     return WEAR_FACTORS[said or machine.doubt.wear]
 
@@ -240,15 +234,18 @@ def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, 
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        widths = {PREDICTION.name: np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
+        widths = {causes.PREDICTION.name: np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = [np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides]
         clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
-        widths = {TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)]), CLAMPING.name: np.vstack(clamping)}
+        widths = {
+            causes.TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)]),
+            causes.CLAMPING.name: np.vstack(clamping),
+        }
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
-        widths[UNTAPPED.name] = absent
+        widths[causes.UNTAPPED.name] = absent
         absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
     return widths
 
@@ -285,7 +282,7 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Return the ranges of Kt and Kr/Kt: published, else by [uncertainty]."""
+    """Return the ranges of Kt and Kr/Kt: published, else by [doubt]."""
     median = machine.coefficients(table)
     if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100

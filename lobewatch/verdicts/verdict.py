@@ -33,116 +33,113 @@ NOT_CHECKED_CODE = "not-checked"
 
 
 class Stability(StrEnum):
-    """Word that is said of a program."""
+    """Stability of a program: the four words of a verdict."""
 
     STABLE = "stable"
-    """At most 1 % of the uncertainty chatters, at 95 % confidence."""
+    """At most 1 % of the Monte Carlo samples chatter, at 95 % confidence."""
     DOUBTFUL = "doubtful"
-    """Stable in the median, but more of the uncertainty may chatter; a remark says what decides and what would
-    settle it."""
+    """Stable in the median estimate, but more samples may chatter; a remark names the decisive cause and its remedy."""
     NOT_STABLE = "not stable"
-    """It chatters in the median estimate."""
+    """Chatter in the median estimate."""
     UNKNOWN = "unknown"
-    """It could not be checked; a remark says why."""
+    """Not evaluated; a remark says why."""
 
 
 class CriticalDrop(NamedTuple):
-    """Frequency drop of today, relative; 0 where the verdict has changed already, inf where none changes it."""
+    """Relative frequency drops from now that change a verdict; 0 if it has changed already, inf if none changes it."""
 
     doubtful: float
-    """Fall up to which it stays stable; NaN where it could not be checked."""
+    """Drop up to which the program stays stable; NaN if it was not evaluated."""
     not_stable: float
-    """Fall up to which it stays stable in the median estimate; NaN where it could not be checked."""
+    """Drop up to which it stays stable in the median estimate; NaN if it was not evaluated."""
     error: float
-    """Standard error of `not_stable`, by damping and stiffness as they scatter from tap test to tap test."""
+    """Standard error of `not_stable`, from the scatter of damping and stiffness between tap tests."""
 
 
 class StoredVerdict(NamedTuple):
-    """What the history keeps of a verdict."""
+    """The part of a verdict that the history stores."""
 
     stability: Stability
     """Stability of the program."""
     limit: float
-    """Deepest stable depth at the program's speed in the median estimate (m); NaN where it is not known."""
+    """Median estimate of the deepest stable depth at the speed of the program (m); NaN if unknown."""
     critical: CriticalDrop | None = None
-    """Frequency drop that change the verdict; None where nobody has asked yet."""
+    """Frequency drops that change the verdict; None if not computed yet."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the median estimate; None where it is unknown."""
+        """Whether the program is stable in the median estimate; None if unknown."""
         return None if self.stability is Stability.UNKNOWN else self.stability is not Stability.NOT_STABLE
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Whether a program is stable with a tool in the spindle as it is known at some time."""
+    """Verdict on a program with a tool in the spindle, as of some tap test."""
 
     program: ProgramTable
-    """Program as in machine.toml, with the cutting coefficients that test cuts have shown."""
+    """Program as in machine.toml, with the cutting coefficients learned from test cuts."""
     stability: Stability
     """Stability of the program."""
     assembly: Assembly | None = None
-    """Tool as tapped that it was checked with; None where there is nothing to check with."""
+    """Tool that it was evaluated with; None if there is none."""
     at_speed: SpindleAtSpeed = NO_TEST_CUTS
-    """Spindle as test cuts have shown it beside that."""
+    """Spindle at speed, as learned from test cuts."""
     limit: float = math.nan
-    """Deepest stable depth at its speed in the median estimate, in the worst direction of feed (m); inf where there
-    is none up to 20 times its own, NaN where unknown."""
+    """Median estimate of the deepest stable depth at its speed, in the worst feed direction (m); inf if there is no
+    limit up to 20 times its own depth, NaN if unknown."""
     limit_low: float = math.nan
-    """1 % quantile of the limit over the uncertainty (m)."""
+    """1 % quantile of the limit (m)."""
     limit_high: float = math.nan
-    """99 % quantile of the limit over the uncertainty (m)."""
+    """99 % quantile of the limit (m)."""
     chatter_risk: float = math.nan
-    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those
-    learned."""
+    """Chatter risk with the spindle rotating (0 to 1): estimated from plausible differences, or learned."""
     decisive_cause: str = ""
-    """Cause of the uncertainty that decides (`Uncertainty.causes`), "question" where a tap test is in question,
-    "workpiece" where it is thin; empty unless it is doubtful."""
+    """Name of the decisive cause of uncertainty (see `UNCERTAINTY_CAUSES`); empty unless the verdict is doubtful."""
     chatter_frequency: float = math.nan
-    """Frequency that is recorded at the limit (Hz); NaN where there is none."""
+    """Chatter frequency at the limit (Hz); NaN without a limit."""
     kind: str = ""
     """Kind of the limit: "hopf", "flip" or ""."""
     feed_angle: float = math.nan
-    """Direction of feed that is worst, as an angle from x (rad)."""
+    """Worst feed direction, as an angle from x (rad)."""
     method: str = ""
-    """Method that the limit was found by."""
+    """Method of the limit."""
     detail: str = ""
-    """Fineness of the method, and number of samples."""
+    """Resolution of the method, and number of samples."""
     drive_limit: float = math.inf
-    """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
+    """Deepest cut that power and torque allow at its speed (m); inf without a limit."""
     samples: ProgramSamples | None = None
-    """Spindles that it was evaluated on; None where it is unknown."""
+    """Monte Carlo samples; None if unknown."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what it rests on, what would settle it, and why it is unknown."""
+    """Remarks on assumptions, decisive uncertainty and remedies."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the median estimate; None where it is unknown."""
+        """Whether the program is stable in the median estimate; None if unknown."""
         return self.stored.is_stable
 
     @property
     def is_measured(self) -> bool:
-        """Whether its tool was tapped; else all is predicted by the model, or unknown."""
+        """Whether the tool was tapped; else the verdict is predicted by the model, or unknown."""
         return self.assembly is not None and not self.assembly.predicted
 
     @property
     def n_cuts(self) -> int:
-        """Number of test cuts that it rests on; 0 where it holds for the spindle at rest."""
+        """Number of test cuts learned from; 0 if the verdict holds for the spindle not rotating."""
         return self.at_speed.n_cuts
 
     @property
     def depth_margin(self) -> float:
-        """Median limit over depth, less 1; negative where it is not stable."""
+        """Depth margin: median limit over depth, less 1; negative if not stable."""
         return self.limit / (self.program.depth_mm / 1e3) - 1
 
     @property
     def is_beyond_drive(self) -> bool:
-        """Whether it asks for more power or torque than there is."""
+        """Whether it needs more power or torque than the drive has."""
         return self.program.depth_mm / 1e3 > self.drive_limit
 
     @property
     def stored(self) -> StoredVerdict:
-        """What the history keeps."""
+        """Part that the history stores."""
         return StoredVerdict(self.stability, self.limit)
 
 
@@ -219,10 +216,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
 
 
 def _unknown_verdict(
-    table: ProgramTable,
-    reasons: tuple[Remark, ...],
-    assembly: Assembly | None = None,
-    further: tuple[Remark, ...] = (),
+    table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None, further: tuple[Remark, ...] = ()
 ) -> Verdict:
     """Build the verdict on a program that cannot be evaluated."""
     text = "; ".join(map(str, reasons)) or "no modes at the tool tip"

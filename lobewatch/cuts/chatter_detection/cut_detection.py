@@ -140,8 +140,8 @@ def _loudness_step(level: Floats, is_loud: Flags) -> float:
 def _loudness_threshold(level: Floats) -> float:
     """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
     smooth = scipy.ndimage.uniform_filter1d(level, N_QUIET_PIECES)
-    beside = N_QUIET_PIECES // 2
-    least = threshold = float(np.min(smooth[beside:-beside])) + MIN_CUT_LOUDNESS
+    half_window = N_QUIET_PIECES // 2
+    least = threshold = float(np.min(smooth[half_window:-half_window])) + MIN_CUT_LOUDNESS
     for _ in range(MAX_THRESHOLD_STEPS):
         above = smooth > threshold
         if np.all(above) or not np.any(above):
@@ -205,9 +205,11 @@ def _loudness(power: Floats) -> Floats:
     Mean over frequency, not of logarithms: a light cut is recorded in few peaks. power: shape (pieces, frequencies).
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
-    beside = N_QUIET_PIECES // 2
+    half_window = N_QUIET_PIECES // 2
     quiet = int(
-        np.argmin(scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)[beside:-beside])
+        np.argmin(
+            scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)[half_window:-half_window]
+        )
     )
     least = np.minimum(
         np.quantile(smooth, MIN_AIR_SHARE, axis=0), np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)

@@ -47,7 +47,7 @@ from lobewatch.machine.journal.cut_entry import CutVerdict
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of what is left over that of the comb: above it, with sidebands, a cut chatters ..."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
-"""... without side bands above this ..."""
+"""... without sidebands above this ..."""
 MAX_STABLE_ENERGY = 2e-4
 """... and below this it is stable."""
 MIN_COMB_ENERGY = 1e-9
@@ -145,23 +145,23 @@ def evaluate_cut(
     sound = max(sounds, key=_rank_evidence)
     if is_measured or sound.verdict == "stable" or sound.peaks is None or not len(sound.peaks.unexplained):
         return sound
-    elsewhere = 60 * find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.peaks.unexplained)
-    return sound if np.isnan(elsewhere) else _speed_not_found(spectra[0], elsewhere)
+    distant = 60 * find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.peaks.unexplained)
+    return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
 
 
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    lines = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
-    unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin_width)
-    by_origin = classify_peaks(lines, spectrum, quiet, turning, teeth, unsteady)
+    peaks = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
+    unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, peaks, turning, spectrum.bin_width)
+    by_origin = classify_peaks(peaks, spectrum, quiet, turning, teeth, unsteady)
     sound = CutEvaluation("stable", "", spindle_speed=turning, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
     judged = _evaluate_peaks(sound, cut, teeth, immersion)
     if judged.reason != "unexplained-tone":
         return judged
     tones = add_air_tones(quiet, air, by_origin.unexplained.frequency)
-    by_origin = classify_peaks(lines, spectrum, tones, turning, teeth, unsteady)
+    by_origin = classify_peaks(peaks, spectrum, tones, turning, teeth, unsteady)
     return _evaluate_peaks(replace(sound, peaks=by_origin), cut, teeth, immersion)
 
 
@@ -173,10 +173,10 @@ def _find_speed(
         turning = find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if turning is not None:
             return turning
-        elsewhere = 60 * find_distant_speed(spectra, quiet, teeth, commanded, None)
+        distant = 60 * find_distant_speed(spectra, quiet, teeth, commanded, None)
         return (
-            _speed_not_found(spectra[0], elsewhere)
-            if np.isfinite(elsewhere)
+            _speed_not_found(spectra[0], distant)
+            if np.isfinite(distant)
             else _evaluate_without_air(spectra, teeth, commanded)
         )
     turning, other = check_tachometer_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
@@ -191,17 +191,21 @@ def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: fl
     turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
     if turning is None:
         return _speed_not_found(spectra[0], np.nan)
-    lines = find_cut_peaks(spectra, silence)
-    beside = lines[fold_frequency(lines.frequency, turning.frequency) > PEAK_TOLERANCE * spectra[0].bin_width]
-    elsewhere = 60 * find_distant_speed(spectra, silence, teeth, commanded, turning, beside) if len(beside) else np.nan
-    if np.isfinite(elsewhere):
-        return _speed_not_found(spectra[0], elsewhere)
+    peaks = find_cut_peaks(spectra, silence)
+    other_peaks = peaks[fold_frequency(peaks.frequency, turning.frequency) > PEAK_TOLERANCE * spectra[0].bin_width]
+    distant = (
+        60 * find_distant_speed(spectra, silence, teeth, commanded, turning, other_peaks)
+        if len(other_peaks)
+        else np.nan
+    )
+    if np.isfinite(distant):
+        return _speed_not_found(spectra[0], distant)
     return CutEvaluation("cannot tell", "no-air", spindle_speed=turning, spectrum=spectra[0])
 
 
-def _speed_not_found(spectrum: Spectrum, elsewhere: float) -> CutEvaluation:
+def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
     """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: a speed that fits (rpm)."""
-    return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=elsewhere)
+    return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=distant)
 
 
 def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
@@ -215,29 +219,29 @@ def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
 
 def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
-    lines, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
-    if lines is None or turning is None or spectrum is None:
+    peaks, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
+    if peaks is None or turning is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
     if (
         is_undersampled(spectrum, turning, teeth)
-        and np.count_nonzero(lines.tooth_order == 0) + len(lines.folded) < MIN_TOOTH_HARMONICS
+        and np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded) < MIN_TOOTH_HARMONICS
     ):
         return replace(sound, verdict="cannot tell", reason="slow-sampling")
-    if not len(lines.unexplained):
+    if not len(peaks.unexplained):
         return _evaluate_without_chatter(sound, teeth, immersion)
     tooth = turning.frequency * teeth
-    chatter = find_chatter_peaks(lines.unexplained, tooth, spectrum.bin_width)
+    chatter = find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
     end = compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
     still = min(
         float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0]) / _chatter_power(chatter), 1.0
     )
-    ratio = still * lines.unexplained.energy / max(lines.comb.energy, MIN_COMB_ENERGY * lines.unexplained.energy)
+    ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = replace(sound, energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_without_chatter(sound, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
         return replace(sound, verdict="cannot tell", reason="faint")
-    if not has_sidebands(lines.unexplained, chatter, turning.frequency, spectrum.bin_width):
+    if not has_sidebands(peaks.unexplained, chatter, turning.frequency, spectrum.bin_width):
         return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
@@ -267,11 +271,11 @@ def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float
 
 def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
     """Group the peaks by "turns" of the spindle, "tooth" passing, "air" and "chatter"; empty groups are left out."""
-    lines, chatter = sound.peaks, sound.chatter
+    peaks, chatter = sound.peaks, sound.chatter
     named: dict[str, SpectralPeaks] = {}
-    if lines is not None:
-        tooth = lines.tooth_order == 0
-        named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.air}
+    if peaks is not None:
+        tooth = peaks.tooth_order == 0
+        named = {"turns": peaks.comb[~tooth], "tooth": peaks.comb[tooth], "air": peaks.air}
     if chatter is not None:
         named["chatter"] = chatter.peaks
     return {name: kind for name, kind in named.items() if len(kind)}

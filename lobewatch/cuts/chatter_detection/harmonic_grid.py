@@ -48,39 +48,39 @@ class SpindleSpeed:
     """Mean square distance of all peaks from it, in standard errors of each, at most `MAX_GRID_ERRORS` squared."""
 
 
-def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
-    """Refine a spindle frequency (Hz) by least squares over its harmonic grid; bin_: bin width of the spectrum (Hz)."""
+def refine_speed(frequency: float, peaks: SpectralPeaks, bin_width: float) -> SpindleSpeed:
+    """Refine a spindle frequency (Hz) by least squares over its harmonic grid; bin_width: of the spectrum (Hz)."""
     speed = SpindleSpeed(frequency, np.inf, 0.0, 0, MAX_GRID_ERRORS**2)
     for tolerance in GRID_TOLERANCES:
-        families = find_sideband_families(speed.frequency, lines, tolerance * bin_)
+        families = find_sideband_families(speed.frequency, peaks, tolerance * bin_width)
         rows = np.concatenate([_design_rows(family, number, len(families)) for number, family in enumerate(families)])
         places = np.concatenate([family.indices for family in families])
         if np.linalg.matrix_rank(rows) < len(families):
             return speed
-        root = 1 / lines[places].frequency_error(bin_)
-        scaled, measured = rows * root[:, np.newaxis], lines.frequency[places] * root
+        root = 1 / peaks[places].frequency_error(bin_width)
+        scaled, measured = rows * root[:, np.newaxis], peaks.frequency[places] * root
         solution = np.linalg.lstsq(scaled, measured, rcond=None)[0]
         if abs(solution[0] / frequency - 1) > MAX_SPEED_CHANGE:
             return speed
         error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
         away = np.minimum(np.abs(scaled @ solution - measured), MAX_GRID_ERRORS)
-        misfit = float(np.sum(away**2) + (len(lines) - places.size) * MAX_GRID_ERRORS**2) / len(lines)
-        share, agreeing = places.size / len(lines), places.size - len(families)
+        misfit = float(np.sum(away**2) + (len(peaks) - places.size) * MAX_GRID_ERRORS**2) / len(peaks)
+        share, agreeing = places.size / len(peaks), places.size - len(families)
         speed = SpindleSpeed(float(solution[0]), error, share, agreeing, misfit)
     return speed
 
 
-def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
+def find_sideband_families(frequency: float, peaks: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
     """Find the harmonics of a frequency (Hz), then the sideband families of the clearest peaks left."""
-    order = np.round(lines.frequency / frequency)
-    comb = (np.abs(lines.frequency - order * frequency) < tolerance) & (order > 0)
+    order = np.round(peaks.frequency / frequency)
+    comb = (np.abs(peaks.frequency - order * frequency) < tolerance) & (order > 0)
     families = [SidebandFamily(np.flatnonzero(comb), np.zeros(int(comb.sum())), order[comb])]
     left = ~comb
     for _ in range(MAX_SIDEBAND_FAMILIES):
         if not np.any(left):
             break
-        anchor = lines.frequency[np.flatnonzero(left)[np.argmax(lines.clearness[left])]]
-        beyond, mirrored = lines.frequency - anchor, lines.frequency + anchor
+        anchor = peaks.frequency[np.flatnonzero(left)[np.argmax(peaks.clearness[left])]]
+        beyond, mirrored = peaks.frequency - anchor, peaks.frequency + anchor
         up, down = np.round(beyond / frequency), np.round(mirrored / frequency)
         off, off_mirrored = np.abs(beyond - up * frequency), np.abs(mirrored - down * frequency)
         members = left & (np.minimum(off, off_mirrored) < tolerance)

@@ -36,15 +36,15 @@ MIN_STEADINESS_PEAKS = 3
 
 
 def estimate_unsteadiness(
-    signal: Floats, sample_rate: float, lines: SpectralPeaks, turning: SpindleSpeed, bin_: float
+    signal: Floats, sample_rate: float, peaks: SpectralPeaks, turning: SpindleSpeed, bin_width: float
 ) -> float:
     """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
-    order = np.round(lines.frequency / turning.frequency)
+    order = np.round(peaks.frequency / turning.frequency)
     comb = (
-        np.abs(lines.frequency - order * turning.frequency)
-        < bin_ + MAX_UNSTEADINESS * lines.frequency / UNSTEADINESS_FACTOR
+        np.abs(peaks.frequency - order * turning.frequency)
+        < bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
     ) & (order > 1)
-    loudest = lines[comb].loudest(N_STEADINESS_PEAKS)
+    loudest = peaks[comb].loudest(N_STEADINESS_PEAKS)
     if not len(loudest):
         return MIN_UNSTEADINESS
     orders = np.round(loudest.frequency / turning.frequency)
@@ -76,18 +76,19 @@ AIR_PIECE_LENGTH = 0.5
 """Length of the pieces of air in which tones are searched that come and go (s); each begins in the middle of the one
 before it; chosen ..."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
-"""... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
+"""... and the power of a tone there over that of the noise of this many bins on each side: noise reaches it near a peak
 once in 1000 airs of 10 s; chosen."""
 MAX_FOLDED_RATES = 2.0
 """Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
 UPPER_BAND_SHARE = 0.7
-"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
+"""... and is hardly louder there (`MAX_FOLDED_AMPLITUDE`) than the loudest harmonic above this share of half the
+sample rate ..."""
 MAX_HARMONICS = 16
 """... or than any, where fewer than this are below half the sample rate; chosen."""
 MIN_TOOTH_HARMONICS = 3
 """Harmonics of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
 FOLDED_PEAK_SLACK = 1e-3
-"""... and so much further off, relative: from few lines the speed is no better known."""
+"""... and this much further off, relative: from few peaks the speed is no better known."""
 MAX_FOLDED_AMPLITUDE = 1.5
 """Amplitude of a folded harmonic over that of the loudest harmonic, at most."""
 MAX_WAVERING_ENERGY = 0.05
@@ -113,10 +114,10 @@ class PeaksByOrigin:
     """Peaks that are left: chatter, where there is any."""
 
 
-def is_in_air(lines: SpectralPeaks, air: Spectrum) -> Flags:
+def is_in_air(peaks: SpectralPeaks, air: Spectrum) -> Flags:
     """Whether peaks are there in air too."""
     return np.asarray(
-        lines.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(lines.frequency, AIR_PEAK_TOLERANCE)
+        peaks.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(peaks.frequency, AIR_PEAK_TOLERANCE)
     )
 
 
@@ -128,12 +129,12 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
-    near, around = (
+    near, tolerance = (
         _bins_around(frequency / step, bins, size // 2) for bins in (round(AIR_PEAK_TOLERANCE), TONE_NOISE_BINS)
     )
     for begin in range(0, signal.size - size + 1, size // 2):
         power = compute_power(signal[begin : begin + size], size)
-        tone, noise = np.max(power[near], axis=1), np.median(power[around], axis=1) / np.log(2)
+        tone, noise = np.max(power[near], axis=1), np.median(power[tolerance], axis=1) / np.log(2)
         level = np.maximum(level, np.where(tone > MIN_TONE_POWER_RATIO * noise, tone, 0.0))
     power = air.power.copy()
     np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)
@@ -148,8 +149,8 @@ def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
 
 def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
     """Find the peaks of all axes that are not in air, without skirts."""
-    lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
-    return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
+    peaks = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(peaks, air, strict=True)])
 
 
 def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
@@ -158,29 +159,29 @@ def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bo
 
 
 def classify_peaks(
-    lines: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
+    peaks: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
     """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
 
     unsteady: by how much the speed varies, relative: harmonics are this much wider.
     """
-    order = np.round(lines.frequency / turning.frequency)
-    away = np.abs(lines.frequency - order * turning.frequency)
+    order = np.round(peaks.frequency / turning.frequency)
+    away = np.abs(peaks.frequency - order * turning.frequency)
     unsure = order * (MAX_SPEED_ERRORS * turning.error + unsteady * turning.frequency)
     comb = (away < PEAK_TOLERANCE * spectrum.bin_width + unsure) & (order > 0)
-    foreign = ~comb & is_in_air(lines, air)
+    foreign = ~comb & is_in_air(peaks, air)
     half = spectrum.sample_rate / 2
-    upper = comb & (lines.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
-    loudest = float(np.max(lines.amplitude[upper], initial=0.0))
-    is_bounded = lines.amplitude <= MAX_FOLDED_AMPLITUDE * loudest
-    back = _is_near_folded(lines, spectrum, turning, teeth, unsteady) & (
+    upper = comb & (peaks.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
+    loudest = float(np.max(peaks.amplitude[upper], initial=0.0))
+    is_bounded = peaks.amplitude <= MAX_FOLDED_AMPLITUDE * loudest
+    back = _is_near_folded(peaks, spectrum, turning, teeth, unsteady) & (
         is_bounded | is_undersampled(spectrum, turning, teeth)
     )
     back &= ~(comb | foreign)
     kept = comb & (order > 1)
     tooth = (order[kept] % teeth).astype(np.int64)
-    left = _remove_wavering(lines[~(comb | foreign | back)], lines[kept], spectrum, turning)
-    return PeaksByOrigin(lines[kept], tooth, lines[foreign], lines[back], left)
+    left = _remove_wavering(peaks[~(comb | foreign | back)], peaks[kept], spectrum, turning)
+    return PeaksByOrigin(peaks[kept], tooth, peaks[foreign], peaks[back], left)
 
 
 def _remove_wavering(
@@ -194,17 +195,17 @@ def _remove_wavering(
 
 
 def _is_near_folded(
-    lines: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
+    peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> Flags:
     """Whether peaks lie where harmonics of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
     if not orders.size:
-        return np.zeros(len(lines), dtype=np.bool_)
+        return np.zeros(len(peaks), dtype=np.bool_)
     folded = fold_frequency(np.asarray(orders * turning.frequency), rate)
     slack = np.where(is_undersampled(spectrum, turning, teeth) & (orders % teeth == 0), FOLDED_PEAK_SLACK, 0.0)
     unsure = orders * (MAX_SPEED_ERRORS * turning.error + (unsteady + slack) * turning.frequency)
-    away = np.abs(lines.frequency[:, np.newaxis] - folded) - unsure
+    away = np.abs(peaks.frequency[:, np.newaxis] - folded) - unsure
     return np.asarray(np.min(away, axis=1, initial=np.inf) < PEAK_TOLERANCE * spectrum.bin_width)
 
 
@@ -234,7 +235,7 @@ class ChatterPeaks:
     """All peaks f_c + k tooth passing."""
 
 
-def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float) -> ChatterPeaks:
+def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: float) -> ChatterPeaks:
     """Find the family of peaks that chatter is named by, in Hz; left: at least one unexplained peak.
 
     Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their sidebands too. So that of the loudest peaks is
@@ -246,28 +247,31 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float)
     anchors = [i for i in np.argsort(-named)[:MAX_CHATTER_ANCHORS] if named[i] > 0]
     clear = np.where(part, np.log10(left.clearness), 0.0)
     families = [
-        sideband_distance(left.frequency, left.frequency[i], tooth_frequency) < PEAK_TOLERANCE * bin_ for i in anchors
+        sideband_distance(left.frequency, left.frequency[i], tooth_frequency) < PEAK_TOLERANCE * bin_width
+        for i in anchors
     ]
     energy = np.array([np.sum(weight[family]) for family in families])
-    explained = np.array([_find_explained(left, left.frequency[i], tooth_frequency, bin_) @ clear for i in anchors])
+    explained = np.array(
+        [_find_explained(left, left.frequency[i], tooth_frequency, bin_width) @ clear for i in anchors]
+    )
     large = energy / np.max(energy)
     score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
     best = families[int(np.argmax(score))]
     top = int(np.argmax(np.where(best, named, 0.0)))
-    error = float(left.frequency_error(bin_)[top])
+    error = float(left.frequency_error(bin_width)[top])
     return ChatterPeaks(float(left.frequency[top]), error, left[best & part])
 
 
-def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_: float) -> bool:
+def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:
     """Return whether chatter has a peak k tooth passings or one turn away: a cut makes them, a pump does not. In Hz."""
     apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
-    return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_))
+    return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_width))
 
 
-def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
+def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_width: float) -> Floats:
     """Return 1 for peaks that are harmonics of a frequency or their sidebands, else 0, shape (n,)."""
     explained = np.zeros(len(left))
     for order in range(1, CHATTER_HARMONICS + 1):
         apart = sideband_distance(left.frequency, order * frequency, tooth_frequency)
-        explained[apart < PEAK_TOLERANCE * bin_ * max(1.0, order / 2)] = 1.0
+        explained[apart < PEAK_TOLERANCE * bin_width * max(1.0, order / 2)] = 1.0
     return explained

@@ -29,7 +29,7 @@ PADDING_FACTOR = 2
 NOISE_BINS = 64
 """Bins from which the noise is taken ..."""
 NOISE_QUANTILE = 0.25
-"""... as this quantile of their power: lines may fill the rest."""
+"""... as this quantile of their power: peaks may fill the rest."""
 MIN_PEAK_POWER = 25.0
 """A peak has this many times the power of the noise: noise reaches it once in 1e11 bins."""
 MIN_PEAK_DISTANCE = 1.5
@@ -37,11 +37,11 @@ MIN_PEAK_DISTANCE = 1.5
 SKIRT_BINS = 10.0
 """Distance up to which a peak has a skirt (bins): 5 of the window's own width ..."""
 SKIRT_AMPLITUDE_RATIO = 3.0
-"""... of lines so many times fainter: a tenth of its power."""
+"""... of peaks this many times fainter: a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
 """Standard error of the frequency of a peak, over the root of its clearness (bins) ..."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
-"""... and the part of it that stays however clear the line is (bins)."""
+"""... and the part of it that stays however clear the peak is (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +91,11 @@ class SpectralPeaks:
         """Return the loudest peaks, the loudest first, at most `count`."""
         return self[np.argsort(-self.amplitude)[:count]]
 
-    def frequency_error(self, bin_: float) -> Floats:
-        """Return the standard error of each frequency (Hz), shape (n,); bin_: bin width of the spectrum (Hz)."""
-        return np.asarray(bin_ * np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR))
+    def frequency_error(self, bin_width: float) -> Floats:
+        """Return the standard error of each frequency (Hz), shape (n,); bin_width: of the spectrum (Hz)."""
+        return np.asarray(
+            bin_width * np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR)
+        )
 
 
 def compute_spectrum(signal: Floats, sample_rate: float) -> Spectrum:
@@ -125,19 +127,19 @@ def _noise_level(power: Floats) -> Floats:
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
 
 
-def remove_skirts(lines: SpectralPeaks, bin_: float) -> SpectralPeaks:
+def remove_skirts(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:
     """Remove peaks next to a far louder one: a wavering speed widens a peak, with a row of peaks on its slope.
 
-    bin_: of the spectrum (Hz).
+    bin_width: of the spectrum (Hz).
     """
-    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency) < SKIRT_BINS * bin_
-    return lines[~np.any(apart & (lines.amplitude > SKIRT_AMPLITUDE_RATIO * lines.amplitude[:, np.newaxis]), axis=1)]
+    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency) < SKIRT_BINS * bin_width
+    return peaks[~np.any(apart & (peaks.amplitude > SKIRT_AMPLITUDE_RATIO * peaks.amplitude[:, np.newaxis]), axis=1)]
 
 
 def join_peaks(axes: Sequence[SpectralPeaks]) -> SpectralPeaks:
     """Join the peaks of several axes."""
     return SpectralPeaks(
-        *(np.concatenate([getattr(lines, name) for lines in axes]) for name in ("frequency", "amplitude", "clearness"))
+        *(np.concatenate([getattr(peaks, name) for peaks in axes]) for name in ("frequency", "amplitude", "clearness"))
     )
 
 

@@ -33,7 +33,7 @@ COMB_SPEED_TOLERANCE = 0.05
 USUAL_SPEED_TOLERANCE = 0.002
 """... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
 SAME_SPEED_TOLERANCE = 1e-3
-"""... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
+"""... and up to which it is the same as that of the votes, which know of sidebands; it is taken where it explains as
 many peaks: it has one unknown, they have one more for each family of sidebands."""
 MIN_SURE_VOTES = 6
 """Peaks that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all
@@ -55,14 +55,14 @@ MIN_OWN_PEAK_VOTES = 0.2
 MAX_SPEED_MISFIT = 4.0
 """A speed with a larger misfit is compared with others ..."""
 MAX_RIVAL_SPEEDS = 12
-"""... so many that have the most votes ..."""
+"""... this many that have the most votes ..."""
 VOTE_PEAK_WIDTH = 9
 """... of as many steps of the grid around each."""
 MIN_GRID_SHARE = 0.5
 """Share of the peaks that must belong to the harmonic grid, and must have a neighbour one or two turns or teeth away
 ..."""
 MIN_AGREEING_PEAKS = 3
-"""... and number of them that must agree: a pump that is switched on has lines of its own."""
+"""... and number of them that must agree: a pump that is switched on has peaks of its own."""
 
 
 def find_spindle_speed(
@@ -90,11 +90,11 @@ def find_speed_of_spectra(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
     """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
-    lines, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
-    summed = find_comb_by_sum(spectra, air, lines, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
+    peaks, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
+    summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         return voted or summed
-    rival = refine_speed(summed.frequency, lines, spectra[0].bin_width)
+    rival = refine_speed(summed.frequency, peaks, spectra[0].bin_width)
     return summed if rival.agreeing >= voted.agreeing else voted
 
 
@@ -102,9 +102,9 @@ def _find_speed_by_peaks(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
     """Find the speed by peaks clear of the noise."""
-    lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    peaks = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     of_cut, first = find_cut_peaks(spectra, air), spectra[0]
-    voted = find_speed_by_votes(of_cut, join_peaks(lines), first, teeth, commanded)
+    voted = find_speed_by_votes(of_cut, join_peaks(peaks), first, teeth, commanded)
     comb = find_comb(of_cut, first.bin_width, first.sample_rate, teeth, commanded, COMB_SPEED_TOLERANCE)
     if comb is None:
         return (
@@ -144,8 +144,8 @@ def find_speed_by_votes(
     turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < VOTE_SPEED_TOLERANCE]
     near = np.any(np.abs(grid[:, np.newaxis] - turning) < OWN_PEAK_TOLERANCE * spectrum.bin_width, axis=1)
     best = int(np.argmax(votes))
-    heard = int(np.argmax(np.where(near, votes, 0.0)))
-    best = heard if near[heard] and votes[heard] > MIN_OWN_PEAK_VOTES * votes[best] else best
+    known_speed = int(np.argmax(np.where(near, votes, 0.0)))
+    best = known_speed if near[known_speed] and votes[known_speed] > MIN_OWN_PEAK_VOTES * votes[best] else best
     speed = refine_speed(float(grid[best]), loudest, spectrum.bin_width)
     if speed.misfit > MAX_SPEED_MISFIT:
         rivals = [
@@ -157,11 +157,11 @@ def find_speed_by_votes(
     return speed if is_sure else None
 
 
-def _spaced_share(lines: SpectralPeaks, frequency: float, teeth: int, bin_: float) -> float:
+def _spaced_share(peaks: SpectralPeaks, frequency: float, teeth: int, bin_width: float) -> float:
     """Return the share of peaks with another one or two turns or teeth away; a wrong frequency has few."""
-    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
+    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency)
     steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
-    return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
+    return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_width, axis=1) for step in steps], axis=0)))
 
 
 def _vote_peaks(votes: Floats) -> Indices:
@@ -170,13 +170,13 @@ def _vote_peaks(votes: Floats) -> Indices:
     return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]
 
 
-def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:
+def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:
     """Count the votes for each frequency of a grid (Hz); sharpness: of one peak (Hz)."""
-    weight, step = np.log10(lines.clearness), grid[1] - grid[0]
-    i, j = np.triu_indices(len(lines), 1)
-    spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
+    weight, step = np.log10(peaks.clearness), grid[1] - grid[0]
+    i, j = np.triu_indices(len(peaks), 1)
+    spaced = np.concatenate([np.abs(peaks.frequency[i] - peaks.frequency[j]), peaks.frequency[i] + peaks.frequency[j]])
     spaced, weight = (
-        np.concatenate([spaced, lines.frequency]),
+        np.concatenate([spaced, peaks.frequency]),
         np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight]),
     )
     votes = np.zeros(grid.size)
@@ -218,12 +218,12 @@ def check_tachometer_speed(
     at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
     if at_set is not None:
         return None, at_set.frequency
-    heard = find_speed_of_spectra(spectra, air, teeth, measured)
-    if heard is not None and abs(heard.frequency / measured - 1) > TACHOMETER_TOLERANCE:
-        return None, heard.frequency
-    if not is_near and (heard is None or is_pulse_multiple(measured / commanded)):
+    known_speed = find_speed_of_spectra(spectra, air, teeth, measured)
+    if known_speed is not None and abs(known_speed.frequency / measured - 1) > TACHOMETER_TOLERANCE:
+        return None, known_speed.frequency
+    if not is_near and (known_speed is None or is_pulse_multiple(measured / commanded)):
         return None, commanded
-    return heard or _use_tachometer_speed(spectra, air, measured), np.nan
+    return known_speed or _use_tachometer_speed(spectra, air, measured), np.nan
 
 
 def is_pulse_multiple(ratio: float) -> bool:
@@ -234,12 +234,14 @@ def is_pulse_multiple(ratio: float) -> bool:
 
 def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
     """Return the speed of the tachometer if some peaks are its harmonics, else None."""
-    lines, bin_ = find_cut_peaks(spectra, air), spectra[0].bin_width
-    own = fold_frequency(lines.frequency, measured) < PEAK_TOLERANCE * bin_
+    peaks, bin_width = find_cut_peaks(spectra, air), spectra[0].bin_width
+    own = fold_frequency(peaks.frequency, measured) < PEAK_TOLERANCE * bin_width
     if np.count_nonzero(own) < MIN_AGREEING_PEAKS:
         return None
-    beside = refine_speed(measured, lines.loudest(MAX_COMB_PEAKS), bin_)
-    return SpindleSpeed(measured, TACHOMETER_ERROR * measured, beside.share, int(np.count_nonzero(own)), beside.misfit)
+    other_peaks = refine_speed(measured, peaks.loudest(MAX_COMB_PEAKS), bin_width)
+    return SpindleSpeed(
+        measured, TACHOMETER_ERROR * measured, other_peaks.share, int(np.count_nonzero(own)), other_peaks.misfit
+    )
 
 
 HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
@@ -253,44 +255,50 @@ def find_distant_speed(
     air: Sequence[Spectrum],
     teeth: int,
     commanded: float,
-    heard: SpindleSpeed | None,
-    beside: SpectralPeaks | None = None,
+    known_speed: SpindleSpeed | None,
+    other_peaks: SpectralPeaks | None = None,
 ) -> float:
     """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    recorded: the speed that was found, and beside: peaks that are no harmonics of it. Only a comb whose harmonics
-    they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of period two
-    makes; the mains hum at harmonics of theirs.
+    known_speed: the speed that was found; other_peaks: peaks that are no harmonics of it. Only a comb whose
+    harmonics they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of
+    period two makes; the mains hum at harmonics of theirs.
     """
-    lines, first = find_cut_peaks(spectra, air), spectra[0]
+    peaks, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth
-    clearest = find_distant_comb(lines, *about, commanded, COMB_SPEED_TOLERANCE)
-    if heard is None or beside is None:
+    clearest = find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
+    if known_speed is None or other_peaks is None:
         return np.nan if clearest is None else clearest.frequency
-    mains = [find_comb(lines, *about, hum, HUM_TOLERANCE) for hum in HUM_FREQUENCIES if not _is_mains_speed(heard, hum)]
-    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= heard.agreeing]
+    mains = [
+        find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in HUM_FREQUENCIES if not _is_mains_speed(known_speed, hum)
+    ]
+    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known_speed.agreeing]
     centres = list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
-    sums = (find_comb_by_sum(spectra, air, lines, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
-    loudest = lines.loudest(MAX_COMB_PEAKS)
-    agreeing = refine_speed(heard.frequency, loudest, first.bin_width).agreeing
+    sums = (find_comb_by_sum(spectra, air, peaks, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
+    loudest = peaks.loudest(MAX_COMB_PEAKS)
+    agreeing = refine_speed(known_speed.frequency, loudest, first.bin_width).agreeing
     summed = [
         comb for comb in sums if comb and refine_speed(comb.frequency, loudest, first.bin_width).agreeing > agreeing
     ]
-    better = [comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, heard, beside, first.bin_width)]
+    better = [
+        comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, known_speed, other_peaks, first.bin_width)
+    ]
     return max(better, key=lambda frequency: _rank_comb(frequency, loudest, first.bin_width)) if better else np.nan
 
 
-def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPeaks, bin_: float) -> bool:
+def _is_better_comb(
+    comb: SpindleSpeed, known_speed: SpindleSpeed, other_peaks: SpectralPeaks, bin_width: float
+) -> bool:
     """Return whether most peaks that are no harmonics of a speed fit another comb, not that of half of it."""
-    belongs = fold_frequency(beside.frequency, comb.frequency) < PEAK_TOLERANCE * bin_
-    is_half = abs(2 * comb.frequency / heard.frequency - 1) < SAME_SPEED_TOLERANCE
-    share = np.count_nonzero(belongs) / len(beside), beside[belongs].energy / beside.energy
+    belongs = fold_frequency(other_peaks.frequency, comb.frequency) < PEAK_TOLERANCE * bin_width
+    is_half = abs(2 * comb.frequency / known_speed.frequency - 1) < SAME_SPEED_TOLERANCE
+    share = np.count_nonzero(belongs) / len(other_peaks), other_peaks[belongs].energy / other_peaks.energy
     return not is_half and max(share) > MIN_DISTANT_SHARE
 
 
-def _rank_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> tuple[float, float]:
+def _rank_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> tuple[float, float]:
     """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
-    comb = refine_comb(frequency, lines, bin_)
+    comb = refine_comb(frequency, peaks, bin_width)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
 
 

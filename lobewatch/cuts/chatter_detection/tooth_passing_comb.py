@@ -11,13 +11,7 @@ import scipy
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
-from lobewatch.cuts.chatter_detection.spectrum import (
-    SpectralPeaks,
-    Spectrum,
-    find_peaks,
-    fold_frequency,
-    join_peaks,
-)
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency, join_peaks
 
 COMB_TOLERANCE = 1.2
 """Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""
@@ -26,7 +20,7 @@ COMB_SPEED_WAVER = 1e-4
 MAX_COMB_PEAKS = 40
 """Peaks that are checked ..."""
 MAX_COMB_ANCHORS = 16
-"""... and those that a comb is looked for from; chosen."""
+"""... and those that a comb is searched from; chosen."""
 COMB_FIT_STEPS = 3
 """Steps of the least squares."""
 MAX_COMB_CHANCE = 1e-4
@@ -53,105 +47,111 @@ class Comb(NamedTuple):
 
 
 def find_comb(
-    lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
+    peaks: SpectralPeaks, bin_width: float, sample_rate: float, teeth: int, frequency: float, tolerance: float
 ) -> SpindleSpeed | None:
-    """Find the comb within `around` (relative) of a frequency (Hz) that explains the most peaks, or None.
+    """Find the comb within `tolerance` (relative) of a frequency (Hz) that explains the most peaks, or None.
 
-    peaks: of all axes, without skirts; bin_: of the spectrum (Hz). Each peak is a vote for the frequencies that it
-    is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
+    peaks: of all axes, without skirts; bin_width: of the spectrum (Hz). Each peak is a vote for the frequencies that
+    it is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
     """
-    lines = lines.loudest(MAX_COMB_PEAKS)
+    peaks = peaks.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
-    for images in (_folded_images(lines, sample_rate)[:1], *([_folded_images(lines, sample_rate)] if few else [])):
-        best = _find_best_comb(lines, images, bin_, frequency, around)
-        if best is not None and _comb_chance(best, lines, images, bin_, teeth, around) < MAX_COMB_CHANCE:
-            return _comb_speed(best, lines, bin_)
+    for images in (_folded_images(peaks, sample_rate)[:1], *([_folded_images(peaks, sample_rate)] if few else [])):
+        best = _find_best_comb(peaks, images, bin_width, frequency, tolerance)
+        if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
+            return _comb_speed(best, peaks, bin_width)
     return None
 
 
 def find_distant_comb(
-    lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
+    peaks: SpectralPeaks, bin_width: float, sample_rate: float, teeth: int, frequency: float, tolerance: float
 ) -> SpindleSpeed | None:
-    """Find the best comb between half and twice a frequency (Hz), farther than `around` from it, or None.
+    """Find the best comb between half and twice a frequency (Hz), farther than `tolerance` from it, or None.
 
     Of those that explain as many tenths of the peaks that of which all are tooth passing, else the highest; none of
     which all harmonics have an order in common that the teeth have not: that is a part of another.
     """
-    lines, best, rank = lines.loudest(MAX_COMB_PEAKS), None, (0.0, False, 0.0)
-    for centre in list_distant_centers(frequency, around):
-        comb = find_comb(lines, bin_, sample_rate, teeth, centre, around)
+    peaks, best, rank = peaks.loudest(MAX_COMB_PEAKS), None, (0.0, False, 0.0)
+    for centre in list_distant_centers(frequency, tolerance):
+        comb = find_comb(peaks, bin_width, sample_rate, teeth, centre, tolerance)
         if comb is None or comb.share < MIN_COMB_SHARE:
             continue
-        order = np.round(lines.frequency / comb.frequency).astype(int)
-        common = int(np.gcd.reduce(order[np.abs(lines.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_]))
+        order = np.round(peaks.frequency / comb.frequency).astype(int)
+        common = int(
+            np.gcd.reduce(order[np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width])
+        )
         ranked = round(comb.share, 1), common == teeth, comb.frequency
         if common and teeth % common == 0 and ranked > rank:
             best, rank = comb, ranked
     return best
 
 
-def list_distant_centers(frequency: float, around: float) -> list[float]:
-    """List frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
-    steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
-    return [float(centre) for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps]))]
+def list_distant_centers(frequency: float, tolerance: float) -> list[float]:
+    """List frequencies from half to twice one (Hz), each twice `tolerance` from the next, relative; itself left out."""
+    steps = np.arange(1, int(np.log(2) / (2 * tolerance)) + 1)
+    return [float(centre) for centre in frequency * np.exp(2 * tolerance * np.concatenate([-steps, steps]))]
 
 
-def refine_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed | None:
+def refine_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> SpindleSpeed | None:
     """Refine a frequency (Hz) by least squares over its harmonics among peaks; None without any."""
-    comb = _fit_comb(frequency, lines, lines.frequency[np.newaxis], bin_)
-    return _comb_speed(comb, lines, bin_) if np.any(comb.is_member) else None
+    comb = _fit_comb(frequency, peaks, peaks.frequency[np.newaxis], bin_width)
+    return _comb_speed(comb, peaks, bin_width) if np.any(comb.is_member) else None
 
 
-def _folded_images(lines: SpectralPeaks, sample_rate: float) -> Floats:
+def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
     """Return the frequencies that may have been folded to each peak (Hz), itself first; shape (images, n)."""
-    heard = lines.frequency
-    return np.stack([heard, sample_rate - heard, sample_rate + heard, 2 * sample_rate - heard])
+    levels = peaks.frequency
+    return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
-def _find_best_comb(lines: SpectralPeaks, images: Floats, bin_: float, frequency: float, around: float) -> Comb | None:
-    weight, best, most = np.minimum(np.log10(lines.clearness), MAX_PEAK_WEIGHT), None, 0.0
-    for candidate in _candidate_frequencies(lines, frequency, around):
-        comb = _fit_comb(float(candidate), lines, images, bin_)
+def _find_best_comb(
+    peaks: SpectralPeaks, images: Floats, bin_width: float, frequency: float, tolerance: float
+) -> Comb | None:
+    weight, best, most = np.minimum(np.log10(peaks.clearness), MAX_PEAK_WEIGHT), None, 0.0
+    for candidate in _candidate_frequencies(peaks, frequency, tolerance):
+        comb = _fit_comb(float(candidate), peaks, images, bin_width)
         score = float(np.sum(weight[comb.is_member]))
-        if score > most and abs(comb.frequency / frequency - 1) <= around:
+        if score > most and abs(comb.frequency / frequency - 1) <= tolerance:
             best, most = comb, score
     return best
 
 
-def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float) -> Floats:
+def _candidate_frequencies(peaks: SpectralPeaks, frequency: float, tolerance: float) -> Floats:
     """Return the frequencies (Hz) that the loudest peaks are harmonics of."""
-    loudest = lines.frequency[:MAX_COMB_ANCHORS]
-    orders = np.arange(1, int(np.max(loudest, initial=0.0) / frequency / (1 - around)) + 1)
+    loudest = peaks.frequency[:MAX_COMB_ANCHORS]
+    orders = np.arange(1, int(np.max(loudest, initial=0.0) / frequency / (1 - tolerance)) + 1)
     parts = (loudest[:, np.newaxis] / orders).ravel()
-    return np.asarray(parts[np.abs(parts / frequency - 1) <= around])
+    return np.asarray(parts[np.abs(parts / frequency - 1) <= tolerance])
 
 
-def _fit_comb(frequency: float, lines: SpectralPeaks, images: Floats, bin_: float) -> Comb:
+def _fit_comb(frequency: float, peaks: SpectralPeaks, images: Floats, bin_width: float) -> Comb:
     """Fit a frequency by least squares to its harmonics."""
-    comb = _build_comb(frequency, images, bin_)
+    comb = _build_comb(frequency, images, bin_width)
     for _ in range(COMB_FIT_STEPS):
         if not np.any(comb.is_member):
             break
-        error, order = _peak_error(lines, bin_)[comb.is_member], comb.order[comb.is_member]
+        error, order = _peak_error(peaks, bin_width)[comb.is_member], comb.order[comb.is_member]
         off = float(np.sum(order * comb.offset[comb.is_member] / error**2) / np.sum((order / error) ** 2))
-        comb = _build_comb(comb.frequency + off, images, bin_)
+        comb = _build_comb(comb.frequency + off, images, bin_width)
     return comb
 
 
-def _build_comb(frequency: float, images: Floats, bin_: float) -> Comb:
+def _build_comb(frequency: float, images: Floats, bin_width: float) -> Comb:
     orders = np.round(images / frequency)
     beyond = np.where(orders > 0, images - orders * frequency, np.inf)
     nearest = np.argmin(np.abs(beyond), axis=0)[np.newaxis]
     order, away = (np.take_along_axis(values, nearest, axis=0)[0] for values in (orders, beyond))
-    return Comb(frequency, np.abs(away) < COMB_TOLERANCE * bin_, order, away)
+    return Comb(frequency, np.abs(away) < COMB_TOLERANCE * bin_width, order, away)
 
 
-def _peak_error(lines: SpectralPeaks, bin_: float) -> Floats:
+def _peak_error(peaks: SpectralPeaks, bin_width: float) -> Floats:
     """Return the standard error of each peak (Hz), with the variation of the speed."""
-    return np.hypot(lines.frequency_error(bin_), COMB_SPEED_WAVER * lines.frequency)
+    return np.hypot(peaks.frequency_error(bin_width), COMB_SPEED_WAVER * peaks.frequency)
 
 
-def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, teeth: int, around: float) -> float:
+def _comb_chance(
+    comb: Comb, peaks: SpectralPeaks, images: Floats, bin_width: float, teeth: int, tolerance: float
+) -> float:
     """Return how many of all combs tried would have as many harmonics among random peaks.
 
     Harmonics of tooth passing alone are this much rarer.
@@ -160,19 +160,19 @@ def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, 
     if orders.size < MIN_COMB_HARMONICS:
         return np.inf
     spacing = comb.frequency * (1 if np.any(orders % teeth) else teeth)
-    near = min(2 * COMB_TOLERANCE * bin_ / spacing * len(images), 1.0)
-    tried = max(around * float(np.max(images)) / (COMB_TOLERANCE * bin_), 1.0)
-    apart = np.unique(np.round(lines.frequency / (2 * COMB_TOLERANCE * bin_))).size
+    near = min(2 * COMB_TOLERANCE * bin_width / spacing * len(images), 1.0)
+    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * bin_width), 1.0)
+    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * bin_width))).size
     return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
 
 
-def _comb_speed(comb: Comb, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
-    off = comb.offset / _peak_error(lines, bin_)
-    exact = 1 / np.sqrt(np.sum((comb.order / _peak_error(lines, bin_))[comb.is_member] ** 2))
+def _comb_speed(comb: Comb, peaks: SpectralPeaks, bin_width: float) -> SpindleSpeed:
+    off = comb.offset / _peak_error(peaks, bin_width)
+    exact = 1 / np.sqrt(np.sum((comb.order / _peak_error(peaks, bin_width))[comb.is_member] ** 2))
     error = float(exact * max(1.0, float(np.sqrt(np.mean(off[comb.is_member] ** 2)))))
     misfit = float(np.mean(np.minimum(np.abs(off), MAX_GRID_ERRORS) ** 2))
     count = int(np.count_nonzero(comb.is_member))
-    return SpindleSpeed(comb.frequency, error, count / len(lines), count - 1, misfit)
+    return SpindleSpeed(comb.frequency, error, count / len(peaks), count - 1, misfit)
 
 
 MIN_HARMONIC_LEVEL = 0.6
@@ -199,13 +199,13 @@ WEAK_PEAK_POWER = 4.0
 def find_comb_by_sum(
     spectra: Sequence[Spectrum],
     air: Sequence[Spectrum],
-    lines: SpectralPeaks,
+    peaks: SpectralPeaks,
     teeth: int,
     frequency: float,
-    around: float,
+    tolerance: float,
     usual: float = 1.0,
 ) -> SpindleSpeed | None:
-    """Find the comb within `around` (relative) of a frequency (Hz) that is loudest over the noise, or None.
+    """Find the comb within `tolerance` (relative) of a frequency (Hz) that is loudest over the noise, or None.
 
     spectra and air: of each axis; what is no louder than in air does not count. peaks: those that stand clear, of
     all axes; where they are many, they settle it, and there is one on a harmonic of anything. The mean over all axes
@@ -213,23 +213,23 @@ def find_comb_by_sum(
     is a comb where as many frequencies that are no harmonics would have that sum less often than once in ten
     thousand, over all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
     """
-    if len(lines) >= MAX_COMB_PEAKS * len(spectra):
+    if len(peaks) >= MAX_COMB_PEAKS * len(spectra):
         return None
     first, above = spectra[0], _mean_level(spectra, air)
-    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (frequency * (1 + around))))
-    lowest, most = (1 - around) * frequency, (1 + around) * frequency
+    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (frequency * (1 + tolerance))))
+    lowest, most = (1 - tolerance) * frequency, (1 + tolerance) * frequency
     tried = np.arange(lowest, most, SUM_FREQUENCY_STEP * first.bin_width / max(highest, 1))
     parts = np.array([np.interp(k * tried, first.frequency, above) for k in range(1, highest + 1)])
     best = int(np.argmax(np.sum(parts, axis=0)))
-    heard = parts[:, best]
-    if not 0 < best < tried.size - 1 or np.count_nonzero(heard) < MIN_COMB_HARMONICS:
+    levels = parts[:, best]
+    if not 0 < best < tried.size - 1 or np.count_nonzero(levels) < MIN_COMB_HARMONICS:
         return None
     inside = (first.frequency > lowest) & (first.frequency < highest * most)
-    beside = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
-    rarest = MAX_COMB_CHANCE if np.mean(heard) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
-    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / around, 1.0)
-    if SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(heard, above[beside]) > rarest or _is_partial_comb(
-        heard, above[beside], teeth
+    between = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
+    rarest = MAX_COMB_CHANCE if np.mean(levels) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
+    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / tolerance, 1.0)
+    if SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, above[between]) > rarest or _is_partial_comb(
+        levels, above[between], teeth
     ):
         return None
     weak = join_peaks([find_peaks(spectrum, WEAK_PEAK_POWER) for spectrum in spectra])
@@ -248,17 +248,17 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
     return total / len(spectra)
 
 
-def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
+def _is_partial_comb(levels: Floats, values: Floats, teeth: int) -> bool:
     """Return whether the harmonics share an order that the teeth do not: the comb belongs to another frequency."""
-    orders = np.arange(1, heard.size + 1)
+    orders = np.arange(1, levels.size + 1)
     return any(
-        _sum_chance(heard[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
+        _sum_chance(levels[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
     )
 
 
-def _sum_chance(heard: Floats, values: Floats) -> float:
+def _sum_chance(levels: Floats, values: Floats) -> float:
     """Return how often random values have a sum as large."""
-    count, level = heard.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
+    count, level = levels.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
     share = (
         np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)
         / values.size
@@ -267,4 +267,4 @@ def _sum_chance(heard: Floats, values: Floats) -> float:
     share = np.append(1.0, louder[1:]) - np.append(louder[1:], 0.0)
     size = N_SUM_LEVELS * count + 1
     sums = np.fft.irfft(np.fft.rfft(share, 2 * size) ** count, 2 * size)[:size]
-    return float(np.sum(sums[int(np.sum(heard) * N_SUM_LEVELS / MAX_HARMONIC_LEVEL) :]))
+    return float(np.sum(sums[int(np.sum(levels) * N_SUM_LEVELS / MAX_HARMONIC_LEVEL) :]))

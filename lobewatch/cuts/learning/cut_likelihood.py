@@ -133,8 +133,8 @@ def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[Cu
     """Return the likelihood of the recorded verdict being right, and of its being wrong."""
     truths: tuple[Floats, Floats] = prediction.chatter_probability, 1 - prediction.chatter_probability
     for other in again:
-        told = [share * word for share, word in zip(truths, _label_likelihoods(other, prediction), strict=True)]
-        truths = told[0] / (told[0] + told[1]), told[1] / (told[0] + told[1])
+        weighted = [share * word for share, word in zip(truths, _label_likelihoods(other, prediction), strict=True)]
+        truths = weighted[0] / (weighted[0] + weighted[1]), weighted[1] / (weighted[0] + weighted[1])
     chatters, stable = (share * word for share, word in zip(truths, _label_likelihoods(cut, prediction), strict=True))
     return (chatters, stable) if cut.has_chatter else (stable, chatters)
 

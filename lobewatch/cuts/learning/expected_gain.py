@@ -99,8 +99,8 @@ FREQUENCY_ERROR_FACTOR = 1.5
 LIMIT_DEPTH_MARGIN = 1e-6
 """Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
 MAX_LABEL_DEVIATION = 2.0
-"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond
-it the verdict is more likely wrong."""
+"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
+the verdict is more likely wrong."""
 EQUAL_DEPTH_TOLERANCE = 1e-9
 """Difference of two depths that is none (m)."""
 
@@ -165,11 +165,11 @@ class LimitCharts:
         """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
         more = self.removal_rates > np.min(best)
         speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
-        order, chips = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
-        gain = np.zeros(chips.shape)
+        order, rates = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
+        gain = np.zeros(rates.shape)
         for value in np.unique(best):
             stable = np.cumsum((weights * (best == value))[order], axis=0)
-            gain += stable * np.maximum(chips - value, 0.0)
+            gain += stable * np.maximum(rates - value, 0.0)
         likely = np.cumsum(weights[order], axis=0) > MIN_STABLE_PROBABILITY
         best_gains = np.zeros(speeds.shape)
         best_gains[speeds] = np.max(likely * gain, axis=0, initial=0.0)
@@ -197,13 +197,13 @@ class LimitCharts:
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
         """Return the worth of a cut (rpm m): its own gain, and that of the best next cut."""
         stable = self.limits[:, row] >= depth - EQUAL_DEPTH_TOLERANCE
-        chance, chips = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
+        chance, rates = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
         if chance <= MIN_STABLE_PROBABILITY:
             return 0.0
-        gain = float(np.mean(stable * np.maximum(chips - best, 0.0)))
+        gain = float(np.mean(stable * np.maximum(rates - best, 0.0)))
         if left <= 1:
             return gain
-        after = chance * self._next_gain(stable / np.sum(stable), np.maximum(best, chips))
+        after = chance * self._next_gain(stable / np.sum(stable), np.maximum(best, rates))
         return gain + after + (1 - chance) * self._gain_after_chatter(row, ~stable, best)
 
     def _gain_after_chatter(self, row: int, chatters: Flags, best: float | Floats) -> float:
@@ -211,14 +211,14 @@ class LimitCharts:
         places = np.flatnonzero(chatters)
         if not places.size:
             return 0.0
-        heard = self.frequencies[places, row]
+        expected = self.frequencies[places, row]
         wide = FREQUENCY_ERROR_FACTOR * CHATTER_FREQUENCY_SPREAD * self.typical_frequency
         gains = []
         for frequency in (
-            heard[int(share * places.size)]
+            expected[int(share * places.size)]
             for share in (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
         ):
-            near = np.exp(-(((heard - frequency) / wide) ** 2) / 2)
+            near = np.exp(-(((expected - frequency) / wide) ** 2) / 2)
             weights = np.zeros(len(self.limits))
             weights[places] = near / np.sum(near) if np.sum(near) > 0 else 1 / places.size
             gains.append(self._next_gain(weights, best))

@@ -78,12 +78,12 @@ def find_pocket_depths(
 ) -> list[PocketDepth]:
     """Find the best pockets of a program with their test cuts, the nearest to its own speed first."""
     own, reach = _find_own_cuts(table, assembly, machine, cuts), CutRange.of(machine, table)
-    told = []
+    depths = []
     for pocket in find_speed_pockets(table, assembly, machine):
         speed = round(sum(pocket.window_rpm) / 2 / SPEED_STEP_RPM) * SPEED_STEP_RPM
         inside = tuple(cut for cut in own if pocket.contains(cut.speed_rpm))
-        told.append(PocketDepth(pocket, speed, inside, float(reach.depth_limits(np.array([speed]))[0]) / 1e3))
-    return sorted(told, key=lambda heard: abs(math.log(heard.speed_rpm / table.speed_rpm)))
+        depths.append(PocketDepth(pocket, speed, inside, float(reach.depth_limits(np.array([speed]))[0]) / 1e3))
+    return sorted(depths, key=lambda found: abs(math.log(found.speed_rpm / table.speed_rpm)))
 
 
 def choose_first_depth(table: ProgramTable) -> float:
@@ -104,9 +104,9 @@ def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts
     stable = [cut for cut in at_speed if not cut.has_chatter and cut.depth >= depth]
     if not chattering and not stable:
         return verdict
-    heard = (chattering or stable)[-1]
+    found = (chattering or stable)[-1]
     word, what = (Stability.NOT_STABLE, "chatter") if chattering else (Stability.DOUBTFUL, "stable")
-    text = f"cut {heard.id} was heard {what} at {1e3 * heard.depth:.4g} mm; without K no limit is known beside it"
+    text = f"cut {found.id} was heard {what} at {1e3 * found.depth:.4g} mm; without K no limit is known beside it"
     remark = Remark("heard-alone", program.name, text, "tap with a hammer that measures its force")
     others = [other for other in verdict.remarks if other.code != NOT_CHECKED_CODE]
     return replace(verdict, stability=word, remarks=(remark, *others))

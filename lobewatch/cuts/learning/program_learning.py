@@ -124,13 +124,13 @@ def collect_tool_evidence(
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
     evidence = []
-    for heard in cuts:
-        if heard.tool != table.tool or not heard.is_usable:
+    for entry in cuts:
+        if entry.tool != table.tool or not entry.is_usable:
             continue
-        material = heard.coefficients, heard.cut.tangential, heard.cut.radial
+        material = entry.coefficients, entry.cut.tangential, entry.cut.radial
         if material not in materials:
             materials.append(material)
-        evidence.append(_build_evidence(heard, materials.index(material), assembly))
+        evidence.append(_build_evidence(entry, materials.index(material), assembly))
     return tuple(evidence)
 
 

@@ -64,6 +64,7 @@ def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
     assert again == best
 
 
+@pytest.mark.quick
 def test_few_draws_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
     search = SettingSearch(ProgramCase(cut(), tool(), MACHINE))
     judgement = run_monte_carlo(ProgramCase(cut(depth=0.5), tool(), MACHINE))

@@ -7,6 +7,8 @@ import pytest
 
 from lobewatch.cuts.chatter_detection.spectrum import compute_spectrum, find_peaks
 
+pytestmark = pytest.mark.quick
+
 RATE = 25600.0
 
 

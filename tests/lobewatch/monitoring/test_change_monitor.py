@@ -39,6 +39,7 @@ def first_fall(watched: ChangeMonitor) -> SeriesChange:
     return watched.change_at(watched.first_alarm)
 
 
+@pytest.mark.quick
 def test_the_reference_series_is_judged_as_printed() -> None:
     found = monitor_drops(Readings(FALLING))
     assert np.all(np.isnan(found.scores[:8]))
@@ -48,6 +49,7 @@ def test_the_reference_series_is_judged_as_printed() -> None:
     assert (first_fall(found).kind, first_fall(found).point) == ("slope", 10)
 
 
+@pytest.mark.quick
 def test_the_14th_point_of_it_asks_for_another_and_the_15th_alarms() -> None:
     asks = [n for n in range(FALLING.size + 1) if detect_changes(Readings(FALLING[:n])).needs_repeat]
     alarms = [n for n in range(FALLING.size + 1) if monitor_drops(Readings(FALLING[:n])).first_alarm is not None]
@@ -55,6 +57,7 @@ def test_the_14th_point_of_it_asks_for_another_and_the_15th_alarms() -> None:
     assert alarms == list(range(15, 21))
 
 
+@pytest.mark.quick
 def test_the_nile_fell_once_in_1898() -> None:
     found = monitor_drops(Readings(np.fromstring(NILE, sep=" ")))
     assert np.flatnonzero(found.scores >= SURE_CHANGE_SCORE)[0] == 30
@@ -63,6 +66,7 @@ def test_the_nile_fell_once_in_1898() -> None:
     assert first_fall(found).size == pytest.approx(240, abs=30)
 
 
+@pytest.mark.quick
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(9, 40), drop=st.floats(-1, 1))
 def test_the_score_is_that_of_least_squares_written_out(seed: int, n: int, drop: float) -> None:
@@ -83,10 +87,12 @@ def falling(y: Floats, change: Floats) -> float:
     return float(-size[1] / error)
 
 
+@pytest.mark.quick
 def test_a_rise_is_no_fall() -> None:
     assert monitor_drops(Readings(-FALLING)).first_alarm is None
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("sign", [1, -1])
 def test_fall_and_rise_are_mirror_images(sign: int) -> None:
     falls, rises = monitor_drops_and_rises(Readings(sign * FALLING))
@@ -96,6 +102,7 @@ def test_fall_and_rise_are_mirror_images(sign: int) -> None:
     assert other.first_alarm is None
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_newest_change_has_the_sign_of_a_fall_and_wants_two_points(sign: int) -> None:
     assert [n for n in range(21) if find_newest_change(sign * FALLING[:n]) is not None] == list(range(15, 21))
@@ -105,6 +112,7 @@ def test_the_newest_change_has_the_sign_of_a_fall_and_wants_two_points(sign: int
     assert sign * found.size == pytest.approx(1.62, abs=0.1)
 
 
+@pytest.mark.quick
 def test_size_and_interval_of_a_known_step() -> None:
     fallen = np.repeat([0.0, -1.0], [20, 10]) + np.tile([0.1, -0.1], 15)
     found = first_fall(monitor_drops(Readings(fallen)))
@@ -114,6 +122,7 @@ def test_size_and_interval_of_a_known_step() -> None:
     assert found.half_width == pytest.approx(students.ppf(0.975, 28) * error)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("n", [0, 1, 8, 30])
 def test_equal_points_are_steady(n: int) -> None:
     found = monitor_drops(Readings(np.full(n, 3.0)))
@@ -121,12 +130,14 @@ def test_equal_points_are_steady(n: int) -> None:
     assert found.scores[8:] == pytest.approx(0.0)
 
 
+@pytest.mark.quick
 def test_a_fall_without_any_scatter_alarms() -> None:
     found = monitor_drops(Readings(np.repeat([0.0, -1.0], [12, 3])))
     assert found.first_alarm == 13
     assert first_fall(found).size == pytest.approx(1.0)
 
 
+@pytest.mark.quick
 def test_what_the_temperature_explains_is_no_fall() -> None:
     random = np.random.default_rng(3)
     warmth = np.linspace(18.0, 34.0, 24)
@@ -138,6 +149,7 @@ def test_what_the_temperature_explains_is_no_fall() -> None:
     )
 
 
+@pytest.mark.quick
 def test_a_fall_beside_the_temperature_is_found() -> None:
     random = np.random.default_rng(4)
     warmth = random.uniform(18.0, 30.0, 30)
@@ -166,6 +178,7 @@ def test_false_alarms_in_4000_series(share: float, most: dict[int, float]) -> No
     assert all(found[n] <= most[n] for n in most), found
 
 
+@pytest.mark.quick
 def test_false_alarms_are_rare() -> None:
     found = false_alarms(150, 0.0)
     assert found[24] <= 7.0, found
@@ -212,6 +225,7 @@ def test_a_fall_is_found_in_time(kind: str, size: float, scatter: float, before:
         assert np.all(np.abs(dates + 0.5) <= 1.5)
 
 
+@pytest.mark.quick
 def test_a_step_of_five_times_the_scatter_is_found_within_four_points() -> None:
     late, _ = delays("step", 0.5, 0.1, 12, 50)
     assert np.quantile(late, 0.9) <= 4

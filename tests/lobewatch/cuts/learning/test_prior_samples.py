@@ -15,6 +15,8 @@ from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
 
+pytestmark = pytest.mark.quick
+
 KR_OVER_KT = FactorRange(0.5, 1.1)
 
 

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
 
+pytestmark = pytest.mark.quick
+
 Floats = NDArray[np.float64]
 RATE, TURN = 25600.0, 0.005
 PIECE = 0.02

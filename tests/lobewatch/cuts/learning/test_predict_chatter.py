@@ -15,6 +15,8 @@ from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tool.assembly import Assembly
 from modal import Mode
 
+pytestmark = pytest.mark.quick
+
 SLOT = Cut(teeth=3, immersion=0.4, direction="down", tangential=1.4e9, radial=5e8)
 X, Y = [Mode(1400.0, 0.03, 2.5e7)], [Mode(1713.0, 0.03, 6e7)]
 TAPPED = Assembly("A", datetime(2026, 1, 1, tzinfo=UTC), "t1", X, Y, ("x", "y"), None, {}, False, ())

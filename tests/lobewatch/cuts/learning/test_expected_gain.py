@@ -15,6 +15,8 @@ from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.expected_gain import CutGrid, LimitCharts, floor_depth
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
+pytestmark = pytest.mark.quick
+
 Floats = NDArray[np.float64]
 SPEEDS = np.array([6000.0, 9000.0, 9100.0, 12000.0, 15000.0])
 

@@ -10,6 +10,8 @@ import pytest
 from lobewatch.cuts.chatter_detection.harmonic_grid import find_sideband_families, refine_speed
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
 
+pytestmark = pytest.mark.quick
+
 TURN, CHATTER, BIN = 201.2837, 1712.3, 0.8
 MULTIPLES = (4, 8, 12, 16)
 ABOVE, BELOW = (0, 4, 8), (12, 16, 20)

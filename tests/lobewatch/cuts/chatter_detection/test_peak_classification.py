@@ -10,6 +10,8 @@ from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import PeaksByOrigin, classify_peaks, is_in_air
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
 
+pytestmark = pytest.mark.quick
+
 Floats = NDArray[np.float64]
 RATE, BIN, TURN, TEETH = 25600.0, 1.0, 200.0, 4
 TURNING = SpindleSpeed(TURN, 1e-4, 1.0, 9, 0.0)

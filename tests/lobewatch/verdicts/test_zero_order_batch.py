@@ -13,6 +13,8 @@ from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 from modal import Mode
 
+pytestmark = pytest.mark.quick
+
 X = [Mode(1713.0, 0.029, 3.5e7), Mode(2400.0, 0.02, 9e7, phase_deg=20.0)]
 Y = [Mode(1400.0, 0.035, 2.5e7)]
 SPEEDS = np.geomspace(4000, 24000, 60)

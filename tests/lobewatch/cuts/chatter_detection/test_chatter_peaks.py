@@ -10,6 +10,8 @@ import pytest
 from lobewatch.cuts.chatter_detection.peak_classification import find_chatter_peaks
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
 
+pytestmark = pytest.mark.quick
+
 BIN, TEETH = 0.8, 800.0
 """Bin and tooth frequency (Hz)."""
 

@@ -23,6 +23,8 @@ from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
 
+pytestmark = pytest.mark.quick
+
 TEETH = 800.0
 """Tooth frequency of a slot at 12 000 rpm (Hz)."""
 CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0)

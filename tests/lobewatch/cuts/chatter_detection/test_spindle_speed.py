@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.spindle_speed import find_speed_by_votes
 
+pytestmark = pytest.mark.quick
+
 RATE, BIN, TURN = 25600.0, 0.8, 201.2837
 EMPTY: NDArray[np.float64] = np.zeros(0)
 SPECTRUM = Spectrum(EMPTY, EMPTY, EMPTY, BIN, RATE)

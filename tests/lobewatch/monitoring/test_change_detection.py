@@ -16,6 +16,7 @@ def steady(seed: int, count: int, scatter: float = 0.3) -> Floats:
     return np.random.default_rng(seed).normal(0, scatter, count)
 
 
+@pytest.mark.quick
 def test_a_fall_stays_open_as_long_as_it_is_there() -> None:
     for seed in range(20):
         y = steady(seed, 60, 0.1)
@@ -25,6 +26,7 @@ def test_a_fall_stays_open_as_long_as_it_is_there() -> None:
         assert 1.0 < fall.change.size < 3.0
 
 
+@pytest.mark.quick
 def test_two_bad_clampings_and_then_fourteen_good_ones_close_their_alarm() -> None:
     for seed in range(20):
         y = steady(seed, 36)
@@ -40,6 +42,7 @@ def test_two_bad_clampings_and_then_fourteen_good_ones_close_their_alarm() -> No
         assert not after.needs_repeat
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("rise", "fall"), [(1.5, 1.0), (3.0, 2.8)])
 def test_a_rise_that_nobody_reported_does_not_hide_the_fall_after_it(rise: float, fall: float) -> None:
     late = []
@@ -53,6 +56,7 @@ def test_a_rise_that_nobody_reported_does_not_hide_the_fall_after_it(rise: float
     assert np.mean(np.array(late) < 12) >= 0.95
 
 
+@pytest.mark.quick
 def test_a_rise_by_half_of_a_fall_closes_no_alarm() -> None:
     for seed in range(20):
         y = steady(seed, 60)
@@ -61,6 +65,7 @@ def test_a_rise_by_half_of_a_fall_closes_no_alarm() -> None:
         assert detect_changes(Readings(y)).open_drops[0].triggered_at < 24
 
 
+@pytest.mark.quick
 def test_scores_are_those_of_the_watch_of_the_time() -> None:
     y = steady(5, 60)
     y[24:] += 3.0
@@ -70,6 +75,7 @@ def test_scores_are_those_of_the_watch_of_the_time() -> None:
     np.testing.assert_array_equal(seen.scores[begin:], monitor_drops(Readings(y[begin - 1 :])).scores[1:])
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("count", [0, 1, 8, 9])
 def test_a_short_series_sees_nothing(count: int) -> None:
     seen = detect_changes(Readings(np.zeros(count)))

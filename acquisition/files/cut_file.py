@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +23,13 @@ from acquisition.files.hdf5_file import (
     has_valid_checksum,
     open_hdf5,
 )
+from acquisition.files.raw_hits import HDF5_COMPRESSION, choose_code_type, read_channel, write_channel, write_dataset
 
 if TYPE_CHECKING:
     import h5py
 
 CUT_FORMAT_NAME = "lobewatch-cut"
 CUT_FORMAT_VERSION = 1
-CUT_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True, "chunks": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,14 +108,13 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
         file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
         if signal.codes is not None and signal.channel is not None:
-            word = np.int16 if signal.channel.adc_bits <= 16 else np.int32
-            _write_dataset(file, "codes", signal.codes.astype(word), "ADC code")
-            settings = {field.name: getattr(signal.channel, field.name) for field in fields(Channel)}
-            file["codes"].attrs.update(settings)
+            codes = signal.codes.astype(choose_code_type([signal.channel]))
+            _write_compressed(file, "codes", codes, "ADC code")
+            write_channel(file["codes"].attrs, signal.channel)
         else:
-            _write_dataset(file, "acceleration", signal.acceleration, "m/s^2")
+            _write_compressed(file, "acceleration", signal.acceleration, "m/s^2")
         if signal.speed_rpm is not None:
-            _write_dataset(file, "speed", signal.speed_rpm, "rpm")
+            _write_compressed(file, "speed", signal.speed_rpm, "rpm")
     content = append_checksum(memory.getvalue())
     atomic_write(path, content)
     return content
@@ -142,16 +141,11 @@ def _read_signal(file: h5py.File) -> CutSignal:
     if "acceleration" in file:
         sensor = str(file.attrs.get("sensor", "accelerometer"))
         speed = file["speed"][()] if "speed" in file else None
-        signal = CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload, sensor=sensor)
-        return replace(signal, speed_rpm=speed)
-    codes = file["codes"]
-    settings = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
-    channel = Channel(
-        **{name: value.item() if isinstance(value, np.generic) else value for name, value in settings.items()}
-    )
-    values = codes[()].astype(np.int32)
-    return CutSignal(values * channel.scale, rate, values, channel, lost, overload)
+        return CutSignal(file["acceleration"][()], rate, None, None, lost, overload, sensor, speed)
+    channel = read_channel(file["codes"].attrs)
+    codes = file["codes"][()].astype(np.int32)
+    return CutSignal(codes * channel.scale, rate, codes, channel, lost, overload)
 
 
-def _write_dataset(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
-    file.create_dataset(name, data=values, **CUT_COMPRESSION if values.size else {}).attrs["units"] = unit
+def _write_compressed(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
+    write_dataset(file, name, values, unit, **HDF5_COMPRESSION | {"chunks": True} if values.size else {})

@@ -28,7 +28,9 @@ def test_a_gap_in_a_column_that_is_used_is_refused_with_its_place(
     tmp_path: Path, separator: str, column: int, name: str
 ) -> None:
     path = put(tmp_path / "a.csv", cells_of(separator, (40, column, "")))
-    assert complaint(path).startswith(f"{name} is empty in line 42; mend it there, or leave {name} out of --columns")
+    assert complaint(path).startswith(
+        f"{name} is empty in line 42; mend it there, or leave {name} out of Description.columns"
+    )
 
 
 @pytest.mark.parametrize("text", ["", "overflow", "1,234"])
@@ -79,7 +81,9 @@ def test_numbers_beside_the_first_rows_are_notes_where_all_rows_have_as_many_cel
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
     text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
     path = put(tmp_path / "a.csv", text)
-    assert complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (--response 1)"
+    assert (
+        complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (Description.response 1)"
+    )
     assert read_hits(path, Description(response=1))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
     assert "Acc y is empty in line 9" in complaint(path, response=2)
 

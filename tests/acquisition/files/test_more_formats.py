@@ -65,7 +65,7 @@ def test_a_hammer_against_the_axis_turns_the_frf_round(tmp_path: Path) -> None:
 
 def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None:
     path = uff_with(tmp_path / "a.uff", unit="NONE")
-    assert "--unit" in inspect_file(path).problems
+    assert "Description.unit" in inspect_file(path).problems
     assert "a unit of displacement" in inspect_file(path, Description(unit="m/N")).problems
     assert read_frf(path, Description(unit="g/N")).accelerance == pytest.approx(9.80665 * H[1:], rel=1e-10)
     system = (
@@ -140,7 +140,7 @@ def test_signal_calc_has_the_frequency_in_the_first_column(tmp_path: Path) -> No
 def test_vectors_over_time_with_a_rate(tmp_path: Path) -> None:
     force, acceleration = np.sin(np.arange(50.0)), np.cos(np.arange(50.0))
     scipy.io.savemat(tmp_path / "a.mat", {"fs": 2048.0, "force": force, "acc": acceleration})
-    assert "--force-unit" in inspect_file(tmp_path / "a.mat").problems
+    assert "Description.force_unit" in inspect_file(tmp_path / "a.mat").problems
     (hit,) = read_hits(tmp_path / "a.mat", Description(unit="g", force_unit="lbf"))
     assert hit.sample_rate == 2048
     assert hit.force == pytest.approx(force * 4.4482216152605)
@@ -152,7 +152,7 @@ def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
     top = 1 if kind is np.float32 else -float(np.iinfo(kind).min)
     scipy.io.wavfile.write(tmp_path / "a.wav", 48000, (shares * top).astype(kind))
     assert (
-        "--full-scale 500,50"
+        "Description.full_scale 500,50"
         in inspect_file(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).problems
     )
     said = Description(columns=("force [N]", "acceleration [m/s^2]"), full_scale=(500.0, 50.0))

@@ -118,7 +118,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
-    >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
+    >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # mass of 2 kg
     >>> round(float((s_fx[10] / s_ff[10]).real), 6)  # 1/kg
     0.5
     """
@@ -339,7 +339,7 @@ def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Co
 def propagate_force_noise_through(
     rows: Complexes | Floats, hits: Sequence[Hit], frequency: Floats
 ) -> Iterator[Complexes]:
-    """Yield the result of linear maps (k, n) of each array of `propagate_force_noise` without making it: (k, samples + 1)."""
+    """Yield linear maps (k, n) of each array of `propagate_force_noise`, shape (k, samples + 1), without that array."""
     parts = [window_force(hit) for hit in hits]
     time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
     waves = np.exp(-2j * np.pi * np.outer(frequency, time))

@@ -1,4 +1,4 @@
-"""Hits in HDF5: their set-up, ADC codes or samples, and the verdict on each."""
+"""Write and read hits in HDF5: settings, ADC codes or samples, and the faults of each."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ HDF5_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": Tru
 
 
 class HitSettings(NamedTuple):
-    """What all hits of a test are recorded with."""
+    """Settings that all hits of a test share."""
 
     sample_rate: float
-    """Samples a second (Hz)."""
+    """Sample rate (Hz)."""
     pre_trigger: int
     """Samples before the trigger."""
     channels: tuple[Channel, ...]
@@ -31,7 +31,6 @@ class HitSettings(NamedTuple):
 
     @classmethod
     def from_hit(cls, hit: Hit) -> HitSettings:
-        """That of a hit."""
         return cls(hit.sample_rate, hit.pre_trigger, (hit.channels or ()) if hit.codes is not None else ())
 
 

@@ -38,6 +38,21 @@ class Event:
     """Time of the event, in scans since the start of the stream."""
 
 
+class ClosedOnExit:
+    """Context manager that closes itself at the end."""
+
+    def close(self) -> None:
+        """Close it."""
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+
 class Source(Protocol):
     """A stream of scans from one device, one file or one simulation."""
 

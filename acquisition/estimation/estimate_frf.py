@@ -25,10 +25,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """Estimate the averaged FRF of hits with coherence and usable band.
 
     H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), and Hv is their geometric mean with
-    the
-    phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to zero
-    after
-    its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
+    the phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to
+    zero after its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
 
     Parameters
     ----------
@@ -208,8 +206,7 @@ class RunningMean:
         """Whether more hits would hardly change the peak.
 
         There are at least MIN_CONVERGED_HITS hits, and the rms of the random error sqrt((1 - g2) / (2 n g2)) over the
-        lines near
-        the highest peak is below MAX_CONVERGED_ERROR.
+        lines near the highest peak is below MAX_CONVERGED_ERROR.
         """
         return len(self.hits) >= MIN_CONVERGED_HITS and self.peak_error < MAX_CONVERGED_ERROR
 
@@ -321,8 +318,7 @@ def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Co
     ndarray, shape (n, samples + 1)
         For each hit the errors of the samples in its force window. The last column is that of the mean of the baseline,
         which is subtracted from all samples. Each column has an independent real factor of variance one, and is smooth
-        over
-        lines closer than one over the window's length.
+        over lines closer than one over the window's length.
 
     Raises
     ------

@@ -25,9 +25,8 @@ def infer_averages(frf: Frf) -> int | None:
     """Infer the number of averaged hits from the scatter of an FRF and its coherence.
 
     The coherence gives the scatter of single hits, |H|^2 (1 - g2)/g2. The mean of n hits scatters by 1/n of that, which
-    third
-    differences of neighbouring lines show. The noise of neighbouring lines is assumed independent: a Hann window or
-    interpolated lines make the answer too large. Its error is about 15 % with 500 lines.
+    third differences of neighbouring lines show. The noise of neighbouring lines is assumed independent: a Hann window
+    or interpolated lines make the answer too large. Its error is about 15 % with 500 lines.
 
     Parameters
     ----------
@@ -82,10 +81,8 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
     """Infer an exponential window over responses that nobody stated.
 
     No ringing after a hit can make its end quieter than before the hit, but a window does. The noise is that of
-    differences
-    of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to that of the
-    last
-    tenth. An end of zeros is padding and shows nothing.
+    differences of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to
+    that of the last tenth. An end of zeros is padding and shows nothing.
 
     Parameters
     ----------
@@ -128,8 +125,7 @@ def infer_recorded_share(frf: Frf) -> float:
     """Infer which share of one over the line spacing was recorded; the rest is zero padding.
 
     The lines of a padded record are closer than one over its length, and its impulse response with its noise ends at
-    once
-    where the zeros begin. Ringing falls no faster there than before. An unevenly spaced axis shows nothing.
+    once where the zeros begin. Ringing falls no faster there than before. An unevenly spaced axis shows nothing.
 
     Parameters
     ----------
@@ -180,10 +176,8 @@ def is_smoothed(frf: Frf) -> bool:
     """Return whether lines were smoothed over their neighbours, as a mean over them or a Hann window does.
 
     Smoothing lines means a window over the impulse response that falls away from the hit on both sides. Ringing decays
-    after
-    the hit and noise is the same everywhere, so nothing else leaves more just before the hit than half a record away.
-    Only an
-    evenly spaced axis with noise shows it.
+    after the hit and noise is the same everywhere, so nothing else leaves more just before the hit than half a record
+    away. Only an evenly spaced axis with noise shows it.
 
     Parameters
     ----------

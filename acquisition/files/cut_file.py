@@ -63,8 +63,7 @@ class CutSignal:
         """Whether each sample is clipped, shape (n,).
 
         A sample is clipped at a rail of its converter, or in three equal extreme values in a row where there are no
-        codes. All
-        are where the device reported an overload. With several responses, any of them counts.
+        codes. All are where the device reported an overload. With several responses, any of them counts.
         """
         if self.overload or not self.acceleration.size:
             return np.full(self.acceleration.shape[-1], self.overload)

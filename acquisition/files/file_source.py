@@ -7,8 +7,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -17,7 +15,7 @@ from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 REPLAY_QUIET_TIME = 1.0
 """Time without a hit before, between and after the hits (s)."""
@@ -27,15 +25,13 @@ REPLAY_ADC_BITS = 24
 """Resolution of the virtual converter for recordings without codes (bits)."""
 
 
-class FileSource:
+class FileSource(ClosedOnExit):
     """Source of the hits of a recording, with quiet between them.
 
     Codes are those of the recording, bit by bit, and so are lost scans and reported overloads. A recording without
-    codes (LVM,
-    text) passes a virtual converter of 24 bits whose rail is the largest value in the file: its steps are 1e-7 of that,
-    and a
-    value at a rail for long is an overload, as it was before. The quiet is the recording's own noise before a pulse,
-    repeated.
+    codes (LVM, text) passes a virtual converter of 24 bits whose rail is the largest value in the file: its steps are
+    1e-7 of that, and a value at a rail for long is an overload, as it was before. The quiet is the recording's own
+    noise before a pulse, repeated.
     """
 
     follows_clock = False
@@ -72,14 +68,6 @@ class FileSource:
         """It tells of no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def start(self) -> None:
         """Start at the first hit."""

@@ -1,8 +1,7 @@
 """Tap tests as HDF5 files, one file per test, written whole and never rewritten.
 
 A file is built in memory, written to a temporary name, synced and renamed, so that a file of this name is always
-complete.
-Every dataset has a `units` attribute. There are no pickles, so that h5dump, MATLAB and Julia read it.
+complete. Every dataset has a `units` attribute. There are no pickles, so that h5dump, MATLAB and Julia read it.
 """
 
 from __future__ import annotations

@@ -157,8 +157,7 @@ def encode_uff_frf(frf: Frf, labels: ExportLabels) -> bytes:
     """Encode the FRF as function type 4 and its coherence as type 6.
 
     Values have 12 digits, the abscissa 6 as the format demands. All digits of its step are in a line of identification,
-    from
-    which lobewatch reads it. Source: SDRC Universal File Formats 58, 151, 164.
+    from which lobewatch reads it. Source: SDRC Universal File Formats 58, 151, 164.
     """
     values, _ = convert_to_measured_form(frf)
     ordinate = _UFF_ORDINATES[frf.measured_as]

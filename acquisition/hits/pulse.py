@@ -122,8 +122,7 @@ def window_force(hit: Hit) -> WindowedForce:
     """Return the pulse with one pulse width on either side, tapered to zero over one more (raised cosine).
 
     A tight window matters: noise inside it is alike at neighbouring lines, and shifts the mode. The result is cached
-    per
-    hit. Raises ValueError for a hit without a pulse.
+    per hit. Raises ValueError for a hit without a pulse.
     """
     if hit not in _windowed_forces:
         _windowed_forces[hit] = _compute_windowed_force(hit)

@@ -35,7 +35,8 @@ MAX_RATE_DIFFERENCE = 1e-4
 MAX_TIME_DEVIATION = 0.05
 """Largest distance of a time from an even axis, in steps: 9 degrees of phase at half the sample rate.
 
-Seven printed digits at 51.2 kHz are off by 0.003, single precision by 0.012 after 4 s, a lost sample by 0.5 or more."""
+Seven printed digits at 51.2 kHz are off by 0.003, single precision by 0.012 after 4 s, a lost sample by 0.5 or more.
+"""
 MIN_UNEVEN_STEPS = 20
 """Smallest number of uneven steps where few digits are the reason; a lost sample makes one."""
 

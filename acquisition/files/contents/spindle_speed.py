@@ -26,8 +26,7 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
     """Return the spindle speed at each sample (rpm), shape (n,), from a tachometer signal of any unit, shape (n,).
 
     The speed is constant from one turn to the next. It is NaN before the first turn, after the last, and where a pulse
-    is
-    missing. Its mean over time is the number of turns over their time.
+    is missing. Its mean over time is the number of turns over their time.
 
     Parameters
     ----------

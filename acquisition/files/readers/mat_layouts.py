@@ -2,10 +2,8 @@
 
 Seen in public files: vectors by name (`Freq_domain`, `Hf_chan_2`, `Hf_coh_chan_2`, `Time_chan_1`), matrices of a logger
 (`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), SigLab (`SLm`),
-structs
-of Test.Lab (`x_values`, `y_values`), and our own. An FRF is taken before signals over time: it is the average of the
-hits,
-they are one of them. `Description.columns` can take them all the same.
+structs of Test.Lab (`x_values`, `y_values`), and our own. An FRF is taken before signals over time: it is the average
+of the hits, they are one of them. `Description.columns` can take them all the same.
 """
 
 from __future__ import annotations
@@ -66,10 +64,9 @@ def read_siglab(v: Mapping[str, Any]) -> Contents | None:
     """Read SigLab (.vna, DSP Technology): FRFs in volts over volts, returned in the units of their channels.
 
     `SLm` holds the frequencies (fdxvec), a cell for each reference and response (xcmeas) and the channels (scmeas) with
-    units
-    for each volt (euscale_fac). Public files show that these are not yet in its transfer functions (xfer): an
-    accelerometer
-    and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md). None for other programs.
+    units for each volt (euscale_fac). Public files show that these are not yet in its transfer functions (xfer): an
+    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md). None for
+    other programs.
     """
     measured = v.get("SLm")
     if not isinstance(measured, Mapping) or not {"fdxvec", "xcmeas", "scmeas"} <= measured.keys():
@@ -146,8 +143,7 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     """Read SignalCalc: the abscissa is the first column, channel 1 is the hammer.
 
     Next to its FRFs are the signals of the last hit, before the window, for `Description.columns`; without FRFs they
-    are that
-    hit.
+    are that hit.
     """
     units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]

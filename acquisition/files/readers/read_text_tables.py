@@ -1,12 +1,10 @@
 """Read text tables of numbers and B&K PULSE text.
 
 The separator (tab, semicolon, comma, blanks), the decimal comma and the columns of a table are found from its rows.
-Lines
-above them are headings, of any number. The nearest with a word for each column names columns and units,
+Lines above them are headings, of any number. The nearest with a word for each column names columns and units,
 `time_s,force_N,acceleration_g`, `Time (s);Force [N];Acc [m/s^2]`, `Freq (Hz) Real (um/N) Imag (um/N)`, or a line of
-units
-is below the names. Lines that begin with # may say `key: value`. Some tap-test programs (.frf) write the heading behind
-the first row. Complex numbers are read as Python, MATLAB and Fortran write them.
+units is below the names. Lines that begin with # may say `key: value`. Some tap-test programs (.frf) write the heading
+behind the first row. Complex numbers are read as Python, MATLAB and Fortran write them.
 
 B&K PULSE exports a header of keys and values, then blocks of rows: index, abscissa and value, two numbers where it is
 complex. The header names the function and its unit, the unit of the abscissa, and the number of rows of a block.

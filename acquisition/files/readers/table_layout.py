@@ -162,8 +162,7 @@ def find_heading_above(lines: Sequence[str], form: RowLayout, width: int) -> Hea
     """Find the names and units above a table.
 
     The nearest line with a word for each column, most of them known, has the names. A line of units has the units.
-    Empty
-    where no line has so many words. width: words of a row.
+    Empty where no line has so many words. width: words of a row.
     """
     lines = [_COMMENT_MARK.sub("", line) for line in lines]
     by_line = [words for line in reversed(lines) if (words := _split_words(line, form, width))]

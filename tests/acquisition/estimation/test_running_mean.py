@@ -38,7 +38,7 @@ def mean_of(hits: list[Hit]) -> RunningMean:
 
 
 def pulse(scale: float, noise: float = 0.0, seed: int = 0) -> Hit:
-    """A hit on a structure that answers each force sample with `scale` times it, 3 samples later, plus noise."""
+    """Make a hit on a structure that answers each force sample with `scale` times it, 3 samples later, plus noise."""
     force = np.zeros(1024)
     force[100:108] = 20, 70, 100, 80, 50, 26, 11, 4
     random = np.random.default_rng(seed).normal(scale=noise, size=1024) if noise else np.zeros(1024)

@@ -15,7 +15,7 @@ HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
 
 
 def cells_of(separator: str, *changed: tuple[int, int, str], ends: Sequence[int] = (400, 400, 400, 400)) -> str:
-    """The hit and a temperature, some cells (row, column, text) changed, each column up to its end."""
+    """Write the hit and a temperature with some cells (row, column, text) changed, each column up to its end."""
     cells = [[cell if i < end else "" for cell, end in zip(row, ends, strict=True)] for i, row in enumerate(HIT)]
     for row, column, text in changed:
         cells[row][column] = text

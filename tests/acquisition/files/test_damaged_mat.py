@@ -83,7 +83,7 @@ SOUND = sound_files()
 
 
 def damaged(content: bytes, chance: random.Random) -> bytes:
-    """A sound file with one kind of damage."""
+    """Return a sound file with one kind of damage."""
     spoilt, size = bytearray(content), len(content)
     kind = chance.choice(("bit", "bits", "cut", "zeros", "length", "length", "length", "moved"))
     if kind in ("bit", "bits"):
@@ -151,7 +151,7 @@ def forks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Forks]:
 
 
 def outcome(path: Path) -> str:
-    """What becomes of a file."""
+    """Return how a file was read."""
     try:
         if inspect_file(path).problems:
             return "asked about"

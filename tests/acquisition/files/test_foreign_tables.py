@@ -179,8 +179,7 @@ SEPARATORS = ("\t", ";", ",", " ", " \t ", "   ")
 
 @st.composite
 def layouts(draw: st.DrawFn) -> tuple[str, bool, bool]:
-    """A table of frequency, real and imaginary part as somebody may write it; whether it says what they are, and
-    whether an index stands before them."""
+    """Draw a table of frequency, real and imaginary part, whether it names them, and whether an index comes first."""
     separator = draw(st.sampled_from(SEPARATORS))
     comma = separator != "," and draw(st.booleans())
     form = draw(st.sampled_from(["%.9e", "%16.8e", "%.12g", "%+.9E"]))

@@ -23,7 +23,7 @@ H = 1e-6 / (1 + 0.2j * F)
 
 
 def uff_with(path: Path, *, binary: bool = False, unit: str = "m/s^2", direction: tuple[int, int] = (1, 1)) -> Path:
-    """An accelerance of H, as the format has it; binary: little endian, double."""
+    """Write an accelerance of H as the format demands; binary: little endian, double."""
     pairs = np.stack([H.real, H.imag], axis=1).ravel()
     body = pairs.astype("<f8").tobytes() if binary else b"\n".join(b"%20.11E" % v for v in pairs) + b"\n"
     first = f"    58b     1     2{11:12d}{len(body):12d}     0     0           0           0" if binary else "    58"
@@ -76,7 +76,7 @@ def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None
 
 
 def mat_73(path: Path, variables: dict[str, Any]) -> Path:
-    """A file as MATLAB -v7.3 writes it: HDF5 behind a header of 512 bytes, transposed, complex as pairs."""
+    """Write a file as MATLAB -v7.3 does: HDF5 behind a header of 512 bytes, transposed, complex as pairs."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in variables.items():
             values = np.atleast_2d(value).T
@@ -258,7 +258,7 @@ def test_a_frequency_that_is_there_twice_is_refused(tmp_path: Path) -> None:
 
 
 def one_of_each(folder: Path) -> dict[str, Path]:
-    """A small sound file of each format."""
+    """Write a small sound file of each format."""
     generator = np.random.default_rng(1)
     hit = Hit(generator.normal(size=60), generator.normal(size=60), 1000.0)
     made = {}

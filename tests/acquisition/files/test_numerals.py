@@ -20,7 +20,7 @@ THOUSANDS = {
 
 @st.composite
 def grouped_tables(draw: st.DrawFn) -> tuple[str, np.ndarray, str]:
-    """A hit in some layout with thousands apart, its force, and how the text is encoded."""
+    """Draw a hit with separated thousands in some layout, its force, and the encoding of the text."""
     decimal = draw(st.sampled_from([".", ","]))
     thousands = draw(st.sampled_from(THOUSANDS[decimal]))
     separator = draw(st.sampled_from(["\t", ";", ","]))
@@ -57,7 +57,7 @@ def test_thousands_apart_between_blanks(tmp_path: Path, decimal: str, thousands:
 
 
 def doubtful(decimal: str, force: str, *others: str) -> str:
-    """A hit whose forces are all written so, but for some; its time and acceleration with this decimal sign."""
+    """Write a hit with ambiguous forces but for some; its time and acceleration have this decimal sign."""
     forces = [*others, *[force] * (len(HIT) - len(others))]
     lines = [f"{t};{cell};{a}".replace(".", decimal) for (t, _, a, _), cell in zip(HIT, ["@"] * len(HIT), strict=True)]
     return "Time (s);Force (N);Acc (g)\n" + "".join(

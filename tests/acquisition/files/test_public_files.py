@@ -88,7 +88,7 @@ def test_a_uff_frf_with_signs_that_are_no_ascii() -> None:
 
 
 def lengthened(name: str, n: int) -> str:
-    """An LVM file with so many rows, as its header says."""
+    """Write an LVM file with as many rows as its header states."""
     text = (DATA / "lvm_read" / name).read_text("latin-1")
     head, rows = text.rsplit("X_Value", 1)[0], text.rsplit("X_Value", 1)[1].splitlines()
     values = [row for row in rows[1:] if row.strip()]

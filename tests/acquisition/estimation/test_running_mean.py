@@ -19,6 +19,8 @@ from acquisition import (
     estimate_frf,
 )
 
+pytestmark = pytest.mark.quick
+
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]

@@ -9,6 +9,8 @@ import pytest
 
 from acquisition import DataError, Description, HitFlags, check_hit, inspect_file, read_frf, read_hits, read_recording
 
+pytestmark = pytest.mark.quick
+
 N = 2000
 RATE = 5000.0
 TIME = np.arange(N) / RATE

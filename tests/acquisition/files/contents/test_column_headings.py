@@ -11,6 +11,8 @@ from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, ro
 
 from acquisition import DataError, Description, inspect_file, read_frf, read_recording
 
+pytestmark = pytest.mark.quick
+
 
 def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
     heading = "Freq (Hz),Real (m/N),Imag (m/N)\n"

@@ -11,6 +11,8 @@ from written_tables import FORCE, HIT, RESPONSE, F, H, complaint, is_h, numeral,
 from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
 from acquisition.files.read_cut import read_cut_recording
 
+pytestmark = pytest.mark.quick
+
 HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
 
 

@@ -163,7 +163,7 @@ def infer_recorded_share(frf: Frf) -> float:
 MIN_SMOOTHING_LINES = 128
 """Smallest number of lines."""
 NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN = (0.85, 0.95), (0.45, 0.55)
-"""Span of time, as shares of the record, half a record away from the hit."""
+"""Spans of time, as shares of the record: just before the hit comes round again, and half a record away from it."""
 SMOOTHING_NOISE_RATIO = 2.0
 """Noise near the hit over that far from it from which lines were smoothed; three smoothed lines give 2.3 or more."""
 MAX_PRE_HIT_SHARE = 0.1

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 TAP_FORMAT_NAME = "lobewatch-tap"
 TAP_FORMAT_VERSION, TAP_FORMAT_VERSION_WITHOUT_FORCE = 1, 2
-"""Version of a file without force and FRF, which older programs cannot read."""
+"""Version of a file, and of one without force and FRF, which older programs cannot read."""
 SOURCE_CHUNK_SIZE = 1_000_000
 """Number of bytes of a replayed file that are packed together."""
 

@@ -1,8 +1,4 @@
-"""Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file.
-
-Values have 12 digits, the abscissa 6 as the format has it; all digits of its step stand in a line of identification,
-from which lobewatch reads it back. Source: SDRC Universal File Formats 58, 151, 164.
-"""
+"""Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file."""
 
 from __future__ import annotations
 

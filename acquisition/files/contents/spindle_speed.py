@@ -13,7 +13,7 @@ from acquisition.files.contents.description import Description, ImportReport
 from acquisition.files.contents.units import parse_unit
 
 PULSE_ON_LEVEL, PULSE_OFF_LEVEL = 0.6, 0.4
-"""Level of the signal, as a share of its range, below which a pulse ends."""
+"""Levels of the signal, as shares of its range, above which a pulse begins and below which it ends; chosen."""
 MAX_TURN_RATIO = 1.4
 """Ratio of the time of a turn to that of its neighbours, or its inverse, from which pulses are missing or too many."""
 MIN_REGULAR_TURNS_SHARE = 0.8

@@ -281,7 +281,7 @@ class RunningMean:
         """
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
-        for remaining in kept:  # anew: subtraction would leave its rounding errors
+        for remaining in kept:  # a subtraction would leave its rounding errors
             self.add(remaining)
 
     def _others(self, hit: Hit) -> list[Hit]:

@@ -78,7 +78,7 @@ MIN_WINDOW_SAMPLES = 32
 
 
 def infer_window(hits: Sequence[Hit]) -> float | None:
-    """Infer an exponential window over responses that nobody stated.
+    """Infer an unstated exponential window over responses.
 
     No ringing after a hit can make its end quieter than before the hit, but a window does. The noise is that of
     differences of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to
@@ -145,12 +145,9 @@ def infer_recorded_share(frf: Frf) -> float:
     >>> round(infer_recorded_share(Frf(np.arange(1.0, 1000.0), spectrum)), 1)
     0.5
     """
-    frf = frf.in_band(frf.usable_band)
-    frequency, steps = frf.frequency, np.diff(frf.frequency)
-    if frequency.size < MIN_PADDING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+    response = _compute_impulse_response(frf, MIN_PADDING_LINES)
+    if response is None:
         return 1.0
-    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
-    response = np.abs(np.fft.ifft(frf.accelerance * taper))
     levels = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response, TIME_PARTS)])
     for end in range(3, TIME_PARTS - 4):
         last, zeros = levels[end - 1], np.max(levels[end + 1 : -2])
@@ -193,18 +190,22 @@ def is_smoothed(frf: Frf) -> bool:
     ----------
     Bendat & Piersol, Random Data, ch. 11 (smoothing over frequency as a window over lag).
     """
-    frf = frf.in_band(frf.usable_band)
-    frequency, steps = frf.frequency, np.diff(frf.frequency)
-    if frequency.size < MIN_SMOOTHING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+    response = _compute_impulse_response(frf, MIN_SMOOTHING_LINES)
+    if response is None:
         return False
-    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
-    response = np.abs(np.fft.ifft(frf.accelerance * taper)) ** 2
+    power, n = response**2, response.size
     near, far = (
-        float(np.mean(response[_make_span_slice(share, response.size)])) for share in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
+        float(np.mean(power[round(begin * n) : round(end * n)])) for begin, end in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
     )
-    leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * response.size) ** -10
-    return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(response) < MAX_PRE_HIT_SHARE**2)
+    leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * n) ** -10
+    return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(power) < MAX_PRE_HIT_SHARE**2)
 
 
-def _make_span_slice(share: tuple[float, float], size: int) -> slice:
-    return slice(round(share[0] * size), round(share[1] * size))
+def _compute_impulse_response(frf: Frf, min_lines: int) -> Floats | None:
+    """Return the size of the tapered impulse response in the usable band; None for few or uneven lines."""
+    frf = frf.in_band(frf.usable_band)
+    steps = np.diff(frf.frequency)
+    if frf.frequency.size < min_lines or np.ptp(steps) > 1e-3 * steps[0]:
+        return None
+    taper = np.hanning(frf.frequency.size + 2)[1:-1] ** 2
+    return np.asarray(np.abs(np.fft.ifft(frf.accelerance * taper)))

@@ -70,8 +70,8 @@ def append_checksum(content: bytes) -> bytes:
 
 def has_wrong_checksum(content: bytes) -> bool:
     """Return whether a file has a checksum that differs: one flipped bit can make HDF5 hang or crash."""
-    seal = content[-CHECKSUM_SIZE:]
-    return seal.startswith(CHECKSUM_MARK) and seal != _format_checksum(content[:-CHECKSUM_SIZE])
+    checksum = content[-CHECKSUM_SIZE:]
+    return checksum.startswith(CHECKSUM_MARK) and checksum != _format_checksum(content[:-CHECKSUM_SIZE])
 
 
 def has_valid_checksum(content: bytes) -> bool:

@@ -220,7 +220,7 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
         hits, flags = read_raw_hits(file)
         if "beside" in file:
             pairs = zip(hits, read_raw_hits(file["beside"])[0], strict=True)
-            hits = tuple(replace(hit, cross_hit=beside) for hit, beside in pairs)
+            hits = tuple(replace(hit, cross_hit=cross) for hit, cross in pairs)
         return hits, _read_circumstances(file), flags
 
 

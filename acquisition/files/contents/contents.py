@@ -208,10 +208,6 @@ def _make_array_signal(name: str, column: NDArray[Any]) -> Signal:
     return Signal(name, column, "frf" if column.size >= MIN_FRF_LINES else "")
 
 
-def _read_no_circumstances(_path: Path) -> None:
-    """Return None for every file."""
-
-
 @dataclass(frozen=True)
 class Format:
     """Kind of recorded file, with the functions that read it.
@@ -229,7 +225,7 @@ class Format:
     """Function that recognizes a file by its first 4096 bytes (at least one) and, where needed, all of it."""
     read: Callable[[Path], Contents | list[Hit] | Frf]
     """Function that reads a file: its contents, or hits in SI units, at least one, or an FRF, where nothing is open."""
-    read_circumstances: Callable[[Path], Circumstances | None] = _read_no_circumstances
+    read_circumstances: Callable[[Path], Circumstances | None] = lambda _path: None
     """Function that reads when, where and by whom a file was recorded; None where it does not state that."""
     read_frf: Callable[[Path], Frf] | None = None
     """Function that reads the FRF of a file that also has hits; None where it is estimated from them."""

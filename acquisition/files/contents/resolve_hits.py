@@ -29,7 +29,7 @@ HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]", in their order, o
 NO_FORCE_ADVICE = "hammer none where no force was measured"
 """Advice where a file has no force."""
 FEW_DIGITS = "its time is printed with few digits: whether samples are missing cannot be seen"
-"""Note on a time whose missing samples nobody can see."""
+"""Note on a time that cannot show missing samples."""
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
 MAX_TIME_DEVIATION = 0.05

@@ -44,42 +44,18 @@ QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
 }
 """Quantity by the exponents of length, time and force."""
 _LENGTH, _TIME, _FORCE, _DIMENSIONLESS = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
-_UNITS_BY_NAME: dict[str, tuple[float, Dimension]] = {
-    "m": (1.0, _LENGTH),
-    "cm": (1e-2, _LENGTH),
-    "mm": (1e-3, _LENGTH),
-    "um": (1e-6, _LENGTH),
-    "micron": (1e-6, _LENGTH),
-    "nm": (1e-9, _LENGTH),
-    "in": (0.0254, _LENGTH),
-    "inch": (0.0254, _LENGTH),
-    "mil": (2.54e-5, _LENGTH),
-    "ft": (0.3048, _LENGTH),
-    "s": (1.0, _TIME),
-    "sec": (1.0, _TIME),
-    "second": (1.0, _TIME),
-    "seconds": (1.0, _TIME),
-    "ms": (1e-3, _TIME),
-    "us": (1e-6, _TIME),
-    "Hz": (1.0, (0, -1, 0)),
-    "kHz": (1e3, (0, -1, 0)),
-    "rpm": (1 / 60, (0, -1, 0)),
-    "cpm": (1 / 60, (0, -1, 0)),
-    "rad": (1 / (2 * math.pi), _DIMENSIONLESS),
-    "N": (1.0, _FORCE),
-    "newton": (1.0, _FORCE),
-    "newtons": (1.0, _FORCE),
-    "daN": (10.0, _FORCE),
-    "kN": (1e3, _FORCE),
-    "mN": (1e-3, _FORCE),
-    "lbf": (POUND_FORCE, _FORCE),
-    "lb": (POUND_FORCE, _FORCE),
-    "kgf": (STANDARD_GRAVITY, _FORCE),
-    "kg": (1.0, (-1, 2, 1)),
-    "g": (STANDARD_GRAVITY, (1, -2, 0)),
-    "gal": (1e-2, (1, -2, 0)),
-    "gn": (STANDARD_GRAVITY, (1, -2, 0)),
-}
+_UNIT_GROUPS: tuple[tuple[Dimension, dict[str, float]], ...] = (
+    (_LENGTH, {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9}),
+    (_LENGTH, {"in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "ft": 0.3048}),
+    (_TIME, {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}),
+    ((0, -1, 0), {"Hz": 1.0, "kHz": 1e3, "rpm": 1 / 60, "cpm": 1 / 60}),
+    (_DIMENSIONLESS, {"rad": 1 / (2 * math.pi)}),
+    (_FORCE, {"N": 1.0, "newton": 1.0, "newtons": 1.0, "daN": 10.0, "kN": 1e3, "mN": 1e-3}),
+    (_FORCE, {"lbf": POUND_FORCE, "lb": POUND_FORCE, "kgf": STANDARD_GRAVITY}),
+    ((-1, 2, 1), {"kg": 1.0}),
+    ((1, -2, 0), {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
+)
+_UNITS_BY_NAME = {name: (factor, group) for group, units in _UNIT_GROUPS for name, factor in units.items()}
 _UNITS_BY_LOWER_NAME = {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}
 """Units in lower case. Mega and milli differ only in case: MN is unknown, and mN is known only as written."""
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")

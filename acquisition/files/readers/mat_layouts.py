@@ -148,7 +148,7 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
     hit = [(name, match[1]) for name in v if (match := re.fullmatch(r"X(\d+)", name)) and _is_pairs(v[name])]
-    over_time = list(_make_signal_calc_hit(v, hit, units, alone=not frfs))
+    over_time = list(_make_signal_calc_hit(v, hit, units, is_only_hit=not frfs))
     if not frfs:
         return Contents(tuple(over_time)) if len(hit) > 1 else None
     signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
@@ -170,18 +170,18 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
 
 
 def _make_signal_calc_hit(
-    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, alone: bool
+    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, is_only_hit: bool
 ) -> Iterator[Signal]:
     """Yield time and channels of a hit, with roles only where the file has no FRF."""
     for number, (name, channel) in enumerate(hit):
         role: Role = "force" if channel == "1" else "response"
-        record = 0 if alone else 1
-        if number == 0 or not alone:
+        record = 0 if is_only_hit else 1
+        if number == 0 or not is_only_hit:
             time = np.real(v[name][:, 0])
-            yield Signal(f"{name}:1", time, "time" if alone else "", "s", record=record, is_before_window=True)
+            yield Signal(f"{name}:1", time, "time" if is_only_hit else "", "s", record=record, is_before_window=True)
         values = np.real(v[name][:, 1])
         unit = _get_channel_text(units, channel)
-        yield Signal(f"{name}:2", values, role if alone else "", unit, record=record, is_before_window=True)
+        yield Signal(f"{name}:2", values, role if is_only_hit else "", unit, record=record, is_before_window=True)
 
 
 def _is_pairs(value: Any) -> bool:
@@ -294,11 +294,11 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
         if name != axis
     ]
     others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
-    beside = list(list_array_signals(others))
-    has_frf = any(signal.role == "frf" for signal in beside)
+    unassigned = list(list_array_signals(others))
+    has_frf = any(signal.role == "frf" for signal in unassigned)
     if not signals or (has_frf and not any(signal.role in ("force", "response") for signal in signals)):
         return None
-    return Contents((*signals, *(replace(signal, role="") for signal in beside)))
+    return Contents((*signals, *(replace(signal, role="") for signal in unassigned)))
 
 
 def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:

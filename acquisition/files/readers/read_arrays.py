@@ -59,7 +59,7 @@ NPY_SIGNATURE, ZIP_SIGNATURE = b"\x93NUMPY", b"PK\x03\x04"
 
 
 def read_numpy(path: Path) -> Contents:
-    """Read the arrays of a .npy or .npz file; raise DataError for other objects, damage, or too large an unpacked size."""
+    """Read the arrays of a .npy or .npz file; raise DataError for other objects, damage, or too large a size."""
     try:
         with path.open("rb") as file:
             return _read_numpy_file(file, path)

@@ -60,8 +60,8 @@ def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
         rows, form, heading = _find_rows(path, table, comments)
         columns = read_columns(rows, form, str(path), decimal_sign)
         signals += _name_columns(columns, heading, record)
-        beside = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
-        notes += [f"beside its columns stands {word!r} in the last row" for word in beside]
+        extras = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
+        notes += [f"beside its columns stands {word!r} in the last row" for word in extras]
     _check_complete(path, keys, rows, columns, text)
     notes += [f"below its rows stands {line!r}" for line in footer]
     return replace(_make_table_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))

@@ -241,7 +241,7 @@ def _pair_names_and_units(names: Sequence[str], units: Sequence[str], *, is_rati
     """Pair names and units; is_ratio: whether a product of units is meant as a ratio."""
     if not units:
         return [split_heading(name) for name in names]
-    said = ["" if _UNIT_LABEL.match(word) else word for word in units]
-    bare = [word.strip("()[] ") if parse_unit(word) is None else word for word in said]
+    labels = ["" if _UNIT_LABEL.match(word) else word for word in units]
+    bare = [word.strip("()[] ") if parse_unit(word) is None else word for word in labels]
     texts = [_UNIT_PRODUCT.sub(r"\1/\2", unit) if is_ratio else unit for unit in bare]
     return [(name, text.strip("-")) for name, text in zip(names, texts, strict=True)]

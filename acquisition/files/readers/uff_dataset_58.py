@@ -150,11 +150,8 @@ def _parse_point(text: str) -> tuple[str, int, int]:
 
 def _format_point(point: tuple[str, int, int]) -> str:
     name, node, direction = point
-    sign = (
-        ""
-        if not direction
-        else f"{'-' if direction < 0 else ''}{'xyz'[abs(direction) - 1] if abs(direction) < 4 else ''}"
-    )
+    axis = "xyz"[abs(direction) - 1] if 0 < abs(direction) < 4 else ""
+    sign = f"-{axis}" if direction < 0 else axis
     return " ".join(filter(None, [name, str(node) if node or sign else "", sign]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -134,15 +134,7 @@ class Frf:
                 f"{self.frequency[0]:g}..{self.frequency[-1]:g} Hz; choose a wider band inside it"
             )
         coherence = None if self.coherence is None else self.coherence[keep]
-        return Frf(
-            self.frequency[keep],
-            self.receptance[keep],
-            coherence,
-            self.n_averages,
-            self.measured_as,
-            self.usable_band,
-            self.mass_removed,
-        )
+        return replace(self, frequency=self.frequency[keep], receptance=self.receptance[keep], coherence=coherence)
 
 
 def from_accelerance(

@@ -208,8 +208,7 @@ def select_input_channels(
     """Return the index of the force channel and of the acceleration channel; only the latter where it triggers.
 
     direction: of the hit. With several accelerations, that of this direction is used (of "xy", that of y). Raises
-    DataError
-    unless there is exactly one of each that is needed.
+    DataError unless there is exactly one of each that is needed.
     """
     forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
     responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]

@@ -15,7 +15,6 @@ class NamedRecord(Protocol):
     @property
     def name(self) -> str:
         """Name of its entry point."""
-        ...
 
 
 Plugin = TypeVar("Plugin", bound=NamedRecord)

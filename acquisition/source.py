@@ -59,24 +59,19 @@ class Source(Protocol):
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Sensor on each input."""
-        ...
 
     @property
     def sample_rate(self) -> float:
         """Sample rate (Hz)."""
-        ...
 
     def start(self) -> None:
         """Start sampling; scan 0 is the next one."""
-        ...
 
     def stop(self) -> None:
         """End the stream; blocks() then ends too."""
-        ...
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks as they arrive; raise DeviceError where the device goes away or falls silent."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -112,31 +107,25 @@ class Device(Source, Protocol):
     @property
     def identity(self) -> DeviceIdentity:
         """Model, serial number and firmware."""
-        ...
 
     @property
     def follows_clock(self) -> bool:
         """Whether scans follow the clock, so that their rate can be measured."""
-        ...
 
     @property
     def loss_detection(self) -> str:
         """How lost scans are detected, in two words; empty where none can be lost."""
-        ...
 
     @property
     def events(self) -> deque[Event]:
         """Events, oldest first: take with popleft(), in any thread (IndexError: empty)."""
-        ...
 
     @property
     def fault(self) -> str:
         """Present fault, one sentence; empty without one."""
-        ...
 
     def close(self) -> None:
         """Stop, and release the port."""
-        ...
 
     def __enter__(self) -> Self: ...
 

@@ -25,10 +25,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """Estimate the averaged FRF of hits with coherence and usable band.
 
     H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), and Hv is their geometric mean with
-    the
-    phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to zero
-    after
-    its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
+    the phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to
+    zero after its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
 
     Parameters
     ----------
@@ -118,7 +116,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
-    >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
+    >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # mass of 2 kg
     >>> round(float((s_fx[10] / s_ff[10]).real), 6)  # 1/kg
     0.5
     """
@@ -208,8 +206,7 @@ class RunningMean:
         """Whether more hits would hardly change the peak.
 
         There are at least MIN_CONVERGED_HITS hits, and the rms of the random error sqrt((1 - g2) / (2 n g2)) over the
-        lines near
-        the highest peak is below MAX_CONVERGED_ERROR.
+        lines near the highest peak is below MAX_CONVERGED_ERROR.
         """
         return len(self.hits) >= MIN_CONVERGED_HITS and self.peak_error < MAX_CONVERGED_ERROR
 
@@ -284,7 +281,7 @@ class RunningMean:
         """
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
-        for remaining in kept:  # anew: subtraction would leave its rounding errors
+        for remaining in kept:  # a subtraction would leave its rounding errors
             self.add(remaining)
 
     def _others(self, hit: Hit) -> list[Hit]:
@@ -321,8 +318,7 @@ def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Co
     ndarray, shape (n, samples + 1)
         For each hit the errors of the samples in its force window. The last column is that of the mean of the baseline,
         which is subtracted from all samples. Each column has an independent real factor of variance one, and is smooth
-        over
-        lines closer than one over the window's length.
+        over lines closer than one over the window's length.
 
     Raises
     ------
@@ -339,7 +335,7 @@ def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Co
 def propagate_force_noise_through(
     rows: Complexes | Floats, hits: Sequence[Hit], frequency: Floats
 ) -> Iterator[Complexes]:
-    """Yield the result of linear maps (k, n) of each array of `propagate_force_noise` without making it: (k, samples + 1)."""
+    """Yield linear maps (k, n) of each array of `propagate_force_noise`, shape (k, samples + 1), without that array."""
     parts = [window_force(hit) for hit in hits]
     time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
     waves = np.exp(-2j * np.pi * np.outer(frequency, time))

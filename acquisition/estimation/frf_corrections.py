@@ -15,8 +15,7 @@ def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
     """Multiply force and response, without their offsets, by exp(-t/time_constant) from the hit on.
 
     With both windowed the FRF is that of the structure at a shifted frequency, H(s + 1/time_constant), exactly and for
-    any
-    length of the pulse: exp(-at) (h * f) = (exp(-at) h) * (exp(-at) f).
+    any length of the pulse: exp(-at) (h * f) = (exp(-at) h) * (exp(-at) f).
 
     Parameters
     ----------
@@ -155,8 +154,7 @@ def remove_sensor_mass(frf: Frf, mass: float) -> Frf:
     """Remove the mass of the sensor from the FRF of a driving point.
 
     The structure feels the hammer's force and -mass x acceleration of the sensor, so that 1/H = 1/H_m + mass w^2 with
-    the
-    measured receptance H_m. This does not hold where the response is not at the hammer's point.
+    the measured receptance H_m. This does not hold where the response is not at the hammer's point.
 
     Parameters
     ----------

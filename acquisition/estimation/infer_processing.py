@@ -25,9 +25,8 @@ def infer_averages(frf: Frf) -> int | None:
     """Infer the number of averaged hits from the scatter of an FRF and its coherence.
 
     The coherence gives the scatter of single hits, |H|^2 (1 - g2)/g2. The mean of n hits scatters by 1/n of that, which
-    third
-    differences of neighbouring lines show. The noise of neighbouring lines is assumed independent: a Hann window or
-    interpolated lines make the answer too large. Its error is about 15 % with 500 lines.
+    third differences of neighbouring lines show. The noise of neighbouring lines is assumed independent: a Hann window
+    or interpolated lines make the answer too large. Its error is about 15 % with 500 lines.
 
     Parameters
     ----------
@@ -79,13 +78,11 @@ MIN_WINDOW_SAMPLES = 32
 
 
 def infer_window(hits: Sequence[Hit]) -> float | None:
-    """Infer an exponential window over responses that nobody stated.
+    """Infer an unstated exponential window over responses.
 
     No ringing after a hit can make its end quieter than before the hit, but a window does. The noise is that of
-    differences
-    of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to that of the
-    last
-    tenth. An end of zeros is padding and shows nothing.
+    differences of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to
+    that of the last tenth. An end of zeros is padding and shows nothing.
 
     Parameters
     ----------
@@ -128,8 +125,7 @@ def infer_recorded_share(frf: Frf) -> float:
     """Infer which share of one over the line spacing was recorded; the rest is zero padding.
 
     The lines of a padded record are closer than one over its length, and its impulse response with its noise ends at
-    once
-    where the zeros begin. Ringing falls no faster there than before. An unevenly spaced axis shows nothing.
+    once where the zeros begin. Ringing falls no faster there than before. An unevenly spaced axis shows nothing.
 
     Parameters
     ----------
@@ -149,12 +145,9 @@ def infer_recorded_share(frf: Frf) -> float:
     >>> round(infer_recorded_share(Frf(np.arange(1.0, 1000.0), spectrum)), 1)
     0.5
     """
-    frf = frf.in_band(frf.usable_band)
-    frequency, steps = frf.frequency, np.diff(frf.frequency)
-    if frequency.size < MIN_PADDING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+    response = _compute_impulse_response(frf, MIN_PADDING_LINES)
+    if response is None:
         return 1.0
-    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
-    response = np.abs(np.fft.ifft(frf.accelerance * taper))
     levels = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response, TIME_PARTS)])
     for end in range(3, TIME_PARTS - 4):
         last, zeros = levels[end - 1], np.max(levels[end + 1 : -2])
@@ -167,7 +160,7 @@ def infer_recorded_share(frf: Frf) -> float:
 MIN_SMOOTHING_LINES = 128
 """Smallest number of lines."""
 NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN = (0.85, 0.95), (0.45, 0.55)
-"""Span of time, as shares of the record, half a record away from the hit."""
+"""Spans of time, as shares of the record: just before the hit comes round again, and half a record away from it."""
 SMOOTHING_NOISE_RATIO = 2.0
 """Noise near the hit over that far from it from which lines were smoothed; three smoothed lines give 2.3 or more."""
 MAX_PRE_HIT_SHARE = 0.1
@@ -180,10 +173,8 @@ def is_smoothed(frf: Frf) -> bool:
     """Return whether lines were smoothed over their neighbours, as a mean over them or a Hann window does.
 
     Smoothing lines means a window over the impulse response that falls away from the hit on both sides. Ringing decays
-    after
-    the hit and noise is the same everywhere, so nothing else leaves more just before the hit than half a record away.
-    Only an
-    evenly spaced axis with noise shows it.
+    after the hit and noise is the same everywhere, so nothing else leaves more just before the hit than half a record
+    away. Only an evenly spaced axis with noise shows it.
 
     Parameters
     ----------
@@ -199,18 +190,22 @@ def is_smoothed(frf: Frf) -> bool:
     ----------
     Bendat & Piersol, Random Data, ch. 11 (smoothing over frequency as a window over lag).
     """
-    frf = frf.in_band(frf.usable_band)
-    frequency, steps = frf.frequency, np.diff(frf.frequency)
-    if frequency.size < MIN_SMOOTHING_LINES or np.ptp(steps) > 1e-3 * steps[0]:
+    response = _compute_impulse_response(frf, MIN_SMOOTHING_LINES)
+    if response is None:
         return False
-    taper = np.hanning(frequency.size + 2)[1:-1] ** 2
-    response = np.abs(np.fft.ifft(frf.accelerance * taper)) ** 2
+    power, n = response**2, response.size
     near, far = (
-        float(np.mean(response[_make_span_slice(share, response.size)])) for share in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
+        float(np.mean(power[round(begin * n) : round(end * n)])) for begin, end in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
     )
-    leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * response.size) ** -10
-    return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(response) < MAX_PRE_HIT_SHARE**2)
+    leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * n) ** -10
+    return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(power) < MAX_PRE_HIT_SHARE**2)
 
 
-def _make_span_slice(share: tuple[float, float], size: int) -> slice:
-    return slice(round(share[0] * size), round(share[1] * size))
+def _compute_impulse_response(frf: Frf, min_lines: int) -> Floats | None:
+    """Return the size of the tapered impulse response in the usable band; None for few or uneven lines."""
+    frf = frf.in_band(frf.usable_band)
+    steps = np.diff(frf.frequency)
+    if frf.frequency.size < min_lines or np.ptp(steps) > 1e-3 * steps[0]:
+        return None
+    taper = np.hanning(frf.frequency.size + 2)[1:-1] ** 2
+    return np.asarray(np.abs(np.fft.ifft(frf.accelerance * taper)))

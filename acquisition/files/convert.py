@@ -1,4 +1,4 @@
-"""A recorded file written in a format that other programs read."""
+"""Convert a recorded file to a format of other programs."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from acquisition.hit import Hit
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """How a format is written."""
+    """Format that can be written."""
 
     title: str
-    """Name of the format for people."""
+    """Name of the format, for people."""
     encode_hits: Callable[[Sequence[Hit], ExportLabels], bytes]
     """Function that writes signals over time."""
     encode_frf: Callable[[Frf, ExportLabels], bytes] | None
@@ -48,12 +48,12 @@ EXPORT_FORMATS = {
     ".mat": ExportFormat("MATLAB file", encode_mat_hits, encode_mat_frf, "double precision"),
     ".json": ExportFormat("SDyPy SEP005 time series", encode_sep005_hits, None, "17 digits"),
 }
-"""By the extension of the file that is written."""
+"""Format by the extension of the written file."""
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """What was written."""
+    """Result of a conversion."""
 
     path: Path
     """Path of the new file."""
@@ -64,14 +64,34 @@ class Conversion:
     precision: str
     """Precision of its numbers, for people."""
     recording: Recording
-    """Recording that it was made from."""
+    """Recording that was converted."""
 
 
 def convert(path: Path | str, out: Path | str, description: Description, *, hits: bool = False) -> Conversion:
-    """Write the FRF of a recorded file, or its hits, in the format that the extension of `out` names.
+    """Write the FRF of a recorded file, or its hits, in the format of the extension of `out`.
 
-    hits: the signals over time; a format without FRFs has them anyway. DataError for a file that does not say enough or
-    does not hold what is asked for; ValueError for an extension that no format has.
+    Parameters
+    ----------
+    path
+        Recorded file.
+    out
+        File to write.
+    description
+        What the recorded file does not state.
+    hits
+        Whether to write the signals over time; a format without FRFs always does.
+
+    Returns
+    -------
+    Conversion
+        What was written.
+
+    Raises
+    ------
+    DataError
+        For a file that does not state enough or does not hold what is requested.
+    ValueError
+        For an extension that no format has.
     """
     path, out = Path(path), Path(out)
     writer = EXPORT_FORMATS.get(out.suffix.lower())

@@ -1,4 +1,4 @@
-"""Recorded hits as if they were being made now."""
+"""Source that replays recorded hits like a live device."""
 
 from __future__ import annotations
 
@@ -18,33 +18,43 @@ from acquisition.hits.pulse import count_pre_hit_samples
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 REPLAY_QUIET_TIME = 1.0
-"""Quiet before, between and after the hits (s)."""
+"""Time without a hit before, between and after the hits (s)."""
 REPLAY_BLOCK_SCANS = 512
-"""Scans handed over at a time."""
+"""Number of scans per block."""
 REPLAY_ADC_BITS = 24
-"""Converter that recordings without codes are read through."""
+"""Resolution of the virtual converter for recordings without codes (bits)."""
 
 
 class FileSource(ClosedOnExit):
-    """The hits of a recording one after the other, with quiet between them.
+    """Source of the hits of a recording, with quiet between them.
 
-    Codes are those of the recording, bit by bit; lost scans and reported overloads are there again. A recording
-    without codes (LVM, text) is read through a converter of 24 bits whose rail is the largest value in the file:
-    its steps are 1e-7 of that, and a value that stands at a rail for long is an overload, as it was before.
-    The quiet is the recording's own: the noise before a pulse, over and over.
+    Codes are those of the recording, bit by bit, and so are lost scans and reported overloads. A recording without
+    codes (LVM, text) passes a virtual converter of 24 bits whose rail is the largest value in the file: its steps are
+    1e-7 of that, and a value at a rail for long is an overload, as it was before. The quiet is the recording's own
+    noise before a pulse, repeated.
     """
 
     follows_clock = False
-    """Its scans come at no rate that could be measured."""
+    """Whether its scans follow the clock; they come at no measurable rate."""
     loss_detection = ""
-    """No scans can be lost."""
+    """How lost scans are detected; none can be lost."""
     fault = ""
-    """Nothing is ever wrong."""
+    """Present fault; there is never one."""
 
     def __init__(self, path: Path | str, realtime: bool = True) -> None:
-        """Read a file that `read_hits` can read; realtime=False hands it over as fast as it is asked for.
+        """Read the hits of a file.
 
-        Raises DataError where there are no hits in it.
+        Parameters
+        ----------
+        path
+            File that `read_hits` can read.
+        realtime
+            Whether blocks come at their sample rate instead of at once.
+
+        Raises
+        ------
+        DataError
+            Where the file has no hits.
         """
         hits = read_hits(path)
         quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)
@@ -60,19 +70,19 @@ class FileSource(ClosedOnExit):
         self._stopped = threading.Event()
 
     def start(self) -> None:
-        """Begin at the first hit."""
+        """Start at the first hit."""
         self._stopped.clear()
 
     def stop(self) -> None:
-        """End at the next block."""
+        """Stop at the next block."""
         self._stopped.set()
 
     def close(self) -> None:
-        """End at the next block; the file is closed already."""
+        """Stop at the next block; the file is already closed."""
         self.stop()
 
     def blocks(self) -> Iterator[Block]:
-        """The blocks; they end some quiet after the last hit."""
+        """Yield the blocks, which end some quiet after the last hit."""
         began, scan = time.monotonic(), 0
         for block in self._pieces():
             scan += block.lost_before
@@ -83,7 +93,7 @@ class FileSource(ClosedOnExit):
             scan += block.codes.shape[1]
 
     def _pieces(self) -> Iterator[Block]:
-        """Blocks without their index."""
+        """Yield blocks without their index."""
         pause = round(REPLAY_QUIET_TIME * self.sample_rate)
         for hit in self._hits:
             codes = self._codes(hit)
@@ -101,7 +111,7 @@ class FileSource(ClosedOnExit):
 
 
 def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
-    """A channel of 1 V per unit whose rail is the largest value, of the sign that this has."""
+    """Make a channel of 1 V per unit whose rail is the largest value, with its sign."""
     values = np.concatenate([getattr(hit, quantity) for hit in hits])
     largest = float(values[np.argmax(np.abs(values))])
     top = 2 ** (REPLAY_ADC_BITS - 1)
@@ -110,7 +120,7 @@ def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
 
 
 def _extract_quiet_scans(hit: Hit, codes: Codes) -> Codes:
-    """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, channels)."""
+    """Return four fifths of the scans before the pulse, without its foot, forwards and backwards, (n, channels)."""
     before = int(0.8 * count_pre_hit_samples(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])

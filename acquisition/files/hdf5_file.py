@@ -14,24 +14,24 @@ if TYPE_CHECKING:
     import h5py
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""First bytes of such a file."""
+"""First bytes of an HDF5 file."""
 
 
 def open_hdf5(memory: io.BytesIO, mode: Literal["r", "r+", "w"]) -> h5py.File:
-    """The file that these bytes are or become; OSError where they are none."""
+    """Open the HDF5 file that these bytes are or become; raise OSError where they are none."""
     import h5py  # takes longer to import than what a command needs that opens no file
 
     return h5py.File(memory, mode)
 
 
 MIN_UNPACKED_LIMIT = 100_000_000
-"""Bytes that may be unpacked from any file."""
+"""Largest unpacked size of any small file (bytes)."""
 MAX_UNPACKED_RATIO = 20
-"""What is larger may be so many times as large as the file: real signals shrink to a half or a quarter."""
+"""Largest ratio of unpacked to packed size of larger files; real signals shrink to a half or a quarter."""
 
 
 def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
-    """DataError for a file of `packed` bytes whose data sets are out of proportion; none of them is read."""
+    """Raise DataError for a file of `packed` bytes whose data sets are too large; no data set is read."""
     import h5py  # here already: the file is open
 
     sizes: list[int] = []
@@ -50,7 +50,7 @@ def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
 
 
 def _measure_unpacked_size(data: h5py.Dataset) -> int:
-    """Bytes in memory, in whole chunks, as they are unpacked."""
+    """Return the size in memory (bytes), in whole chunks as they are unpacked."""
     if data.shape is None:
         return 0
     chunks = data.chunks or (1,) * len(data.shape)
@@ -59,23 +59,23 @@ def _measure_unpacked_size(data: h5py.Dataset) -> int:
 
 
 CHECKSUM_MARK = b"\nlobewatch sha256 "
-"""How a seal begins; a file that does not end with one has none."""
+"""Start of a checksum behind the last byte of a file, where HDF5 does not look."""
 CHECKSUM_SIZE = len(CHECKSUM_MARK) + 64 + 1
 
 
 def append_checksum(content: bytes) -> bytes:
-    """The content and its SHA-256."""
+    """Append the SHA-256 of the content."""
     return content + _format_checksum(content)
 
 
 def has_wrong_checksum(content: bytes) -> bool:
-    """Whether a file has a seal that does not fit the rest of it: one flipped bit can make HDF5 hang or crash."""
-    seal = content[-CHECKSUM_SIZE:]
-    return seal.startswith(CHECKSUM_MARK) and seal != _format_checksum(content[:-CHECKSUM_SIZE])
+    """Return whether a file has a checksum that differs: one flipped bit can make HDF5 hang or crash."""
+    checksum = content[-CHECKSUM_SIZE:]
+    return checksum.startswith(CHECKSUM_MARK) and checksum != _format_checksum(content[:-CHECKSUM_SIZE])
 
 
 def has_valid_checksum(content: bytes) -> bool:
-    """Whether a file has a seal that fits the rest of it."""
+    """Return whether a file has a checksum that agrees."""
     return content[-CHECKSUM_SIZE:] == _format_checksum(content[:-CHECKSUM_SIZE])
 
 

@@ -1,7 +1,7 @@
 """Tap tests as HDF5 files, one file per test, written whole and never rewritten.
 
-Built in memory, then temporary name + fsync + rename: a file of this name is always complete. Every dataset has a
-`units` attribute; no pickles, so that h5dump, MATLAB and Julia read it.
+A file is built in memory, written to a temporary name, synced and renamed, so that a file of this name is always
+complete. Every dataset has a `units` attribute. There are no pickles, so that h5dump, MATLAB and Julia read it.
 """
 
 from __future__ import annotations
@@ -50,14 +50,33 @@ if TYPE_CHECKING:
 
 TAP_FORMAT_NAME = "lobewatch-tap"
 TAP_FORMAT_VERSION, TAP_FORMAT_VERSION_WITHOUT_FORCE = 1, 2
-"""Version of a file, and that of one without force and FRF, which older programs cannot read."""
+"""Version of a file, and of one without force and FRF, which older programs cannot read."""
 SOURCE_CHUNK_SIZE = 1_000_000
-"""Bytes of a replayed file that are packed together."""
+"""Number of bytes of a replayed file that are packed together."""
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
-    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns. OSError where that fails.
+    """Write a tap test with a checksum.
 
+    Parameters
+    ----------
+    path
+        File to write.
+    tap
+        Tap test.
+
+    Returns
+    -------
+    bytes
+        Content of the file, which is then on the disk.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+
+    Examples
+    --------
     >>> from datetime import UTC, datetime
     >>> from tempfile import TemporaryDirectory
     >>> tested = Circumstances("Mill 3", datetime(2026, 3, 2, 9, 30, tzinfo=UTC), tool="D16")
@@ -74,7 +93,7 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
 
 
 def encode_tap(tap: TapTest) -> bytes:
-    """The bytes of the file of a tap test."""
+    """Encode the file of a tap test."""
     memory = io.BytesIO()
     with open_hdf5(memory, "w") as file:
         file.attrs.update(
@@ -95,19 +114,35 @@ def _choose_version(hits: Sequence[Hit]) -> int:
 
 @functools.cache
 def _get_software_name() -> str:
-    """Reading the metadata of the package takes as long as writing an FRF."""
+    """Return name and version; reading the metadata of the package takes as long as writing an FRF."""
     return f"lobewatch {version('lobewatch')}"
 
 
 def round_as_stored(tap: TapTest) -> TapTest:
-    """The tap test as it is read from its file: where the hits are there the coherence is rounded to float32."""
+    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32."""
     if not tap.hits or tap.frf is None or tap.frf.coherence is None:
         return tap
     return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 
 
 def read_tap(path: Path | str) -> TapTest:
-    """A tap test from its file; DataError where it is none or damaged."""
+    """Read a tap test.
+
+    Parameters
+    ----------
+    path
+        File that `write_tap` wrote.
+
+    Returns
+    -------
+    TapTest
+        Tap test with all its hits.
+
+    Raises
+    ------
+    DataError
+        For another or a damaged file.
+    """
     with _open_tap_file(Path(path)) as file:
         try:
             hits, flags = read_raw_hits(file)
@@ -119,8 +154,26 @@ def read_tap(path: Path | str) -> TapTest:
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
-    """One hit of a test in progress, as each sensor felt it, and the verdict on it, sealed; on the disk when this
-    returns, else OSError."""
+    """Write one hit of a test in progress with a checksum, as each sensor measured it.
+
+    The file is on the disk when this returns.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    hit
+        Hit, with its cross hit.
+    circumstances
+        Circumstances of the test.
+    flags
+        Faults of the hit.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    """
     memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), HitSettings.from_hit(hit)))
     with open_hdf5(memory, "r+") as file:
         file.attrs["file"] = Path(path).name
@@ -132,7 +185,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
 
 @functools.lru_cache(maxsize=1)
 def _encode_without_hit(about: Circumstances, version: int, set_up: HitSettings) -> bytes:
-    """The file of a hit of this test before the hit is in it, which is a third of the work."""
+    """Encode the file of a hit of this test before the hit is in it, which is a third of the work."""
     memory = io.BytesIO()
     with open_hdf5(memory, "w") as file:
         file.attrs.update(format=TAP_FORMAT_NAME, version=version)
@@ -142,17 +195,37 @@ def _encode_without_hit(about: Circumstances, version: int, set_up: HitSettings)
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
-    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then; DataError as read_tap."""
+    """Read the hits of a tap file or a hit file.
+
+    Parameters
+    ----------
+    path
+        File that `write_tap` or `write_hit` wrote.
+
+    Returns
+    -------
+    hits : tuple of Hit
+        Hits with their cross hits.
+    circumstances : Circumstances
+        Circumstances of the test.
+    flags : tuple of HitFlags
+        Stored faults of each hit.
+
+    Raises
+    ------
+    DataError
+        For another or a damaged file.
+    """
     with _open_tap_file(Path(path)) as file:
         hits, flags = read_raw_hits(file)
         if "beside" in file:
             pairs = zip(hits, read_raw_hits(file["beside"])[0], strict=True)
-            hits = tuple(replace(hit, cross_hit=beside) for hit, beside in pairs)
+            hits = tuple(replace(hit, cross_hit=cross) for hit, cross in pairs)
         return hits, _read_circumstances(file), flags
 
 
 def read_hit_name(path: Path | str) -> str:
-    """The name that a hit file was written under; empty in the first ones."""
+    """Return the name that a hit file was written under; empty in the first ones."""
     with _open_tap_file(Path(path)) as file:
         return str(file.attrs.get("file", ""))
 
@@ -206,7 +279,7 @@ def _read_circumstances(file: h5py.File) -> Circumstances:
 
 
 def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> None:
-    """precision: of the coherence."""
+    """Write an FRF with this precision of the coherence."""
     group = file.create_group("frf")
     group.attrs.update(n_averages=frf.n_averages, measured_as=frf.measured_as)
     if frf.usable_band is not None:
@@ -218,7 +291,7 @@ def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> 
 def _write_lines(
     group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
 ) -> None:
-    """Arrays over frequency, which becomes their dimension scale."""
+    """Write arrays over frequency, which becomes their dimension scale."""
     write_dataset(group, "frequency", frequency, "Hz", **HDF5_COMPRESSION)
     group["frequency"].make_scale("frequency")
     for name, (data, units) in arrays.items():
@@ -264,20 +337,22 @@ def _read_source(file: h5py.File) -> SourceFile | None:
 
 
 _NON_SIGNAL_FLAGS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_EVALUATED
+"""Faults that the time signals of a hit do not show."""
 
 
 def read_tap_recording(path: Path) -> list[Hit] | Frf:
-    """The hits of a tap file but for those that their own time signals do not speak against and that were refused all
-    the same: taken back, of another spot, of a force that does not reach far enough, not judged. The FRF where none is
-    left."""
+    """Read the hits of a tap file without those that were rejected for other reasons than their time signals.
+
+    Such hits were undone, hit another spot, had too narrow a force band, or were not evaluated. Without hits the FRF is
+    read.
+    """
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _NON_SIGNAL_FLAGS]
     return kept or read_tap(path).required_frf
 
 
 def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
-    """Whether a file is a live tap test of ours, and hits read from it are all of its hits: no signal is lost without
-    the file."""
+    """Return whether a file is a live tap test of lobewatch and these are all its hits."""
     if not hits or not read_regular_file(path).startswith(HDF5_SIGNATURE):
         return False
     tap = read_tap(path)
@@ -285,7 +360,7 @@ def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
 
 
 def _is_lobewatch_file(head: bytes, path: Path) -> bool:
-    """Whether an HDF5 file is one of lobewatch, though perhaps not a tap file: told from its bytes, as damage is."""
+    """Return whether an HDF5 file is of lobewatch, also where it is damaged or no tap file."""
     return head.startswith(HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
 
 

@@ -1,8 +1,4 @@
-"""Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file.
-
-Values have 12 digits, the abscissa 6 as the format has it; all digits of its step stand in a line of identification,
-from which lobewatch reads it back. Source: SDRC Universal File Formats 58, 151, 164.
-"""
+"""Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file."""
 
 from __future__ import annotations
 
@@ -23,7 +19,7 @@ from acquisition.hit import Hit
 
 @dataclass(frozen=True)
 class ExportLabels:
-    """Of a tap test that is written for other programs."""
+    """Labels of a tap test in a file for other programs."""
 
     created: datetime | None = None
     """Time of recording (timezone-aware)."""
@@ -32,13 +28,13 @@ class ExportLabels:
     tool: str = ""
     """Name of the tool in the spindle."""
     name: str = "tap test"
-    """Title for people."""
+    """Title, for people."""
     window: str = "none"
-    """Window over the response, as it was read: "exponential 0.05 s"."""
+    """Window over the response: "exponential 0.05 s"."""
 
     @property
     def plain_tool(self) -> str:
-        """Without what would end it: line ends and semicolons."""
+        """Name of the tool without line ends and semicolons."""
         return " ".join(self.tool.replace(";", ",").split())
 
 
@@ -47,13 +43,13 @@ FRF_UNITS = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
 
 
 def convert_to_measured_form(frf: Frf) -> tuple[Complexes, str]:
-    """An FRF in the form that its sensors gave, which keeps it exact, and its unit."""
+    """Return the values of an FRF in the form that was measured, which keeps them exact, and their unit."""
     values = {"receptance": frf.receptance, "mobility": frf.mobility, "accelerance": frf.accelerance}
     return values[frf.measured_as], FRF_UNITS[frf.measured_as]
 
 
 def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
-    """Frequency, real and imaginary part, coherence where there is one."""
+    """Encode frequency, real and imaginary part, and coherence if known, with 17 digits."""
     values, unit = convert_to_measured_form(frf)
     columns = {"frequency [Hz]": frf.frequency, f"real [{unit}]": values.real, f"imag [{unit}]": values.imag}
     if frf.coherence is not None:
@@ -62,7 +58,7 @@ def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
 
 
 def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
-    """Time, force and acceleration of one hit; DataError for several."""
+    """Encode time, force and acceleration of one hit; raise DataError for several."""
     if len(hits) != 1:
         raise DataError(f"{len(hits)} hits: a text table holds one; write them as .uff, .mat or .json, or the FRF")
     (hit,) = hits
@@ -87,7 +83,7 @@ def _encode_table(columns: dict[str, Floats], labels: ExportLabels, averages: in
 
 
 def encode_mat_frf(frf: Frf, labels: ExportLabels) -> bytes:
-    """frequency (Hz), frf with its unit, coherence, averages."""
+    """Encode frequency (Hz), FRF with its unit, coherence and averages as MATLAB v5."""
     values, unit = convert_to_measured_form(frf)
     variables: dict[str, Any] = {"frequency": frf.frequency, "frf": values, "unit": unit, "averages": frf.n_averages}
     if frf.coherence is not None:
@@ -96,7 +92,7 @@ def encode_mat_frf(frf: Frf, labels: ExportLabels) -> bytes:
 
 
 def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
-    """force (N) and acceleration (m/s^2), a row a hit, and sample_rate (Hz)."""
+    """Encode force (N) and acceleration (m/s^2), a row per hit, and the sample rate (Hz) as MATLAB v5."""
     if len({(hit.force.size, hit.sample_rate) for hit in hits}) > 1:
         raise DataError("the hits differ in length or sample rate; write them as .json")
     rows = {
@@ -122,7 +118,7 @@ def _encode_mat(variables: dict[str, Any], labels: ExportLabels) -> bytes:
 
 
 def encode_sep005_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
-    """Force (N) and acceleration (m/s^2) of each hit, exactly; the group tells the hits apart."""
+    """Encode force (N) and acceleration (m/s^2) of each hit as SEP005 JSON, with a group per hit."""
     texts = {"start_timestamp": labels.created.isoformat()} if labels.created else {}
     texts |= {key: value for key, value in (("direction", labels.direction), ("tool", labels.tool)) if value}
     channels = [
@@ -150,11 +146,15 @@ _UFF_ORDINATES = {
     "accelerance": (12, "Acceleration", "m/s^2"),
 }
 MAX_STEP_DIFFERENCE = 1e-9
-"""Relative difference of two frequency steps that are taken for the same."""
+"""Largest relative difference of equal frequency steps."""
 
 
 def encode_uff_frf(frf: Frf, labels: ExportLabels) -> bytes:
-    """The FRF as function type 4, its coherence as type 6."""
+    """Encode the FRF as function type 4 and its coherence as type 6.
+
+    Values have 12 digits, the abscissa 6 as the format demands. All digits of its step are in a line of identification,
+    from which lobewatch reads it. Source: SDRC Universal File Formats 58, 151, 164.
+    """
     values, _ = convert_to_measured_form(frf)
     ordinate = _UFF_ORDINATES[frf.measured_as]
     axis = _Abscissa(frf.frequency, (18, "Frequency", "Hz"))
@@ -166,7 +166,7 @@ def encode_uff_frf(frf: Frf, labels: ExportLabels) -> bytes:
 
 
 def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
-    """Force and acceleration of each hit as function type 1."""
+    """Encode force and acceleration of each hit as function type 1."""
     sets = []
     for number, hit in enumerate(hits, 1):
         axis = _Abscissa(np.arange(hit.force.size) / hit.sample_rate, _UFF_TIME, 1 / hit.sample_rate)
@@ -176,7 +176,7 @@ def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
 
 
 class _Abscissa:
-    """An abscissa with its step, where it has one."""
+    """Abscissa with its step."""
 
     def __init__(self, values: Floats, what: tuple[int, str, str], step: float | None = None) -> None:
         self.values, self.what = values, what
@@ -193,7 +193,6 @@ def _format_data_set_58(
     labels: ExportLabels,
     extra: str,
 ) -> list[str]:
-    """One data set 58."""
     node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
     exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
     recorded = f"window={labels.window}" + (f";recorded={labels.created.isoformat()}" if labels.created else "")
@@ -215,14 +214,17 @@ def _format_data_set_58(
 
 
 def _check_identification_line(text: str) -> str:
-    """Of identification: 80 characters; DataError where more would be lost."""
+    """Return a line of identification; raise DataError where it has more than 80 characters."""
     if len(text.encode("utf-8")) > 80:
         raise DataError(f"{text!r} has more than the 80 characters of a line of a universal file")
     return text or "NONE"
 
 
 def _format_values(axis: _Abscissa, values: Floats | Complexes) -> Iterator[str]:
-    """Even: 20 characters a number, four a line (complex: two pairs). Uneven: the abscissa (13) before each value."""
+    """Yield lines of values.
+
+    Even axes have four numbers of 20 characters a line, uneven axes the abscissa (13) before each value.
+    """
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     numbers = np.stack(parts, axis=1)
     if axis.is_even:

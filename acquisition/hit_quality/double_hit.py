@@ -39,14 +39,10 @@ def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
     """Find the highest second pulse more than one pulse width away from the main one; None without one.
 
     The force is correlated with a raised-cosine bump less its own mean over three times its length. Offset, drift and
-    mains
-    hum drop out, and noise is averaged over a pulse. The bump must be higher than either side: behind a conditioner
-    with a
-    high pass the force sinks below zero after the main pulse and recovers, which is no touch. A pulse counts where it
-    is
-    farther out of the noise of that estimate (median absolute deviation in the same record) than noise would reach in
-    one of
-    a thousand hits, and is not certainly below 2.5 % of the main pulse.
+    mains hum drop out, and noise is averaged over a pulse. The bump must be higher than either side: behind a
+    conditioner with a high pass the force sinks below zero after the main pulse and recovers, which is no touch. A
+    pulse counts where it is farther out of the noise of that estimate (median absolute deviation in the same record)
+    than noise would reach in one of a thousand hits, and is not certainly below 2.5 % of the main pulse.
 
     Source of the matched filter: Turin, IRE Trans. Inform. Theory 6 (1960) 311.
     """
@@ -129,8 +125,7 @@ def find_second_input(decay: Floats, sample_rate: float, noise: float) -> float 
     """Find the time (s) in a free decay (m/s^2) at which it was hit again; None without a sign of it.
 
     A second touch breaks the linear prediction that a free decay obeys. noise: rms at rest (m/s^2); a decay below three
-    times
-    that does not count. A touch within 1 ms cannot be distinguished from a nonlinear decay.
+    times that does not count. A touch within 1 ms cannot be distinguished from a nonlinear decay.
 
     Source of the prediction: Makhoul (1975), Proc. IEEE 63, 561.
     """

@@ -269,7 +269,7 @@ def _evaluate_pulses(hit: Hit, pulse: Pulse) -> Findings:
 
 
 def _evaluate_response(hit: Hit) -> Findings:
-    """Evaluate the response alone: whether it stands out, and whether its decay was hit again."""
+    """Evaluate only the response: its strength, and whether its decay was hit again."""
     decay, noise = extract_free_decay(hit), measure_rest_noise(hit)
     peak = float(np.max(np.abs(hit.acceleration - np.median(hit.acceleration))))
     if peak < HIT_FAULTS[HitFlags.TOO_SOFT].limits["noise_ratio"] * noise:

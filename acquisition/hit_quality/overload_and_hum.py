@@ -42,8 +42,7 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     """Find an overload of the force (index 0) or of the response (1); None without one.
 
     Certain: three codes at one rail. Inferred: the extreme value three times in a row in a recording without codes and
-    with
-    finer steps; or a flat top with noise on it, as an amplifier makes that saturates before its converter.
+    with finer steps; or a flat top with noise on it, as an amplifier makes that saturates before its converter.
     """
     signal = np.asarray((hit.force, hit.acceleration)[index])
     scale, row = 0.0, index if hit.has_force else 0
@@ -71,8 +70,7 @@ def _count_flat_top(above: Floats, half: float) -> int:
     """Count the samples of a flat top whose noise stays within +-half of it; 0 where the top is round.
 
     The band below a round maximum of any width holds 1/sqrt(3) of the samples of a band three times as deep. Of a flat
-    top
-    it holds nearly all. Neither can be seen where the signal is not well above its noise.
+    top it holds nearly all. Neither can be seen where the signal is not well above its noise.
     """
     top = float(above.max())
     if top <= 8 * half:
@@ -120,8 +118,7 @@ def fit_mains_hum(hit: Hit, before: int) -> Floats | None:
     """Fit tones at 50 or 60 Hz and their harmonics to the response (m/s^2), shape (n,); None without hum.
 
     before: samples ahead of the hit. Hum goes on through the hit with one phase: the same tones must make up most of
-    these
-    samples and of the last fifth of the record. Ringing after the hit was not there before it.
+    these samples and of the last fifth of the record. Ringing after the hit was not there before it.
     """
     quiet, tail = slice(0, before), slice(int((1 - HUM_TAIL_SHARE) * hit.acceleration.size), None)
     if before < MIN_HUM_SAMPLES:

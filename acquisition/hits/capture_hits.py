@@ -260,8 +260,8 @@ class HitSearch:
         """Find the first sample at the level in a loud run after pre_trigger quiet samples.
 
         Loud is above the hysteresis level, and the gaps of a swinging signal count as loud. A run that is open at the
-        end is
-        searched again with the next block, unless it has lasted a whole record: then it is an offset instead of a hit.
+        end is searched again with the next block, unless it has lasted a whole record: then it is an offset instead of
+        a hit.
         """
         signal = self._get_trigger_signal(self._position)
         loud = np.flatnonzero(signal >= self._trigger.hysteresis * self._level)

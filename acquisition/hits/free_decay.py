@@ -39,7 +39,7 @@ def measure_rest_noise(hit: Hit) -> float:
 
 
 FINE_ENVELOPE_PIECES, COARSE_ENVELOPE_PIECES = 200, 8
-"""Number of pieces of the envelope for a decay that outlasts the fine ones."""
+"""Numbers of pieces of the envelope: many for a fast decay, few for one that outlasts them."""
 ENVELOPE_NOISE_RATIO = 3.0
 """Level over the rms of the baseline above which the envelope counts."""
 

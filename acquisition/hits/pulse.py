@@ -44,7 +44,7 @@ class Pulse:
 
 
 def find_pulse(hit: Hit) -> Pulse | None:
-    """Find the highest force pulse; None where it is below 6 times the rms of the baseline, or no force was measured."""
+    """Find the highest force pulse; None where it is below 6 times the rms of the baseline, or without a force."""
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))
@@ -60,7 +60,7 @@ def find_pulse(hit: Hit) -> Pulse | None:
 
 
 def _count_above(foot: float, signal: Floats) -> int:
-    """Count the samples before the first one below the foot. The search goes block by block because pulses are short."""
+    """Count the samples before the first one below the foot, block by block because pulses are short."""
     for at in range(0, signal.size, SEARCH_BLOCK_SIZE):
         below = np.flatnonzero(signal[at : at + SEARCH_BLOCK_SIZE] < foot)
         if below.size:
@@ -122,8 +122,7 @@ def window_force(hit: Hit) -> WindowedForce:
     """Return the pulse with one pulse width on either side, tapered to zero over one more (raised cosine).
 
     A tight window matters: noise inside it is alike at neighbouring lines, and shifts the mode. The result is cached
-    per
-    hit. Raises ValueError for a hit without a pulse.
+    per hit. Raises ValueError for a hit without a pulse.
     """
     if hit not in _windowed_forces:
         _windowed_forces[hit] = _compute_windowed_force(hit)

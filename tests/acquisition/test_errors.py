@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from acquisition import DeviceError
+
+pytestmark = pytest.mark.quick
 
 
 def test_cause_and_cure_of_a_device_error_are_told_together_and_kept_apart() -> None:

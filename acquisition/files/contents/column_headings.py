@@ -17,18 +17,18 @@ _PART_OF_FRF = re.compile(
     r"[\[(]\s*(?!hz)(?:h|frf)\w*(?:\(\w+\))?\s*[\])])\s*(.*)",
     re.IGNORECASE,
 )
-"""Such as Re(H), or imag(FRF) [m/N]."""
+"""Pattern such as Re(H), or imag(FRF) [m/N]."""
 _BEFORE_UNIT = re.compile(r"\s*/\s*|\s*,\s*|\s+in\s+")
-"""Between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
+"""Separator between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
 ANGLE_UNITS = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度"), "deg") | {
     "rad": "rad",
     "radians": "rad",
 }
-"""Units of a phase as they are written in lower case."""
+"""Units of a phase as written in lower case."""
 _DECIBEL_NAME = re.compile(r"(?<![^\W_])db(?![^\W\d_])", re.IGNORECASE)
-"""In the name of a level: "Magnitude dB", "Mag_dB"."""
+"""Pattern of a level in a name: "Magnitude dB", "Mag_dB"."""
 _FRF_PREFIX = re.compile(r"(frf|receptance|mobility|accelerance|h\d?)(?![^\W_])[\W\d_]*")
-"""What stands before the part of an FRF that a column holds: "H1 real"."""
+"""Prefix of a part of an FRF: "H1 real"."""
 _ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
     (r"time|zeit|temps|tiempo|tempo|时间|時間|t$|x_value$", "time"),
     (r"freq|frec|频率|頻率|周波数|f$", "frequency"),
@@ -42,7 +42,7 @@ _ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
     (r"acc|acel|resp|vel|disp|beschl|加速度|速度|位移|変位", "response"),
     (r"tacho", "tacho"),
 )
-"""Beginnings of names in lower case and without accents, in seven languages -> what the column is."""
+"""Role of a column by the beginning of its name in lower case and without accents, in seven languages."""
 COLUMN_ROLES: dict[str, tuple[Role, str]] = {
     "time": ("time", ""),
     "frequency": ("frequency", ""),
@@ -65,11 +65,11 @@ COLUMN_ROLES: dict[str, tuple[Role, str]] = {
     "tacho": ("tacho", ""),
     "-": ("ignored", ""),
 }
-"""What `Description.columns` may call a column -> its role and quantity."""
+"""Role and quantity of a column, by its word in `Description.columns`."""
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Of "Force [N]", "Force (N)", "Force / N", "force_N" or "Re(H) [m/N]"; no unit where none stands apart."""
+    """Split "Force [N]", "Force (N)", "Force / N", "force_N" or "Re(H) [m/N]" into name and unit, empty if unknown."""
     part = _PART_OF_FRF.fullmatch(heading)
     if part:
         return part[1], split_heading(part[2])[1]
@@ -84,29 +84,29 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def is_unit(text: str) -> bool:
-    """Whether it is a unit that is known, of an angle, of a level (dB) or of a voltage, too."""
+    """Return whether a text is a known unit, also of an angle, a level (dB) or a voltage."""
     return parse_unit(text) is not None or text.lower() in ANGLE_UNITS | VOLTAGE_UNITS or is_decibel(text)
 
 
 def is_decibel(unit: str) -> bool:
-    """Whether a unit is dB of something."""
+    """Return whether a unit is dB of something."""
     return unit.lower().startswith("db")
 
 
 def infer_decibel_unit(name: str, unit: str) -> str:
-    """The unit of a column; "dB m/N" where its name says that it is a level of what its unit says."""
+    """Return the unit of a column, "dB m/N" where its name states a level."""
     return f"dB {unit}".strip() if _DECIBEL_NAME.search(name) and not is_decibel(unit) else unit
 
 
 def parse_decibel_reference(unit: str) -> str:
-    """The unit that a level is a multiple of, "1 um/N" of "dB re 1 um/N"; empty where it does not say."""
+    """Return the reference of a level, "1 um/N" of "dB re 1 um/N"; empty where unknown."""
     reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?(?:\)\s*[\[(]|[\s,)]*)", "", unit)
     is_known = parse_unit(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
     return reference if is_known else ""
 
 
 def infer_role(name: str, unit: str) -> Role:
-    """What a column is by its name and its unit, the unit first; empty where neither tells."""
+    """Infer the role of a column from its unit and its name; empty where neither tells."""
     letters = unicodedata.normalize("NFKD", name.strip().lower())
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
     plain = plain if _FRF_PREFIX.fullmatch(plain) else re.sub(rf"^(?:{_FRF_PREFIX.pattern})", "", plain, count=1)

@@ -34,63 +34,63 @@ Role = Literal[
     "ignored",
     "",
 ]
+"""Meaning of a signal; empty where unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """One column, channel or function of a file."""
+    """Column, channel or function of a file."""
 
     name: str
     """Name, as in the file."""
     values: NDArray[Any]
     """Values as in the file, real or complex, shape (n,)."""
     role: Role = ""
-    """Role of the signal, where the file says so; empty where it does not."""
+    """Role of the signal; empty where the file does not state it."""
     unit: str = ""
-    """Unit as in the file; empty where it does not say. dB of a magnitude; deg or rad of a phase."""
+    """Unit as in the file, empty where unknown; dB of a magnitude, deg or rad of a phase."""
     quantity: str = ""
-    """Quantity (displacement, velocity, acceleration, force), where the file says so beside the unit."""
+    """Quantity (displacement, velocity, acceleration, force) where the file states it apart from the unit."""
     direction: str = ""
-    """Direction: x, y, z or -x, -y, -z; empty where the file does not say."""
+    """Direction: x, y, z or -x, -y, -z; empty where unknown."""
     rate: float | None = None
-    """Samples a second that the file names (Hz)."""
+    """Sample rate that the file states (Hz)."""
     record: int = 0
-    """Number of the record: signals that were recorded together have the same."""
+    """Number of the record: signals recorded together have the same."""
     per_full_scale: bool = False
-    """Whether the values are shares of a full scale that the file does not name."""
+    """Whether the values are shares of an unknown full scale."""
     is_before_window: bool = False
-    """Whether it was recorded before the window that the file names."""
+    """Whether it was recorded before the window that the file states."""
     n_rows: int = 0
-    """Number of rows of the table it is a column of, the first of them its first value; a column of fewer values ends
-    before others do. 0 where it is no column of a table."""
+    """Number of rows of its table, the first of them its first value; 0 where it is no column of a table."""
     flaws: Mapping[int, str] = field(default_factory=dict)
-    """What is wrong with a value that is NaN, as "is empty in line 7", by its place."""
+    """Fault of each value that is NaN, as "is empty in line 7", by its index."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """All of a file."""
+    """Contents of a recorded file, not interpreted."""
 
     signals: tuple[Signal, ...]
     """Signals in the order of the file."""
     averages: int | None = None
-    """Hits that an FRF was averaged from."""
+    """Number of hits averaged in an FRF."""
     created: datetime | None = None
     """Time of recording (timezone-aware)."""
     direction: str = ""
-    """Direction at the tool tip; empty where the file does not say."""
+    """Direction at the tool tip; empty where unknown."""
     tool: str = ""
-    """Name of the tool in the spindle; empty where the file does not say."""
+    """Name of the tool in the spindle; empty where unknown."""
     machines: tuple[str, ...] = ()
-    """Names of what was tapped, each once, where the file says so."""
+    """Names of the tested machines, each once, where the file states them."""
     window: str = ""
-    """Window over the response, as the file names it; empty where it does not."""
+    """Window over the response, as the file states it; empty where unknown."""
     notes: tuple[str, ...] = ()
-    """Notes on what else should be known of it."""
+    """Notes for people."""
 
 
 def list_distinct_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Names that differ in more than a number, each once: "hit 1" and "hit 2" are one; empty ones are none."""
+    """List names that differ in more than a number, each once: "hit 1" and "hit 2" are the same."""
     spellings: dict[str, str] = {}
     for name in names:
         spellings.setdefault(re.sub(r"[\d\s_.#-]+", "", name).lower(), name)
@@ -100,9 +100,9 @@ def list_distinct_names(names: Iterable[str]) -> tuple[str, ...]:
 def cut_to_shortest(
     used: Sequence[Signal], axes: Sequence[Signal], report: ImportReport
 ) -> tuple[list[Signal], list[Signal]]:
-    """Columns and their axes cut to where the first of them ends, which the report tells; others as they are.
+    """Cut columns and their axes of one table to the shortest, and report it; leave others unchanged.
 
-    Of several axes only the longest counts: the others may be those of other columns.
+    Of several axes only the longest counts, because the others may belong to other columns.
     """
     by_size = sorted([*used, *sorted(axes, key=_count_values)[-1:]], key=_count_values)
     if not by_size or not all(_is_in_same_table(column, by_size[0]) for column in by_size):
@@ -115,12 +115,12 @@ def cut_to_shortest(
 
 
 def has_same_axis(one: Signal, other: Signal) -> bool:
-    """Whether two signals of a record have their values at the same places: in one table, or as many."""
+    """Return whether two signals of a record have a common axis: in one table, or with as many values."""
     return one.record == other.record and (_is_in_same_table(one, other) or one.values.shape == other.values.shape)
 
 
 def report_flaws(used: Sequence[Signal], report: ImportReport, first: int = 0) -> None:
-    """A fault for each column with a flaw from this place on."""
+    """Report a fault for each column with a flaw from this index on."""
     for column in used:
         flaw = next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), "")
         if flaw:
@@ -137,7 +137,7 @@ def _count_values(signal: Signal) -> int:
 
 
 def append_force_signals(response: Contents, force: Contents, force_file: Path) -> Contents:
-    """The signals of both, those of the force behind; where both have a name it says which file it is of."""
+    """Append the signals of a force file; a name that both have gets the name of its file."""
     names = {signal.name for signal in response.signals}
     added = [_rename_if_taken(signal, names, force_file.name) for signal in force.signals]
     return replace(response, signals=(*response.signals, *added))
@@ -152,7 +152,7 @@ _TIME_CONSTANT = re.compile(r"([\d.]+(?:[eE][+-]?\d+)?)\s*(m?)s\b")
 
 
 def parse_time_constant(window: str) -> float | None:
-    """Of "exponential 0.05 s" (s); None where there is no window, NaN where it is not told how it falls."""
+    """Parse the time constant of "exponential 0.05 s" (s); None without a window, NaN where it is not stated."""
     if _NO_WINDOW.fullmatch(window):
         return None
     constant = _TIME_CONSTANT.search(window)
@@ -162,22 +162,22 @@ def parse_time_constant(window: str) -> float | None:
 
 
 def format_window(time_constant: float | None) -> str:
-    """The same as text."""
+    """Format a time constant as `parse_time_constant` reads it."""
     if time_constant is None:
         return "none"
     return "of unknown form" if math.isnan(time_constant) else f"exponential {time_constant!r} s"
 
 
 MAX_ARRAY_COLUMNS = 64
-"""Columns of an array that are told one by one."""
+"""Largest number of columns of an array that become signals."""
 MIN_FRF_LINES = 8
-"""Complex numbers that may be an FRF; fewer are poles."""
+"""Smallest number of complex values of an FRF; fewer are poles."""
 
 
 def list_array_signals(variables: Mapping[str, Any], glue: str = ".", prefix: str = "") -> Iterator[Signal]:
-    """Every row of two or more numbers; those of an array of several dimensions, along its longest, as name:1, name:2.
+    """Yield every vector of numbers, and the columns of an array along its longest dimension as name:1, name:2.
 
-    glue: what stands between the names of groups. Complex ones are FRFs.
+    Complex vectors are FRFs. glue: separator between the names of groups.
     """
     for name, value in variables.items():
         if isinstance(value, Mapping):
@@ -199,36 +199,36 @@ def _split_array(name: str, value: NDArray[Any]) -> Iterator[Signal]:
 
 
 def _make_array_signal(name: str, column: NDArray[Any]) -> Signal:
-    """Numbers that have no imaginary part at all are real: MATLAB has one type for all columns of a matrix."""
+    """Make a signal, real where no value has an imaginary part.
+
+    MATLAB has one type for all columns of a matrix.
+    """
     if not np.iscomplexobj(column) or not np.any(column.imag):
         return Signal(name, column.real)
     return Signal(name, column, "frf" if column.size >= MIN_FRF_LINES else "")
 
 
-def _read_no_circumstances(_path: Path) -> None:
-    """Of when, where and by whom it was recorded."""
-
-
 @dataclass(frozen=True)
 class Format:
-    """One kind of recorded file. Its functions raise DataError, with the path and the place, for a damaged one."""
+    """Kind of recorded file, with the functions that read it.
+
+    The functions raise DataError with path and place for a damaged file.
+    """
 
     name: str
-    """Short name, in lower case, of its own among all formats."""
+    """Short name in lower case, unique among all formats."""
     title: str
     """Name for people."""
     extensions: tuple[str, ...]
-    """Endings that names of such files mostly have, with the dot: for messages, and for what of a folder is read at
-    all."""
+    """Usual extensions of such files, with the dot: for messages, and for the search of folders."""
     matches: Callable[[bytes, Path], bool]
-    """Whether a file is of this kind, from its first 4096 bytes (it has at least one) and, where need be, all of it."""
+    """Function that recognizes a file by its first 4096 bytes (at least one) and, where needed, all of it."""
     read: Callable[[Path], Contents | list[Hit] | Frf]
-    """Function that reads it: its contents, or hits in SI units, at least one, or an FRF, where the format leaves
-    nothing open."""
-    read_circumstances: Callable[[Path], Circumstances | None] = _read_no_circumstances
-    """Function that reads when, where and by whom it was recorded, beside its Contents; None where it says nothing."""
+    """Function that reads a file: its contents, or hits in SI units, at least one, or an FRF, where nothing is open."""
+    read_circumstances: Callable[[Path], Circumstances | None] = lambda _path: None
+    """Function that reads when, where and by whom a file was recorded; None where it does not state that."""
     read_frf: Callable[[Path], Frf] | None = None
-    """Function that reads the FRF it holds beside its hits; None where that is to be estimated from them."""
+    """Function that reads the FRF of a file that also has hits; None where it is estimated from them."""
     read_from: Callable[[Path, int, str], Contents] | None = None
-    """Function that reads it behind some first lines, with a decimal sign (empty where nobody says it); None where it
-    is not a text of lines."""
+    """Function that reads a text after some skipped lines, with a decimal sign (empty: unknown); None for other files.
+    """

@@ -14,9 +14,9 @@ _LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sen
 
 @dataclass(frozen=True)
 class Description:
-    """What a person says of a recording; empty or None: nothing. It fills in what the file does not say.
+    """User's description of a recording; empty or None: no statement. It completes what the file does not state.
 
-    Where the file says something else that is an error, but for `columns`, which stand in place of its headings.
+    A contradiction to the file is an error, except for `columns`, which replaces its headings.
     """
 
     columns: tuple[str, ...] = ()
@@ -28,33 +28,33 @@ class Description:
     force_unit: str = ""
     """Unit of the force (N, lbf)."""
     skip: int | None = None
-    """Number of lines above the rows of a text that are passed over."""
+    """Number of lines to skip above the rows of a text."""
     decimal: str = ""
-    """Decimal sign of the numbers of a text, "comma" or "point"; the other one stands between thousands."""
+    """Decimal sign of the numbers of a text, "comma" or "point"; the other one separates thousands."""
     spacing: float | None = None
-    """Spacing of the lines of an FRF that the file holds without its frequencies (Hz)."""
+    """Spacing of the lines of an FRF without frequencies (Hz)."""
     start: float | None = None
-    """Frequency of its first line (Hz); 0 where nobody says."""
+    """Frequency of its first line (Hz); None: 0."""
     force: Path | None = None
-    """File that holds the force, where it stands in another: its columns follow those of the response."""
+    """File with the force, where the recording has only the response; its columns follow those of the response."""
     rate: float | None = None
-    """Samples a second (Hz)."""
+    """Sample rate (Hz)."""
     averages: int | None = None
-    """Hits that an FRF was averaged from."""
+    """Number of hits averaged in an FRF."""
     response: int | None = None
-    """Number of the response that is meant where there are several, from 1."""
+    """Number of the response to use where there are several, from 1."""
     full_scale: tuple[float, ...] = ()
     """Full scale of each channel in its unit, where values are shares of it."""
     sensitivity: tuple[str, ...] = ()
     """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
     without_force: bool = False
-    """Whether no force was measured: the response is all that is looked for."""
+    """Whether no force was measured, so that only a response is needed."""
     sensor: str = "accelerometer"
-    """Kind of sensor that a cut was heard by: accelerometer or microphone."""
+    """Kind of sensor of a recorded cut: accelerometer or microphone."""
     tacho: str = ""
-    """Name or number of the column of the spindle's speed: that itself where its unit is rpm or Hz, else pulses."""
+    """Name or number of the column of the spindle speed: the speed where its unit is rpm or Hz, else pulses."""
     pulses: int | None = None
-    """Pulses of the tachometer in a turn; None: 1."""
+    """Pulses of the tachometer per turn; None: 1."""
     date: datetime | None = None
     """Time of recording; local time where it has no zone."""
     date_pattern: str = ""
@@ -64,10 +64,10 @@ class Description:
     direction: str = ""
     """Direction at the tool tip, x or y."""
     conditions: Conditions = UNKNOWN_CONDITIONS
-    """Conditions it was taken under."""
+    """Conditions of the test."""
 
     def list_signal_options(self) -> list[str]:
-        """The options that were given and that say something of the signals in the file."""
+        """List the given fields that state something about the signals of the file."""
         names = [option.name for option in fields(self) if option.name not in _LABEL_FIELDS]
         return [f"Description.{name}" for name in names if getattr(self, name) not in ("", (), None)]
 
@@ -77,14 +77,14 @@ Origin = Literal["file", "option", "default"]
 
 @dataclass(frozen=True)
 class Fact:
-    """Something known of a recording."""
+    """Known fact of a recording."""
 
     name: str
     """Name of the fact: "sample rate", "unit", ..."""
     value: str
     """Value, as text for people."""
     origin: Origin
-    """Origin: the file, an option, or nobody ("default")."""
+    """Origin: the file, an option of the user, or a default."""
 
 
 @dataclass

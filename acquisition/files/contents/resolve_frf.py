@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
@@ -13,17 +14,13 @@ from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
 from acquisition.files.contents.description import Description, ImportReport
-from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
+from acquisition.files.contents.resolve_unit import MOTION_QUANTITIES, choose_signal, resolve_frf_unit
 from acquisition.files.contents.units import parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
 FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
 """Example of the columns of an FRF."""
-FRF_FORM_BY_MOTION: dict[str, FrfQuantity] = {
-    "displacement": "receptance",
-    "velocity": "mobility",
-    "acceleration": "accelerance",
-}
+FRF_FORM_BY_MOTION: dict[str, FrfQuantity] = dict(zip(MOTION_QUANTITIES, get_args(FrfQuantity), strict=True))
 """Form of an FRF by the quantity of its response."""
 MAX_INVALID_COHERENCE_SHARE = 0.02
 """Share of the lines that may have a coherence outside 0 to 1, as the first lines of some analysers have."""

@@ -29,13 +29,14 @@ HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]", in their order, o
 NO_FORCE_ADVICE = "hammer none where no force was measured"
 """Advice where a file has no force."""
 FEW_DIGITS = "its time is printed with few digits: whether samples are missing cannot be seen"
-"""Note on a time whose missing samples nobody can see."""
+"""Note on a time that cannot show missing samples."""
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
 MAX_TIME_DEVIATION = 0.05
 """Largest distance of a time from an even axis, in steps: 9 degrees of phase at half the sample rate.
 
-Seven printed digits at 51.2 kHz are off by 0.003, single precision by 0.012 after 4 s, a lost sample by 0.5 or more."""
+Seven printed digits at 51.2 kHz are off by 0.003, single precision by 0.012 after 4 s, a lost sample by 0.5 or more.
+"""
 MIN_UNEVEN_STEPS = 20
 """Smallest number of uneven steps where few digits are the reason; a lost sample makes one."""
 

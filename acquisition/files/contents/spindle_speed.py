@@ -13,23 +13,43 @@ from acquisition.files.contents.description import Description, ImportReport
 from acquisition.files.contents.units import parse_unit
 
 PULSE_ON_LEVEL, PULSE_OFF_LEVEL = 0.6, 0.4
-"""Share of the range of the signal above which a pulse has begun, and below which it is over; chosen."""
+"""Levels of the signal, as shares of its range, above which a pulse begins and below which it ends; chosen."""
 MAX_TURN_RATIO = 1.4
-"""Time of a turn over that of most beside it, or its inverse, from which on pulses are missing or too many; chosen."""
+"""Ratio of the time of a turn to that of its neighbours, or its inverse, from which pulses are missing or too many."""
 MIN_REGULAR_TURNS_SHARE = 0.8
-"""Share of the turns that must be as long as those beside them; chosen."""
+"""Smallest share of turns that are as long as their neighbours."""
 NEIGHBOR_TURNS = 5
-"""Turns on each side that a turn is compared with; chosen."""
+"""Number of turns on each side to compare with."""
 
 
 def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
-    """Spindle speed at each sample (rpm), shape (n,), from a tachometer in any unit, shape (n,); sample_rate in Hz.
+    """Return the spindle speed at each sample (rpm), shape (n,), from a tachometer signal of any unit, shape (n,).
 
-    pulses: in a turn; from one turn to the next the speed is constant, NaN before the first, after the last and where
-    a pulse is missing. Its mean over time is the number of turns over their time. ValueError for less than two turns,
-    for pulses that come at no even times, and pulses < 1.
+    The speed is constant from one turn to the next. It is NaN before the first turn, after the last, and where a pulse
+    is missing. Its mean over time is the number of turns over their time.
 
-    Example: a pulse of 2 ms each 20 ms.
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+        Signal of the tachometer in any unit.
+    sample_rate
+        Sample rate (Hz).
+    pulses
+        Number of pulses per turn.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Spindle speed (rpm).
+
+    Raises
+    ------
+    ValueError
+        For less than two turns, for irregular pulses, and for pulses < 1.
+
+    Examples
+    --------
+    A pulse of 2 ms every 20 ms.
 
     >>> pulse = np.where(np.arange(2000) % 200 < 20, 5.0, 0.0)
     >>> np.unique(compute_speed_from_pulses(pulse, 10e3)[200:1600].round(3)).tolist()
@@ -57,7 +77,7 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
 
 
 def _find_rising_edges(signal: Floats) -> Floats:
-    """Where pulses begin, in samples and parts of them."""
+    """Find the starts of pulses, in samples and fractions of them."""
     low, high = float(np.min(signal)), float(np.max(signal))
     if not high > low:
         return np.empty(0)

@@ -1,4 +1,4 @@
-"""Units as they stand in recorded files, and their way to SI."""
+"""Parse units of recorded files and convert them to SI."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ MeasuredQuantity = Literal[
     "accelerance",
     "",
 ]
+"""Quantity that a unit measures; empty for others."""
 
 STANDARD_GRAVITY = 9.80665
-"""m/s^2 per g."""
+"""Standard acceleration of gravity (m/s^2 per g)."""
 POUND_FORCE = 4.4482216152605
-"""N per lbf."""
+"""Pound-force (N per lbf)."""
 
 VOLTAGE_UNITS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
-"""V per unit of a voltage as it is written in lower case: no sensor's quantity, and no part of other units."""
+"""Volts per unit of a voltage in lower case; no part of other units."""
 
 QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
     (0, 1, 0): "time",
@@ -41,67 +42,44 @@ QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
     (1, -1, -1): "mobility",
     (1, -2, -1): "accelerance",
 }
+"""Quantity by the exponents of length, time and force."""
 _LENGTH, _TIME, _FORCE, _DIMENSIONLESS = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
-_UNITS_BY_NAME: dict[str, tuple[float, Dimension]] = {
-    "m": (1.0, _LENGTH),
-    "cm": (1e-2, _LENGTH),
-    "mm": (1e-3, _LENGTH),
-    "um": (1e-6, _LENGTH),
-    "micron": (1e-6, _LENGTH),
-    "nm": (1e-9, _LENGTH),
-    "in": (0.0254, _LENGTH),
-    "inch": (0.0254, _LENGTH),
-    "mil": (2.54e-5, _LENGTH),
-    "ft": (0.3048, _LENGTH),
-    "s": (1.0, _TIME),
-    "sec": (1.0, _TIME),
-    "second": (1.0, _TIME),
-    "seconds": (1.0, _TIME),
-    "ms": (1e-3, _TIME),
-    "us": (1e-6, _TIME),
-    "Hz": (1.0, (0, -1, 0)),
-    "kHz": (1e3, (0, -1, 0)),
-    "rpm": (1 / 60, (0, -1, 0)),
-    "cpm": (1 / 60, (0, -1, 0)),
-    "rad": (1 / (2 * math.pi), _DIMENSIONLESS),
-    "N": (1.0, _FORCE),
-    "newton": (1.0, _FORCE),
-    "newtons": (1.0, _FORCE),
-    "daN": (10.0, _FORCE),
-    "kN": (1e3, _FORCE),
-    "mN": (1e-3, _FORCE),
-    "lbf": (POUND_FORCE, _FORCE),
-    "lb": (POUND_FORCE, _FORCE),
-    "kgf": (STANDARD_GRAVITY, _FORCE),
-    "kg": (1.0, (-1, 2, 1)),
-    "g": (STANDARD_GRAVITY, (1, -2, 0)),
-    "gal": (1e-2, (1, -2, 0)),
-    "gn": (STANDARD_GRAVITY, (1, -2, 0)),
-}
+_UNIT_GROUPS: tuple[tuple[Dimension, dict[str, float]], ...] = (
+    (_LENGTH, {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9}),
+    (_LENGTH, {"in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "ft": 0.3048}),
+    (_TIME, {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}),
+    ((0, -1, 0), {"Hz": 1.0, "kHz": 1e3, "rpm": 1 / 60, "cpm": 1 / 60}),
+    (_DIMENSIONLESS, {"rad": 1 / (2 * math.pi)}),
+    (_FORCE, {"N": 1.0, "newton": 1.0, "newtons": 1.0, "daN": 10.0, "kN": 1e3, "mN": 1e-3}),
+    (_FORCE, {"lbf": POUND_FORCE, "lb": POUND_FORCE, "kgf": STANDARD_GRAVITY}),
+    ((-1, 2, 1), {"kg": 1.0}),
+    ((1, -2, 0), {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
+)
+_UNITS_BY_NAME = {name: (factor, group) for group, units in _UNIT_GROUPS for name, factor in units.items()}
 _UNITS_BY_LOWER_NAME = {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}
-"""Mega and milli differ in case only: MN is not known, and mN only as it is written."""
+"""Units in lower case. Mega and milli differ only in case: MN is unknown, and mN is known only as written."""
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
 _TURNS_PER_MINUTE = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
-"""Turns a minute as they are written: minutes are no unit otherwise ("x_min" is the least)."""
+"""Turns per minute as they are written; minutes are no unit otherwise ("x_min" is a minimum)."""
 _METERS_PER_SECOND = re.compile(r"\bms\^?-([12])\b")
-"""Metres a second, or a second squared, without a sign between: no unit of a tap test is a power of a millisecond."""
+"""Metres per second, or per second squared, without a sign between: no unit here is a power of a millisecond."""
 _ASCII_EQUIVALENTS = str.maketrans({"µ": "u", "μ": "u", "¹": "^1", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that is known."""
+    """Known unit."""
 
     quantity: MeasuredQuantity
-    """Quantity that is measured in it; empty where that is nothing a tap test has."""
+    """Quantity that the unit measures; empty where no tap test has it."""
     factor: float
-    """SI value of one such unit."""
+    """SI value of one unit."""
 
 
 def parse_unit(text: str) -> Unit | None:
-    """The unit in a text such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where it is not known.
+    """Parse a unit such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where unknown.
 
-    Hz, rad/s and rpm are frequency, in Hz; g is standard gravity.
+    Hz, rad/s and rpm are frequencies, in Hz; g is standard gravity.
     """
     plain = (
         re.sub(r"_?\bper\b_?|_per_", "/", text.strip())
@@ -122,13 +100,13 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def get_motion(quantity: str) -> str:
-    """Of the response that an FRF was made from; that itself otherwise."""
+    """Return the quantity of the response of an FRF quantity, and other quantities unchanged."""
     motions = {"receptance": "displacement", "mobility": "velocity", "accelerance": "acceleration"}
     return motions.get(quantity, quantity)
 
 
 def _tokenize(text: str) -> list[tuple[str, str, str, str, str]]:
-    """In reverse order: the next one is the last."""
+    """Split a unit into tokens in reverse order, so that pop() takes the next one."""
     tokens, at = list[tuple[str, str, str, str, str]](), 0
     while text[at:].strip():
         token = _TOKEN.match(text, at)
@@ -140,7 +118,7 @@ def _tokenize(text: str) -> list[tuple[str, str, str, str, str]]:
 
 
 def _parse_product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
-    """Factors up to the end or a closing bracket, which is left; "a/b/c" and "a/b*c" go from left to right."""
+    """Parse factors from left to right up to the end or a closing bracket, which remains."""
     value, dimension = _parse_factor(tokens)
     while tokens and tokens[-1][3] != ")":
         sign = -1 if tokens[-1][3] == "/" else 1

@@ -1,9 +1,9 @@
 """Recognize known layouts of variables in MATLAB files.
 
 Seen in public files: vectors by name (`Freq_domain`, `Hf_chan_2`, `Hf_coh_chan_2`, `Time_chan_1`), matrices of a logger
-(`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), structs of Test.Lab
-(`x_values`, `y_values`), and our own. An FRF is taken before signals over time that stand beside it: it is the average
-of the hits, they are one of them; `Description.columns` takes them all the same.
+(`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), SigLab (`SLm`),
+structs of Test.Lab (`x_values`, `y_values`), and our own. An FRF is taken before signals over time: it is the average
+of the hits, they are one of them. `Description.columns` can take them all the same.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from acquisition.files.contents.contents import Contents, Role, Signal, list_arr
 
 _WINDOW_NAME = re.compile(r"(response_?)?window(_?type)?", re.IGNORECASE)
 _WINDOW_LOUD_SHARE = 0.02
-"""Share of the largest value above which a sample tells the window ..."""
+"""Share of the largest value above which a sample shows the window."""
 _WINDOW_FIT_TOLERANCE = 0.02
-"""... which is exponential where the logarithms lie so close to a straight line (rms)."""
+"""Largest rms of the logarithms about a straight line of an exponential window."""
 
 
 def find_window(variables: Mapping[str, Any]) -> str:
-    """As `Contents.window`."""
+    """Find the window as `Contents.window`: stated by a variable, or seen in the signals before and behind it."""
     named = next(
         (value for name, value in variables.items() if _WINDOW_NAME.fullmatch(name) and isinstance(value, str)), ""
     )
@@ -39,7 +39,7 @@ def find_window(variables: Mapping[str, Any]) -> str:
 
 
 def _infer_window(before: Any, behind: Any) -> str:
-    """The window between two signals (n, 2) of time and value; empty where they are the same, or none."""
+    """Infer the window between two signals (n, 2) of time and value; empty where they are equal, or none."""
     if not all(isinstance(pairs, np.ndarray) and pairs.ndim == 2 and pairs.shape[1] == 2 for pairs in (before, behind)):
         return ""
     if before.shape != behind.shape or not np.any(before[:, 1]) or np.array_equal(before[:, 1], behind[:, 1]):
@@ -53,7 +53,7 @@ def _infer_window(before: Any, behind: Any) -> str:
 
 
 def _fit_exponential(time: Floats, level: Floats) -> str:
-    """level: logarithm of the window."""
+    """Fit an exponential to the logarithm of a window."""
     slope, start = np.polyfit(time, level, 1)
     if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:
         return "of unknown form"
@@ -61,11 +61,12 @@ def _fit_exponential(time: Floats, level: Floats) -> str:
 
 
 def read_siglab(v: Mapping[str, Any]) -> Contents | None:
-    """Its FRFs in the units of their channels; None where it is of another program.
+    """Read SigLab (.vna, DSP Technology): FRFs in volts over volts, returned in the units of their channels.
 
     `SLm` holds the frequencies (fdxvec), a cell for each reference and response (xcmeas) and the channels (scmeas) with
-    units for each volt (euscale_fac). That these are not yet in its transfer functions (xfer) is from public files: an
-    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md).
+    units for each volt (euscale_fac). Public files show that these are not yet in its transfer functions (xfer): an
+    accelerometer and a laser at one point agree with them, 0.9 to 1.1 in five of seven (docs/formats.md). None for
+    other programs.
     """
     measured = v.get("SLm")
     if not isinstance(measured, Mapping) or not {"fdxvec", "xcmeas", "scmeas"} <= measured.keys():
@@ -88,7 +89,7 @@ def _make_siglab_signals(measured: Mapping[str, Any]) -> Iterator[Signal]:
 
 
 def _get_siglab_scale(channel: Mapping[str, Any]) -> tuple[float, str]:
-    """Units a volt, and the unit, of a channel."""
+    """Return the units per volt, and the unit, of a channel."""
     return (float(channel["euscale_fac"]), f"({channel['eu_string']})") if channel["eu_on_off"] else (1.0, "V")
 
 
@@ -100,7 +101,7 @@ _TIME_NAME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
 
 
 def recognize_layout(variables: Mapping[str, Any]) -> Contents | None:
-    """What the variables of a file mean where they are of a known layout; None where they are of none."""
+    """Return the contents of variables in a known layout, else None."""
     for layout in (
         _read_lobewatch,
         _read_signal_calc,
@@ -117,7 +118,7 @@ def recognize_layout(variables: Mapping[str, Any]) -> Contents | None:
 
 
 def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
-    """As `lobewatch convert` writes them."""
+    """Read variables as `encode_mat_frf` and `encode_mat_hits` write them."""
     if not isinstance(v.get("written_by"), str) or not v["written_by"].startswith("lobewatch"):
         return None
     texts = {name: v[name] if isinstance(v.get(name), str) else "" for name in ("recorded", "direction", "tool")}
@@ -139,14 +140,15 @@ def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
 
 
 def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
-    """SignalCalc: the abscissa stands in the first column, channel 1 is the hammer.
+    """Read SignalCalc: the abscissa is the first column, channel 1 is the hammer.
 
-    Beside its FRFs stand the signals of the last hit, before the window, for `Description.columns`; alone they are that hit.
+    Next to its FRFs are the signals of the last hit, before the window, for `Description.columns`; without FRFs they
+    are that hit.
     """
     units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
     hit = [(name, match[1]) for name in v if (match := re.fullmatch(r"X(\d+)", name)) and _is_pairs(v[name])]
-    over_time = list(_make_signal_calc_hit(v, hit, units, alone=not frfs))
+    over_time = list(_make_signal_calc_hit(v, hit, units, is_only_hit=not frfs))
     if not frfs:
         return Contents(tuple(over_time)) if len(hit) > 1 else None
     signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
@@ -168,18 +170,18 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
 
 
 def _make_signal_calc_hit(
-    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, alone: bool
+    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, is_only_hit: bool
 ) -> Iterator[Signal]:
-    """Time and channels of a hit; alone: they are what the file is about, so they have their roles."""
+    """Yield time and channels of a hit, with roles only where the file has no FRF."""
     for number, (name, channel) in enumerate(hit):
         role: Role = "force" if channel == "1" else "response"
-        record = 0 if alone else 1
-        if number == 0 or not alone:
+        record = 0 if is_only_hit else 1
+        if number == 0 or not is_only_hit:
             time = np.real(v[name][:, 0])
-            yield Signal(f"{name}:1", time, "time" if alone else "", "s", record=record, is_before_window=True)
+            yield Signal(f"{name}:1", time, "time" if is_only_hit else "", "s", record=record, is_before_window=True)
         values = np.real(v[name][:, 1])
         unit = _get_channel_text(units, channel)
-        yield Signal(f"{name}:2", values, role if alone else "", unit, record=record, is_before_window=True)
+        yield Signal(f"{name}:2", values, role if is_only_hit else "", unit, record=record, is_before_window=True)
 
 
 def _is_pairs(value: Any) -> bool:
@@ -197,7 +199,7 @@ def _get_channel_text(texts: Sequence[str], channel: str) -> str:
 
 
 def _read_test_lab(v: Mapping[str, Any]) -> Contents | None:
-    """Structs with `x_values` (start_value, increment) and `y_values` (values, quantity with a label)."""
+    """Read structs with `x_values` (start_value, increment) and `y_values` (values, quantity with a label)."""
     signals = list[Signal]()
     for name, value in v.items():
         for struct in value if isinstance(value, list) else [value]:
@@ -223,7 +225,7 @@ def _split_struct(name: str, x: Mapping[str, Any], y: Mapping[str, Any], record:
 
 
 def _read_logger(v: Mapping[str, Any]) -> Contents | None:
-    """`freq` is the sample rate, `npts` the length of the record that `yspec` was made from."""
+    """Read a logger: `freq` is the sample rate, `npts` the length of the record that `yspec` was made from."""
     if "freq" not in v or np.ndim(v["freq"]) or not ({"yspec", "indata"} & v.keys()):
         return None
     rate = float(v["freq"])
@@ -240,8 +242,10 @@ def _read_logger(v: Mapping[str, Any]) -> Contents | None:
 
 
 def _read_vectors(v: Mapping[str, Any]) -> Contents | None:
-    """Vectors and matrices of the length of a frequency, complex ones but for coherence; the time signals beside them
-    keep their names and no role, so that `Description.columns` can have them. Only signals over time: those of its length."""
+    """Read complex vectors and matrices of the length of a frequency, and their coherence.
+
+    The time signals keep their names without a role, so that `Description.columns` can have them.
+    """
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
     for name, axis in arrays.items():
         if _FREQUENCY_NAME.fullmatch(name) and _is_rising(axis):
@@ -272,8 +276,11 @@ def _make_vector_signals(
 
 
 def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
-    """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell. What
-    else stands in the file has no role, so that `Description.columns` can have it; an FRF is taken before signals of no name."""
+    """Read a time, or a sample rate, and vectors or a matrix of the same length, with roles by their names.
+
+    Other variables have no role, so that `Description.columns` can have them. An FRF is taken before signals without a
+    role.
+    """
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
     rate = next((float(v[name]) for name in v if _RATE_NAME.fullmatch(name) and _is_number(v[name])), None)
     axis = next((name for name in arrays if _TIME_NAME.fullmatch(name) and _has_equal_length(name, arrays)), None)
@@ -287,15 +294,15 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
         if name != axis
     ]
     others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
-    beside = list(list_array_signals(others))
-    has_frf = any(signal.role == "frf" for signal in beside)
+    unassigned = list(list_array_signals(others))
+    has_frf = any(signal.role == "frf" for signal in unassigned)
     if not signals or (has_frf and not any(signal.role in ("force", "response") for signal in signals)):
         return None
-    return Contents((*signals, *(replace(signal, role="") for signal in beside)))
+    return Contents((*signals, *(replace(signal, role="") for signal in unassigned)))
 
 
 def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether it is a vector as long as others: an axis, though its values may be none."""
+    """Return whether it is a vector as long as others: an axis, though its values may be none."""
     axis = arrays[name]
     return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
 
@@ -305,7 +312,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Vectors of a length, and the columns of matrices, which are name:1, name:2, ..."""
+    """Yield vectors of a length, and the columns of matrices as name:1, name:2, ..."""
     for name, values in arrays.items():
         if values.shape == (n,):
             yield name, values

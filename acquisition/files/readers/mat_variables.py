@@ -1,7 +1,7 @@
-"""The variables of a MATLAB or HDF5 file, read by a program of its own: scipy and HDF5 crash or hang on damaged ones.
+"""Read the variables of a MATLAB or HDF5 file in a subprocess: scipy and HDF5 crash or hang on damaged ones.
 
-That program hands them over as MessagePack: structs as maps, cells as lists, arrays as `numpy.save` writes them, what
-no layout reads as nil; a text in their place says why the file cannot be read.
+The subprocess returns them as MessagePack: structs as maps, cells as lists, arrays as `numpy.save` writes them, and nil
+for what no layout reads. A text in their place states why the file cannot be read.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from acquisition.files.hdf5_file import HDF5_SIGNATURE, MAX_UNPACKED_RATIO, MIN_
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 
 READ_CPU_TIME, READ_CPU_TIME_PER_BYTE = 2.0, 0.2e-6
-"""Processor time that reading may take (s), for any file and for each byte of it: 20 times what sound ones take."""
+"""Processor time of reading (s), for any file and per byte: 20 times what sound files take."""
 READ_TIMEOUT_FACTOR = 30.0
-"""Time for which it is waited over that, on a computer that has other work or no such limit."""
+"""Waiting time over the processor time, for a busy computer or one without such a limit."""
 READ_MEMORY_FACTOR = 6
-"""Memory that reading may take, over the size of what is read at most."""
+"""Memory of reading over the largest unpacked size."""
 MAT_V73_SIGNATURE = b"MATLAB 7.3 MAT-file"
 """First bytes of a file that is HDF5, as MATLAB writes it."""
 ARRAY_EXTENSION_CODE = 1
-"""Number of the MessagePack extension that holds an array."""
+"""Code of the MessagePack extension with an array."""
 
 
 def read_mat_variables(path: Path) -> dict[str, Any]:
-    """All of them by name; DataError where the file is damaged or unpacks out of proportion."""
+    """Read all variables by name; raise DataError where the file is damaged or unpacks out of proportion."""
     try:
         content = run_in_subprocess(
             __name__, str(path), patience=READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
@@ -53,7 +53,7 @@ def _decode_array(_number: int, content: memoryview) -> Any:
 
 
 def main() -> None:
-    """Write the variables of the file that is named to standard output."""
+    """Write the variables of the named file to standard output."""
     sys.stdout.buffer.write(_encode_answer(Path(sys.argv[1])))
 
 
@@ -74,12 +74,11 @@ def _compute_cpu_limit(size: int) -> float:
 
 
 def _limit_for_size(size: int) -> None:
-    """For a file of so many bytes."""
     limit_resources(_compute_cpu_limit(size), READ_MEMORY_FACTOR * max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * size))
 
 
 def _read_v5(path: Path) -> dict[str, Any]:
-    """Variables of v4 and v5 by name."""
+    """Read the variables of v4 and v5 by name."""
     import scipy.io  # it takes a while, and HDF5 does not need it
 
     size = path.stat().st_size
@@ -95,7 +94,7 @@ def _read_v5(path: Path) -> dict[str, Any]:
 
 
 def _read_v73(path: Path) -> dict[str, Any]:
-    """The same of v7.3: arrays transposed, complex numbers as pairs, text as 16-bit codes."""
+    """Read the variables of v7.3 by name: arrays transposed, complex numbers as pairs, text as 16-bit codes."""
     size = path.stat().st_size
     _limit_for_size(size)
     with h5py.File(path, "r") as file:
@@ -124,7 +123,7 @@ def _convert_node(node: Any) -> Any:
 
 
 def _encode_value(value: object) -> object:
-    """What MessagePack has no form of; structs that stand in matrices have their names beside them."""
+    """Encode a value that MessagePack has no form of; structs in matrices have their names in `_fieldnames`."""
     if hasattr(value, "_fieldnames"):
         return {name: field for name, field in vars(value).items() if name != "_fieldnames"}
     if not isinstance(value, np.ndarray | np.generic) or value.dtype.kind not in "biufcSUO":

@@ -1,7 +1,7 @@
 """Parse numbers with decimal points or commas and thousands separators.
 
-What a comma or a point is for, a number tells in which it can be one thing only: `0,5` and `1,2e-6` have a decimal
-comma, `1,234.5` and `1,234,567` commas between thousands; `1,234` alone may be either.
+A number shows what a comma or a point is for where it can be only one thing: `0,5` and `1,2e-6` have a decimal comma,
+`1,234.5` and `1,234,567` have commas between thousands. `1,234` may be either.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from acquisition.arrays import Floats
 
 SignUse = Literal["decimal", "thousands", "doubtful"]
-"""What a sign in a number is for."""
+"""Use of a sign in a number."""
 
 _OTHER_SIGN = {",": ".", ".": ","}
 _BLANK_CHARACTERS = " \u00a0\u2009\u202f'\u2019"
-"""Blanks that stand between thousands, some of which do not break or are thin, and apostrophes."""
+"""Blanks between thousands, some of them non-breaking or thin, and apostrophes."""
 _EXPONENT = r"(?:[eEdD][+-]?\d+)?"
 _THOUSANDS_PATTERN = {
     sign: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{sign}]\d{{3}})+(?:[{other}]\d*)?")
@@ -37,25 +37,25 @@ _DECIMAL_PATTERN = {
 _WITH_BLANKS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:[{_BLANK_CHARACTERS}]\d{{3}})+(?:[.,]\d*)?{_EXPONENT}")
 _IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
 _MISSING_VALUE = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QNAN|SNAN)0*", re.IGNORECASE)
-"""In place of a number, as spreadsheets and older C libraries write it."""
+"""Missing value as spreadsheets and older C libraries write it."""
 
 
 @dataclass(frozen=True)
 class NumberFormat:
-    """How the numbers of a file are written."""
+    """Number format of a column."""
 
     comma: SignUse = "decimal"
-    """What a comma is for."""
+    """Use of a comma."""
     point: SignUse = "decimal"
-    """What a point is for."""
+    """Use of a point."""
 
     @property
     def non_decimal_signs(self) -> str:
-        """Those of both signs that are no decimal sign, or perhaps none."""
+        """Signs that are no decimal sign, or perhaps none."""
         return "".join(sign for sign, use in ((",", self.comma), (".", self.point)) if use != "decimal")
 
     def parse(self, word: str) -> complex:
-        """A word as a number, real where it is; ValueError, as the end of a sentence, where it is none or in doubt."""
+        """Parse a word, real where possible; raise ValueError with the end of a sentence where it is no number."""
         plain = re.sub(f"[{_BLANK_CHARACTERS}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
         for sign, use in ((",", self.comma), (".", self.point)):
             if use != "decimal" and sign in plain:
@@ -67,11 +67,11 @@ class NumberFormat:
 
 
 PLAIN_NUMBER_FORMAT = NumberFormat()
-"""A decimal point or comma, and nothing between thousands."""
+"""Format with a decimal point or comma and nothing between thousands."""
 
 
 def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
-    """A number without what stands between its thousands; ValueError where that is not known, or elsewhere."""
+    """Remove the separators of thousands; raise ValueError where their use is unknown or their place is wrong."""
     if not _THOUSANDS_PATTERN[sign].fullmatch(word):
         raise ValueError("which is no number")
     if use == "doubtful":
@@ -81,7 +81,7 @@ def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
 
 
 def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
-    """How the numbers of each column are written: as one of its own tells, else as those of the others do, if alike."""
+    """Infer the number format of each column from its numbers, else from the other columns where they agree."""
     commas, points = ([_infer_sign_use(sign, column) for column in columns] for sign in _OTHER_SIGN)
     comma, point = _agree_on_use(commas), _agree_on_use(points)
     if point == "doubtful" and not {"decimal", "doubtful"} & {*commas}:
@@ -92,7 +92,7 @@ def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
 
 
 def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
-    """What a sign is for in these words; None where no number has one."""
+    """Infer the use of a sign from words; None where no number has it."""
     if sign not in "".join(words):
         return None
     uses = (use for word in words if sign in word if (use := _classify_sign(sign, word)) is not None)
@@ -101,7 +101,7 @@ def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
 
 
 def _agree_on_use(uses: Sequence[SignUse | None]) -> SignUse:
-    """What a sign is for in all columns that tell; in doubt where none does, or one other than another."""
+    """Return the use of a sign that all columns agree on, else "doubtful"."""
     certain = {use for use in uses if use in ("decimal", "thousands")}
     return certain.pop() if len(certain) == 1 else "doubtful"
 
@@ -117,7 +117,7 @@ def _classify_sign(sign: str, word: str) -> SignUse | None:
 
 
 def is_number(word: str) -> bool:
-    """Whether a word is a number, however that is written."""
+    """Return whether a word is a number in any format."""
     try:
         PLAIN_NUMBER_FORMAT.parse(word)
     except ValueError:
@@ -126,7 +126,7 @@ def is_number(word: str) -> bool:
 
 
 def _parse_number(plain: str) -> complex:
-    """A number with a decimal point; ValueError where it is none."""
+    """Parse a number with a decimal point; raise ValueError where it is none."""
     try:
         return float(plain)
     except ValueError:
@@ -137,18 +137,18 @@ def _parse_number(plain: str) -> complex:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """The numbers of a column, up to its last cell that is not empty."""
+    """Numbers of a column, up to its last cell that is not empty."""
 
     values: NDArray[Any]
     """Numbers, complex where one is, NaN where a cell holds none; shape (n,)."""
     flaws: Mapping[int, str]
-    """What is wrong with a cell that holds none, as "is empty in line 7", by its place in the column."""
+    """Fault of each cell without a number, as "is empty in line 7", by its index."""
 
 
 def parse_columns(columns: Sequence[Sequence[str]], lines: Sequence[int], decimal_sign: str = "") -> list[Column]:
-    """The numbers in the cells of each column, each cell in a line of its own.
+    """Parse the cells of each column, one cell per line.
 
-    decimal_sign: a comma or a point where the file says it; the other one stands between thousands then.
+    decimal_sign: a comma or a point where it is known; the other one separates thousands then.
     """
     by_sign = {",": NumberFormat("decimal", "thousands"), ".": NumberFormat("thousands", "decimal")}
     written = [by_sign[decimal_sign]] * len(columns) if decimal_sign in by_sign else _infer_formats(columns)
@@ -176,7 +176,7 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
 
 
 def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> Floats | None:
-    """The numbers of cells, many times as fast; None where one is complex, missing, or has thousands."""
+    """Parse cells at once; None where a number is complex or missing, or has thousands."""
     text = "\n".join(cells)
     if any(sign in text for sign in numerals.non_decimal_signs):
         return None

@@ -1,4 +1,4 @@
-"""Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files."""
+"""Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files. Known names show what they are."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
 
 
 def read_mat(path: Path) -> Contents:
-    """Its arrays; DataError where it is damaged or unpacks out of proportion."""
+    """Read the arrays of a MATLAB file; raise DataError where it is damaged or unpacks out of proportion."""
     variables = read_mat_variables(path)
     contents = recognize_layout(variables)
     if contents is not None:
@@ -39,7 +39,7 @@ def _is_mat(head: bytes, _path: Path) -> bool:
 
 
 def _is_mat_v4(head: bytes) -> bool:
-    """Whether it begins with the header of a matrix, least or most significant byte first, and its name.
+    """Return whether a file begins with the header of a matrix, in either byte order, and its name.
 
     Source: MAT-File Format (The MathWorks), level 4: type, rows, columns, whether complex, length of the name.
     """
@@ -59,7 +59,7 @@ NPY_SIGNATURE, ZIP_SIGNATURE = b"\x93NUMPY", b"PK\x03\x04"
 
 
 def read_numpy(path: Path) -> Contents:
-    """The arrays of a .npy or .npz file; DataError where they are no numbers, damaged, or unpack out of proportion."""
+    """Read the arrays of a .npy or .npz file; raise DataError for other objects, damage, or too large a size."""
     try:
         with path.open("rb") as file:
             return _read_numpy_file(file, path)
@@ -79,7 +79,7 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
 
 
 def _split_array_fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """An array by its name, or the fields of one that has fields."""
+    """Return an array by a name, or its fields where it has some."""
     names = array.dtype.names
     return {"array": array} if names is None else {name: array[name] for name in names}
 
@@ -93,7 +93,7 @@ def _check_zip_size(file: BinaryIO, path: Path) -> None:
 
 
 def read_hdf5(path: Path) -> Contents:
-    """The data sets of an HDF5 file by their paths; DataError where it is damaged or unpacks out of proportion."""
+    """Read the data sets of an HDF5 file by their paths; raise DataError for damage or unpacking out of proportion."""
     return _make_array_contents(read_mat_variables(path))
 
 
@@ -117,7 +117,7 @@ _SEP005_KEYS = ("data", "name", "unit_str")
 
 
 def read_sep005(path: Path) -> Contents:
-    """Its channels; DataError where it is damaged or no list of time series."""
+    """Read the channels of SEP005 JSON; raise DataError where it is damaged or no list of time series."""
     try:
         channels = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
@@ -126,7 +126,7 @@ def read_sep005(path: Path) -> Contents:
 
 
 def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
-    """What a list of SEP005 dictionaries holds; place: for errors. Channels of one group were recorded together."""
+    """Return the contents of SEP005 dictionaries; place: for errors. Channels of one group were recorded together."""
     signals, groups = list[Signal](), dict[str, int]()
     for number, channel in enumerate(channels, 1):
         where = f"{place}: channel {number}"

@@ -1,6 +1,6 @@
 """Read WAV, FLAC and MP3 files with one channel per sensor.
 
-WAV by scipy, FLAC and MP3 by soundfile where that is installed (`pip install "lobewatch[sound]"`).
+WAV is read by scipy, FLAC and MP3 by soundfile where that is installed (`pip install "lobewatch[sound]"`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ MP3_SYNC_BITS = 0xFFE0
 
 
 def read_audio(path: Path) -> Contents:
-    """Its channels as shares of the full scale, -1 to 1.
+    """Read the channels as shares of the full scale, -1 to 1.
 
-    DataError where it is damaged or cut short, or soundfile is not installed.
+    Raises DataError where the file is damaged or cut short, or soundfile is not installed.
     """
     with path.open("rb") as file:
         is_wav = _is_wav(file.read(12))
@@ -34,7 +34,7 @@ def read_audio(path: Path) -> Contents:
 
 
 def _read_wav(path: Path) -> tuple[int, Floats]:
-    """Sample rate and channels of a WAV file."""
+    """Read sample rate and channels of a WAV file."""
     import scipy.io.wavfile  # it takes a while, and few files need it
 
     content = path.read_bytes()
@@ -53,7 +53,7 @@ def _read_wav(path: Path) -> tuple[int, Floats]:
 
 
 def _read_flac_or_mp3(path: Path) -> tuple[int, Floats]:
-    """Sample rate and channels of a FLAC or MP3 file."""
+    """Read sample rate and channels of a FLAC or MP3 file."""
     try:
         import soundfile
     except ImportError as error:

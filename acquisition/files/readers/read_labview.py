@@ -1,4 +1,8 @@
-"""Read LabVIEW files: LVM text and TDMS."""
+"""Read LabVIEW files: LVM text and TDMS.
+
+LVM has a header, a decimal comma or point, and one time column, one for each channel, or none. TDMS is read by npTDMS
+where that is installed (`pip install "lobewatch[tdms]"`).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ _LVM_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 
 def read_lvm(path: Path) -> Contents:
-    """The channels of every segment; DataError with the place where it fails."""
+    """Read the channels of every segment; raise DataError with the place where it fails."""
     text = read_text(path)
     lines = text.splitlines()
     ends = [i for i, line in enumerate(lines) if line.startswith(_LVM_HEADER_END)]
@@ -84,7 +88,7 @@ def _get_word(words: Sequence[str], i: int) -> str:
 
 
 def _parse_lvm_date(head: Mapping[str, str]) -> datetime | None:
-    """Date and Time of the header, in the local time zone; None where it has none that can be read."""
+    """Return date and time of the header in the local time zone; None where they cannot be read."""
     clock = head.get("Time", "").replace(",", ".").partition(".")[0]
     try:
         return datetime.strptime(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S").astimezone()
@@ -100,7 +104,7 @@ LVM_FORMAT = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_
 
 
 def read_tdms(path: Path) -> Contents:
-    """Its channels of numbers, a record a group; DataError where it is damaged, or npTDMS is not installed."""
+    """Read the channels of numbers, a record per group; raise DataError for a damaged file or without npTDMS."""
     try:
         from nptdms import TdmsFile
     except ImportError as error:
@@ -130,7 +134,7 @@ def _make_tdms_signals(channels: list[Any], record: int) -> Iterator[Signal]:
 
 
 def _get_tdms_start(channel: Any) -> datetime | None:
-    """Of the waveform; TDMS has it in UTC."""
+    """Return the start of the waveform, which TDMS has in UTC."""
     time = channel.properties.get("wf_start_time")
     if time is None:
         return None

@@ -1,13 +1,13 @@
 """Read text tables of numbers and B&K PULSE text.
 
-The separator (tab, semicolon, comma, white space), the decimal comma and the columns are found from the rows. Lines
-above them are headings, of any number; the nearest with a word for each column names columns and units,
+The separator (tab, semicolon, comma, blanks), the decimal comma and the columns of a table are found from its rows.
+Lines above them are headings, of any number. The nearest with a word for each column names columns and units,
 `time_s,force_N,acceleration_g`, `Time (s);Force [N];Acc [m/s^2]`, `Freq (Hz) Real (um/N) Imag (um/N)`, or a line of
-units stands below the names. Lines that begin with # may say `key: value`. Some tap-test programs (.frf) write the
-heading behind the first row of numbers. Complex numbers are read as Python, MATLAB and Fortran write them.
+units is below the names. Lines that begin with # may say `key: value`. Some tap-test programs (.frf) write the heading
+behind the first row. Complex numbers are read as Python, MATLAB and Fortran write them.
 
-Each row is index, abscissa and value, two numbers where it is complex. The header names the function and its unit, the
-unit of the abscissa, and how many rows a block has.
+B&K PULSE exports a header of keys and values, then blocks of rows: index, abscissa and value, two numbers where it is
+complex. The header names the function and its unit, the unit of the abscissa, and the number of rows of a block.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ from acquisition.files.readers.text_file import NumberedLines, decode_text, is_t
 
 _DIGIT = re.compile(r"\d|nan|inf", re.IGNORECASE)
 _LEADING_WORD = re.compile(r"[\s\"']*(?!(?:nan|inf|infinity)\b)[^\W\d_]{2}", re.IGNORECASE)
-"""At the begin of a line that is no row."""
+"""Word at the beginning of a line that is no row."""
 MIN_TABLE_ROWS = 3
-"""Lines in a row that begin with a number where the rows of a table begin."""
+"""Number of consecutive lines with a number at their beginning where a table begins."""
 
 
 def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
-    """The columns of a text file behind its first `skip` lines; DataError with the line where it is no table.
+    """Read the columns of a text file after its first `skip` lines; raise DataError with the line where it is no table.
 
-    decimal_sign: a comma or a point; empty: what the numbers show.
+    decimal_sign: a comma or a point; empty: as the numbers show.
     """
     text = read_text(path)
     lines, comments = number_lines(text, skip)
@@ -60,15 +60,15 @@ def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
         rows, form, heading = _find_rows(path, table, comments)
         columns = read_columns(rows, form, str(path), decimal_sign)
         signals += _name_columns(columns, heading, record)
-        beside = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
-        notes += [f"beside its columns stands {word!r} in the last row" for word in beside]
+        extras = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
+        notes += [f"beside its columns stands {word!r} in the last row" for word in extras]
     _check_complete(path, keys, rows, columns, text)
     notes += [f"below its rows stands {line!r}" for line in footer]
     return replace(_make_table_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
 
 
 def _split_tables(path: Path, lines: NumberedLines) -> Iterator[NumberedLines]:
-    """The table, or those beneath each other where a line above the rows stands again below; with their headings."""
+    """Split a file into its tables with their headings, where a line above the rows comes again below."""
     texts = lines.texts
     first = _find_first_row(path, lines)
     above = {line for line in texts[:first] if _LEADING_WORD.match(line)}
@@ -78,19 +78,19 @@ def _split_tables(path: Path, lines: NumberedLines) -> Iterator[NumberedLines]:
 
 
 def _remove_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
-    """Lines up to the last that may be a row, and words behind it."""
+    """Return the lines up to the last that may be a row, and the words behind it."""
     form = detect_separator(lines.texts[-1:] or [""])
     last = next((i for i in range(len(lines.texts), 0, -1) if _may_be_row(lines.texts[i - 1], form)), 0)
     return (lines[:last], lines.texts[last:]) if last else (lines, [])
 
 
 def _may_be_row(line: str, form: RowLayout) -> bool:
-    """Whether it has a digit, and more than one number where it begins with a word."""
+    """Return whether a line has a digit, and more than one number where it begins with a word."""
     return bool(_DIGIT.search(line)) and (not _LEADING_WORD.match(line) or sum(map(is_number, form.split(line))) > 1)
 
 
 def _name_columns(columns: Sequence[Column], heading: Heading, record: int) -> list[Signal]:
-    """Columns with their names, units and what they therefore are; heading: empty where there is none."""
+    """Return the columns with their names, units and roles; heading: empty without one."""
     n_rows = max((column.values.size for column in columns), default=0)
     named = zip(heading or [("", "")] * len(columns), columns, strict=True)
     return [
@@ -100,7 +100,7 @@ def _name_columns(columns: Sequence[Column], heading: Heading, record: int) -> l
 
 
 def _make_column_signal(name: str, unit: str, column: Column) -> Signal:
-    """Complex numbers are an FRF, and real ones none."""
+    """Make a signal: complex numbers are an FRF, real ones are none."""
     values, flaws = column.values, column.flaws
     if np.iscomplexobj(values):
         return Signal(name, values, "frf", unit, flaws=flaws)
@@ -110,7 +110,7 @@ def _make_column_signal(name: str, unit: str, column: Column) -> Signal:
 
 
 def _find_rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowLayout, Heading]:
-    """The rows, how they are written, and the heading above them, behind the first or among comments."""
+    """Return the rows, their layout, and the heading above them, behind the first or among comments."""
     first = _find_first_row(path, lines)
     begin = max(first - 1, 0)  # of the row that may have the heading behind it
     plain = NumberedLines([*map(normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
@@ -129,7 +129,7 @@ def _find_rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tup
 
 
 def _begins_in_column(line: str, form: RowLayout) -> bool:
-    """Whether the first of the columns holds a number in this line."""
+    """Return whether the first of the columns holds a number in this line."""
     words = form.split(line)
     return form.columns[0] < len(words) and is_number(words[form.columns[0]])
 
@@ -147,7 +147,7 @@ def _find_first_row(path: Path, lines: NumberedLines) -> int:
 
 
 def _reject_broken_row(path: Path, above: NumberedLines, form: RowLayout, width: int) -> None:
-    """DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
+    """Raise DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
     words = form.split(normalize_complex(above.texts[-1])) if above.texts else []
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
@@ -160,7 +160,7 @@ def _reject_broken_row(path: Path, above: NumberedLines, form: RowLayout, width:
 def _check_complete(
     path: Path, keys: Mapping[str, str], rows: NumberedLines, columns: Sequence[Column], text: str
 ) -> None:
-    """DataError where the last row has no line end and lacks a number, or our table is not as its heading says."""
+    """Raise DataError where the last row is cut short, or a table of lobewatch differs from its heading."""
     last, has_end = f"{path}: line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
     if not has_end and any(column.values.size == len(rows.texts) - 1 for column in columns):
         raise DataError(f"{last} ends within its row: the file is cut short; export it anew, or take out that line")
@@ -198,7 +198,7 @@ _PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), 
 
 
 def read_pulse(path: Path) -> Contents:
-    """The function of every block; DataError with the place where it is cut short or its header says too little."""
+    """Read the function of every block; raise DataError where it is cut short or its header states too little."""
     lines, _ = number_lines(read_text(path), 0)
     blocks = _find_pulse_blocks(lines)
     header = _parse_pulse_header(lines.texts[: blocks[0][0]]) if blocks else {}
@@ -228,14 +228,14 @@ def read_pulse(path: Path) -> Contents:
 
 
 def _find_pulse_blocks(lines: NumberedLines) -> list[tuple[int, int]]:
-    """Where the rows of each block begin, and the line behind the last."""
+    """Return where the rows of each block begin and end."""
     are_rows = [line.lstrip()[:1].isdigit() for line in lines.texts]
     edges = np.flatnonzero(np.diff([0, *are_rows, 0])).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _parse_pulse_header(lines: Sequence[str]) -> dict[str, str]:
-    """What stands behind the keys of these lines; keys in lower case."""
+    """Return the values by their keys in lower case."""
     parts = (line.partition(":") for line in lines)
     return {key.strip().lower(): value.strip() for key, _, value in parts if value.strip()}
 
@@ -248,7 +248,7 @@ def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
 
 
 def _parse_pulse_date(header: Mapping[str, str]) -> datetime | None:
-    """Date and time of the first block, in the local time zone; None where it has none that can be read."""
+    """Return date and time of the first block in the local time zone; None where they cannot be read."""
     pattern = header.get("date format", "")
     for part, directive in _PULSE_DATE_PARTS:
         pattern = re.sub(rf"(?<![%\w]){part}(?!\w)", directive, pattern)

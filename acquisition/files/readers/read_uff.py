@@ -1,6 +1,7 @@
-"""Universal files, data set 58, ASCII and binary: FRFs, coherence and signals over time; units of data set 164.
+"""Read universal files, data set 58, ASCII and binary, with the units of data set 164.
 
-Source: SDRC Universal File Formats 58, 58b, 151, 164 (University of Cincinnati, SDRL).
+FRFs, coherence and signals over time are read. Source: SDRC Universal File Formats 58, 58b, 151, 164 (University of
+Cincinnati, SDRL).
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from acquisition.files.readers.uff_dataset_58 import UffFunction, read_function
 
 _DATA_SET_MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
 _UNIT_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN"), 7: ("in", "lbf"), 9: ("mm", "N")}
-"""Data set 164: code -> units of length and force."""
+"""Units of length and force by the code in data set 164."""
 _MOTION_TYPES = {8: ("displacement", ""), 11: ("velocity", "/s"), 12: ("acceleration", "/s^2")}
-"""Type of an ordinate -> its quantity, and what stands behind its length."""
+"""Quantity of an ordinate type, and the part of its unit behind the length."""
 _FORCE_TYPES = (9, 13)
 _TIME_TYPE, _FRF_TYPE, _COHERENCE_TYPE = 1, 4, 6
 _DATE_FORMATS = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-%m-%dT%H:%M:%S%z")
@@ -28,10 +29,10 @@ _DATE_FORMATS = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y
 
 @dataclass(frozen=True)
 class UffDataSets:
-    """What the data sets of a file hold."""
+    """Data sets of a file."""
 
     functions: Sequence[UffFunction]
-    """Data sets 58, in their order."""
+    """Data sets 58 in their order."""
     system: tuple[str, str] | None
     """Units of length and force by data set 164."""
     models: tuple[str, ...]
@@ -39,7 +40,7 @@ class UffDataSets:
 
 
 def read_uff(path: Path) -> Contents:
-    """Its FRFs with their coherence, or its signals over time; DataError with the data set where it is damaged."""
+    """Read FRFs with their coherence, or signals over time; raise DataError with the data set where it is damaged."""
     sets = _read_data_sets(path, path.read_bytes())
     frfs = [function for function in sets.functions if function.type == _FRF_TYPE]
     kinds = sorted({function.type for function in sets.functions} - {_TIME_TYPE, _FRF_TYPE, _COHERENCE_TYPE})
@@ -89,7 +90,7 @@ def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
 
 
 def _make_frf_signals(sets: UffDataSets, frfs: Sequence[UffFunction]) -> Iterator[Signal]:
-    """Each in a record of its own, turned to the positive direction of both axes."""
+    """Return one record per FRF with positive axis directions."""
     for record, frf in enumerate(frfs):
         unit, quantity = _get_frf_unit(frf, sets.system)
         sign = -1.0 if frf.response_direction * frf.reference_direction < 0 else 1.0
@@ -106,7 +107,7 @@ def _make_frf_signals(sets: UffDataSets, frfs: Sequence[UffFunction]) -> Iterato
 
 
 def _get_frf_unit(frf: UffFunction, system: tuple[str, str] | None) -> tuple[str, str]:
-    """Unit and quantity of the response, as far as the file tells."""
+    """Return unit and quantity of the response as far as known."""
     quantity, per_time = _MOTION_TYPES.get(frf.ordinate.type, ("", ""))
     top, below = frf.ordinate.unit, frf.denominator.unit
     if not top and system and quantity:
@@ -117,7 +118,7 @@ def _get_frf_unit(frf: UffFunction, system: tuple[str, str] | None) -> tuple[str
 
 
 def _make_time_signals(sets: UffDataSets) -> Iterator[Signal]:
-    """Channels; where one comes again, the next hit begins."""
+    """Return the channels; where one comes again, the next hit begins."""
     record, places = 0, set[tuple[object, ...]]()
     for function in (listed for listed in sets.functions if listed.type == _TIME_TYPE):
         if (function.place, function.ordinate.type) in places:
@@ -137,7 +138,7 @@ def _make_time_signals(sets: UffDataSets) -> Iterator[Signal]:
 
 
 def _get_common_direction(sets: UffDataSets) -> str:
-    """At the tool tip, where all responses have the same."""
+    """Return the direction at the tool tip where all responses have the same."""
     responses = {
         abs(function.response_direction) for function in sets.functions if function.ordinate.type in _MOTION_TYPES
     }
@@ -153,7 +154,7 @@ def _list_notes(frfs: Sequence[UffFunction]) -> Iterator[str]:
 
 
 def _parse_date(function: UffFunction) -> datetime | None:
-    """The third line, or that of our own files; local time where it has no zone."""
+    """Return the date of the third line, or that of lobewatch's own files; local time where it has no zone."""
     text = function.keys.get("recorded") or function.lines[2].strip()
     for form in _DATE_FORMATS:
         try:

@@ -15,18 +15,20 @@ from acquisition.files.readers.number_format import Column, is_number, parse_col
 from acquisition.files.readers.text_file import NumberedLines, split_fields
 
 LAYOUT_SAMPLE_ROWS = 200
-"""Rows that tell which words are columns."""
+"""Number of rows that show which words are columns."""
 MIN_ROWS_FOR_TEXT_COLUMN = 3
-"""Rows below which a word that is no number is no column of words, but a mistake."""
+"""Smallest number of rows in which a word that is no number makes a column of words instead of a mistake."""
 MIN_SHORT_COLUMN_ROWS = 8
-"""Rows, at least, of a column that ends before half of the table, as a hit has no fewer samples and notes have; and of
-those at the end that stop before the last column, as fewer may have lost a number."""
+"""Smallest number of rows of a column that ends before half of the table, and of rows that stop before the last column.
+
+A hit has no fewer samples, and notes have fewer rows. A few short rows at the end may have lost a number.
+"""
 BLANK_SEPARATOR = "[ \t]+"
-"""Separator of words that stand apart by blanks: none of them can be empty. Others stand within numbers."""
+"""Separator of words between blanks; none of them can be empty."""
 _UNSIGNED_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _COMPLEX_PAIR = re.compile(rf"\(\s*([+-]?{_UNSIGNED_NUMBER})\s*,\s*([+-]?{_UNSIGNED_NUMBER})\s*\)")
 _COMMA_OR_POINT_NUMBER = _UNSIGNED_NUMBER.replace(r"\.", "[.,]")
-"""With a decimal point or comma."""
+"""Pattern of a number with a decimal point or comma."""
 _COMPLEX_SUM = re.compile(rf"({_COMMA_OR_POINT_NUMBER})\s*([+-])\s*({_COMMA_OR_POINT_NUMBER})\s*[ij]\b")
 _TIMESTAMP = re.compile(r"\d{1,4}([-/.:])\d{1,2}\1\d{1,4}")
 _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
@@ -34,15 +36,15 @@ _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
 
 @dataclass(frozen=True)
 class RowLayout:
-    """How rows are written."""
+    """Layout of the rows of a table."""
 
     separator: str
     """Pattern between two words of a row."""
     columns: tuple[int, ...] = ()
-    """Which words of a row are numbers, from 0 on."""
+    """Index of the words of a row that are numbers."""
 
     def split(self, line: str) -> list[str]:
-        """The words of a line."""
+        """Split a line into words."""
         line = line.strip(" \r\n") if self.separator == "\t" else line.strip()
         if '"' in line and self.separator != BLANK_SEPARATOR:
             return split_fields(line, self.separator)
@@ -50,14 +52,14 @@ class RowLayout:
 
 
 def normalize_complex(line: str) -> str:
-    """A line with its complex numbers, `(1,2)` or `1 + 2i`, as Python writes them."""
+    """Return a line with its complex numbers, `(1,2)` or `1 + 2i`, as Python writes them."""
     if "(" in line:
         line = _COMPLEX_PAIR.sub(lambda match: f"{match[1]}{'' if match[2][0] in '+-' else '+'}{match[2]}j", line)
     return _COMPLEX_SUM.sub(r"\1\2\3j", line) if "i" in line or "j" in line else line
 
 
 def begins_with_number(line: str) -> bool:
-    """Whether a line may be a row, by itself."""
+    """Return whether a single line may be a row."""
     line = normalize_complex(line)
     word, *others = [*filter(None, detect_separator([line]).split(line)), ""]
     if _TIMESTAMP.match(word):
@@ -66,7 +68,7 @@ def begins_with_number(line: str) -> bool:
 
 
 def detect_separator(rows: Sequence[str]) -> RowLayout:
-    """What separates the words of rows; the first one with a comma tells what that is."""
+    """Detect the separator of rows; the first row with a comma shows what that is for."""
     for separator in ("\t", ";"):
         if separator in rows[0].strip():
             return RowLayout(separator)
@@ -77,12 +79,12 @@ def detect_separator(rows: Sequence[str]) -> RowLayout:
 
 
 def _is_single_number(word: str) -> bool:
-    """Whether it is one number, and no part of a row between commas."""
+    """Return whether a word is one number instead of a part of a row between commas."""
     return is_number(word) and not word.endswith(",")
 
 
 def detect_row_layout(rows: Sequence[str]) -> RowLayout:
-    """How rows are written; the first one may have a heading behind it, and does not tell."""
+    """Detect the layout of rows; the first one may have a heading behind it and does not count."""
     form = detect_separator(rows[1:] or rows)
     begin, below = rows[:MIN_SHORT_COLUMN_ROWS], rows[MIN_SHORT_COLUMN_ROWS:]
     sample = [form.split(row) for row in (*begin, *below[:: max(len(below) // LAYOUT_SAMPLE_ROWS, 1)])]
@@ -93,20 +95,20 @@ def detect_row_layout(rows: Sequence[str]) -> RowLayout:
 
 
 def _is_number_column(words: Sequence[str]) -> bool:
-    """Whether most words are numbers, or most of those above the last that is, if they are no notes beside the rows."""
+    """Return whether most words are numbers, or most of those above the last number where these are no notes."""
     filled = [i for i, word in enumerate(words, 1) if is_number(word)]
     return 2 * len(filled) > len(words) or (len(filled) >= MIN_SHORT_COLUMN_ROWS and 2 * len(filled) > filled[-1])
 
 
 def _trim_empty_end(words: Sequence[str]) -> Sequence[str]:
-    """Words without an empty one behind the last separator."""
+    """Remove an empty word behind the last separator."""
     return words[:-1] if len(words) > 1 and not words[-1] else words
 
 
 def read_columns(rows: NumberedLines, form: RowLayout, place: str, decimal_sign: str = "") -> list[Column]:
-    """The numbers of each column; DataError with the line where a row has more or fewer.
+    """Read the numbers of each column; raise DataError with the line where a row has more or fewer.
 
-    place: for messages; decimal_sign: where the file says it.
+    place: for messages; decimal_sign: where it is known.
     """
     cells = _split_cells_fast(form, rows.texts)
     if cells is None:
@@ -117,7 +119,7 @@ def read_columns(rows: NumberedLines, form: RowLayout, place: str, decimal_sign:
 
 
 def _split_cells_fast(form: RowLayout, rows: Sequence[str]) -> list[list[str]] | None:
-    """The words of each column where all rows are alike, many times as fast; None where they are not."""
+    """Split rows of the same layout at once; None where rows differ."""
     separator, n = (None if form.separator == BLANK_SEPARATOR else form.separator), len(form.columns)
     text = (separator or " ").join(rows)
     widths = {len(row.split()) for row in rows} if separator is None else {row.count(separator) + 1 for row in rows}
@@ -129,7 +131,7 @@ def _split_cells_fast(form: RowLayout, rows: Sequence[str]) -> list[list[str]] |
 
 
 def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: RowLayout, place: str) -> None:
-    """DataError for a row that goes on behind the last column, or stops before it unless some at the end all do."""
+    """Raise DataError for a row that goes on behind the last column, or stops early unless all rows at the end do."""
     last, width, usual = form.columns[-1], len(form.columns), statistics.mode(map(len, words))
     n_whole = max((i for i, row in enumerate(words, 1) if len(row) > last), default=0)
     may_stop = form.separator != BLANK_SEPARATOR and len(words) - n_whole >= MIN_SHORT_COLUMN_ROWS
@@ -145,22 +147,22 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
 
 
 Heading = list[tuple[str, str]]
-"""Name and unit of each column; empty where they are not said."""
+"""Name and unit of each column; empty where unknown."""
 _RATIO_LABEL = "Units: Ratio"
 _UNIT_PRODUCT = re.compile(r"(\(.+\))(\(.+\))")
 _LETTER = re.compile(r"[^\W\d_]")
 _UNIT_LABEL = re.compile(r"unit|einheit|unidad|単位|单位", re.IGNORECASE)
-"""At the begin of a line of units."""
+"""Label at the beginning of a line of units."""
 _COMMENT_MARK = re.compile(r"^\s*[#%!*/]+\s*")
-"""Of a comment."""
+"""Mark of a comment."""
 _SPACE_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
 
 
 def find_heading_above(lines: Sequence[str], form: RowLayout, width: int) -> Heading:
-    """From the line with a word for each column of which most are known, the nearest of several; its units from a line
-    of units. Empty where no line has so many words.
+    """Find the names and units above a table.
 
-    width: words of a row.
+    The nearest line with a word for each column, most of them known, has the names. A line of units has the units.
+    Empty where no line has so many words. width: words of a row.
     """
     lines = [_COMMENT_MARK.sub("", line) for line in lines]
     by_line = [words for line in reversed(lines) if (words := _split_words(line, form, width))]
@@ -174,12 +176,11 @@ def find_heading_above(lines: Sequence[str], form: RowLayout, width: int) -> Hea
 
 
 def _count_known_roles(words: Sequence[str]) -> int:
-    """How many tell what their column is."""
     return sum(bool(infer_role(*split_heading(word))) for word in words)
 
 
 def find_heading_behind(row: str, form: RowLayout) -> Heading:
-    """Behind the numbers of a row: a name and a unit for each column, or names alone; else empty."""
+    """Find the names and units behind the numbers of a row, a name and a unit per column or only names; else empty."""
     width = len(form.columns)
     words = re.split(
         r"\s+" if form.separator in (BLANK_SEPARATOR, "\t") else form.separator, row.strip(), maxsplit=width
@@ -193,17 +194,17 @@ def find_heading_behind(row: str, form: RowLayout) -> Heading:
 
 
 def _pair_alternating(words: Sequence[str]) -> Heading:
-    """Of a name and a unit for each column in turn."""
+    """Pair a name and a unit of each column in turn."""
     return [(name, unit if is_unit(unit) else "") for name, unit in zip(words[::2], words[1::2], strict=True)]
 
 
 def is_unit_line(lines: Sequence[str], form: RowLayout, width: int) -> bool:
-    """Whether the last of these lines is one of units."""
+    """Return whether the last of these lines is a line of units."""
     return bool(lines) and _are_units(_split_words(lines[-1], form, width))
 
 
 def _split_words(line: str, form: RowLayout, width: int) -> list[str]:
-    """A word for each column, whatever separates them; empty where there are more or fewer."""
+    """Split a line into a word per column with any separator; empty where there are more or fewer words."""
     joined = _SPACE_BEFORE_BRACKET.sub("", line)
     for separator in (form.separator, "\t", ";", ",", "[ \t]{2,}", BLANK_SEPARATOR):
         text = line if separator in ",;\t" else joined
@@ -224,7 +225,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _are_units(words: Sequence[str]) -> bool:
-    """Whether all are units; or the first is one of time or frequency and no other a name that is known."""
+    """Return whether all words are units, or the first is one of time or frequency and no other a known name."""
     bare = [word.strip("()[] ") for word in words if not _UNIT_LABEL.match(word)]
     if not any(bare):
         return False
@@ -237,10 +238,10 @@ def _are_units(words: Sequence[str]) -> bool:
 
 
 def _pair_names_and_units(names: Sequence[str], units: Sequence[str], *, is_ratio: bool) -> Heading:
-    """is_ratio: whether a product of units is meant as a ratio."""
+    """Pair names and units; is_ratio: whether a product of units is meant as a ratio."""
     if not units:
         return [split_heading(name) for name in names]
-    said = ["" if _UNIT_LABEL.match(word) else word for word in units]
-    bare = [word.strip("()[] ") if parse_unit(word) is None else word for word in said]
+    labels = ["" if _UNIT_LABEL.match(word) else word for word in units]
+    bare = [word.strip("()[] ") if parse_unit(word) is None else word for word in labels]
     texts = [_UNIT_PRODUCT.sub(r"\1/\2", unit) if is_ratio else unit for unit in bare]
     return [(name, text.strip("-")) for name, text in zip(names, texts, strict=True)]

@@ -15,24 +15,24 @@ _TWO_NUMBERS = re.compile(
     rf"^[\W_]*?{_NUMBER_PATTERN}(?:[ \t;,]+{_NUMBER_PATTERN}(?![.\w])|[ \t]*[+-][ \t]*{_NUMBER_PATTERN}[ij])",
     re.MULTILINE,
 )
-"""In a row, or as the two parts of a complex one."""
+"""Two numbers in a row, or the two parts of a complex one."""
 TEXT_HEAD_SIZE = 65536
-"""Bytes of a file that tell whether it has numbers."""
+"""Number of bytes of a file that show whether it has numbers."""
 
 
 def read_text(path: Path) -> str:
-    """UTF-8, UTF-16 with its mark or without, else Latin-1, in which every byte is a character."""
+    """Read a text in UTF-8, UTF-16 with or without its mark, else Latin-1, where every byte is a character."""
     return decode_text(path.read_bytes())
 
 
 def decode_text(content: bytes) -> str:
-    """The same of the bytes of a file, or of its first ones."""
+    """Decode the bytes of a text file, or its first ones, as `read_text` does."""
     encoding = _detect_utf16(content[:TEXT_HEAD_SIZE])
     return content.decode(encoding, errors="replace") if encoding else decode_utf8_or_latin1(content)
 
 
 def decode_utf8_or_latin1(content: bytes) -> str:
-    """UTF-8, else Latin-1."""
+    """Decode UTF-8, else Latin-1."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -40,9 +40,9 @@ def decode_utf8_or_latin1(content: bytes) -> str:
 
 
 def _detect_utf16(head: bytes) -> str:
-    """UTF-16, by its mark, or as of two bytes the same one is zero in most characters and never the other; else empty.
+    """Detect UTF-16 by its mark, or by zero bytes at the same place of most characters; return its name, else "".
 
-    Numbers, blanks and separators are such characters, in whatever language the words between them are.
+    Numbers, blanks and separators have such a zero byte, whatever the language of the words is.
     """
     if head.startswith(_UTF16_MARKS):
         return "utf-16"
@@ -53,20 +53,20 @@ def _detect_utf16(head: bytes) -> str:
 
 
 def split_fields(line: str, separator: str) -> list[str]:
-    """The words of a line; within quotes a separator is none, but in a line that stands in quotes as a whole."""
+    """Split a line into words; quotes protect separators, unless they enclose the whole line."""
     words = [word.strip() for word in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
     return split_fields(words[0], separator) if len(words) == 1 and separator in words[0] else words
 
 
 def is_text(head: bytes) -> bool:
-    """Whether these first bytes can be those of a text."""
+    """Return whether these first bytes can be those of a text."""
     return b"\x00" not in head or bool(_detect_utf16(head))
 
 
 def is_prose(path: Path) -> bool:
-    """Whether a file is a text in which no line begins with two numbers, as notes that lie beside recordings.
+    """Return whether a file is a text without a line that begins with two numbers, like notes next to recordings.
 
-    The first 64 kB are looked at; no file that is empty or cannot be read is prose.
+    The first 64 kB are checked. A file that is empty or cannot be read is no prose.
     """
     try:
         with path.open("rb") as file:
@@ -79,20 +79,19 @@ def is_prose(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class NumberedLines:
-    """Some lines of a file."""
+    """Lines of a file with their numbers."""
 
     texts: Sequence[str]
     """Lines without their ends."""
     numbers: Sequence[int]
-    """Number of each line, from 1 on."""
+    """Number of each line, from 1."""
 
     def __getitem__(self, part: slice) -> NumberedLines:
-        """Some of them."""
         return NumberedLines(self.texts[part], self.numbers[part])
 
 
 def number_lines(text: str, skip: int) -> tuple[NumberedLines, list[str]]:
-    """Those behind the first `skip` that are not empty, and what stands behind # in others."""
+    """Return the lines after the first `skip` that are not empty, and the comments behind # in others."""
     texts = text.splitlines()[skip:]
     if "#" not in text and all(map(str.strip, texts)):
         return NumberedLines(texts, range(skip + 1, skip + len(texts) + 1)), []

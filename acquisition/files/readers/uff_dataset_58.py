@@ -1,4 +1,4 @@
-"""Read data set 58 of a universal file, text or binary."""
+"""Read data set 58 of a universal file: eleven lines of header, then the values as text or as bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from acquisition.errors import DataError
 from acquisition.files.readers.text_file import decode_utf8_or_latin1
 
 _NUMBERS_PER_VALUE = {2: 1, 4: 1, 5: 2, 6: 2}
-"""Type of the ordinate data -> numbers a value: real and complex, single and double."""
+"""Number of numbers per value by the type of the ordinate data: real and complex, single and double."""
 _NUMBER_TOKEN = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?|[+-]?nan|[+-]?inf", re.IGNORECASE)
 
 
@@ -24,29 +24,29 @@ class UffAxis:
     type: int
     """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
     unit: str
-    """Unit; empty where the file says none."""
+    """Unit; empty where unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class UffFunction:
-    """One data set 58."""
+    """Data set 58."""
 
     lines: tuple[str, ...]
-    """The five lines of identification."""
+    """Five lines of identification."""
     type: int
     """Code of the function: 1 over time, 4 FRF, 6 coherence."""
     name: str
-    """Name for people: where it was measured."""
+    """Name for people: the measured points."""
     response_direction: int
-    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where it does not say."""
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where unknown."""
     reference_direction: int
-    """Direction of the hammer, likewise."""
+    """Direction of the hammer in the same code."""
     place: tuple[object, ...]
-    """Nodes and directions: the same for an FRF and its coherence."""
+    """Nodes and directions, equal for an FRF and its coherence."""
     abscissa: Floats
     """Abscissa in its unit, shape (n,)."""
     step: float
-    """Step of an even abscissa; 0 where it is not even."""
+    """Step of an even abscissa; 0 where it is uneven."""
     values: Floats | Complexes
     """Values of the function in their unit, shape (n,)."""
     abscissa_axis: UffAxis
@@ -58,12 +58,12 @@ class UffFunction:
 
     @property
     def keys(self) -> dict[str, str]:
-        """What lines of identification say as `key=value`, as our own files do."""
+        """Entries `key=value` in the lines of identification, as lobewatch writes them."""
         return {key: value for line in self.lines for key, value in re.findall(r"(\w+)=([^;]*)(?:;|$)", line)}
 
     @property
     def averages(self) -> int | None:
-        """Hits averaged, where the identification says so."""
+        """Number of averaged hits; None where unknown."""
         number = self.keys.get("averages", "") or "".join(
             re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", " ".join(self.lines))[:1]
         )
@@ -71,13 +71,13 @@ class UffFunction:
 
     @property
     def window(self) -> str:
-        """Over the response, where the identification names one."""
+        """Window over the response; empty where unknown."""
         match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
         return match[1].strip() if match else ""
 
 
 def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, int]:
-    """The data set whose first line begins there, and where its values end; place: for errors."""
+    """Read the data set whose first line begins here, and return where its values end; place: for errors."""
     ends = [begin]
     for _ in range(12):
         end = content.find(b"\n", ends[-1])
@@ -142,7 +142,7 @@ def _make_function(
 
 
 def _parse_point(text: str) -> tuple[str, int, int]:
-    """Name, node and direction."""
+    """Return name, node and direction."""
     name = text[:10].strip()
     node, direction = (re.sub(r"[^\d-]", "", part) for part in (text[10:20], text[20:24]))
     return ("" if name == "NONE" else name), int(node or 0), int(direction or 0)
@@ -150,11 +150,8 @@ def _parse_point(text: str) -> tuple[str, int, int]:
 
 def _format_point(point: tuple[str, int, int]) -> str:
     name, node, direction = point
-    sign = (
-        ""
-        if not direction
-        else f"{'-' if direction < 0 else ''}{'xyz'[abs(direction) - 1] if abs(direction) < 4 else ''}"
-    )
+    axis = "xyz"[abs(direction) - 1] if 0 < abs(direction) < 4 else ""
+    sign = f"-{axis}" if direction < 0 else axis
     return " ".join(filter(None, [name, str(node) if node or sign else "", sign]))
 
 
@@ -165,7 +162,7 @@ def _parse_axis(line: str) -> UffAxis:
 
 
 def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[Floats, int]:
-    """n numbers, in columns that may touch each other."""
+    """Read n numbers in columns that may touch each other."""
     end = content.find(b"\n    -1", begin - 1)
     body = content[begin : end if end >= 0 else len(content)]
     numbers = _NUMBER_TOKEN.findall(body)
@@ -180,7 +177,7 @@ def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[F
 def _read_binary_values(
     place: str, head: str, content: bytes, begin: int, n: int, layout: tuple[int, bool]
 ) -> tuple[Floats, int]:
-    """n values of the binary form; an uneven abscissa is single precision beside single values, else double."""
+    """Read n values; an uneven abscissa is single precision next to single values, else double."""
     kind, even = layout
     words = head.split()
     order, form = int(words[1]), int(words[2])

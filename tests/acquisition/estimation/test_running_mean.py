@@ -19,6 +19,8 @@ from acquisition import (
     estimate_frf,
 )
 
+pytestmark = pytest.mark.quick
+
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]
@@ -38,7 +40,7 @@ def mean_of(hits: list[Hit]) -> RunningMean:
 
 
 def pulse(scale: float, noise: float = 0.0, seed: int = 0) -> Hit:
-    """A hit on a structure that answers each force sample with `scale` times it, 3 samples later, plus noise."""
+    """Make a hit on a structure that answers each force sample with `scale` times it, 3 samples later, plus noise."""
     force = np.zeros(1024)
     force[100:108] = 20, 70, 100, 80, 50, 26, 11, 4
     random = np.random.default_rng(seed).normal(scale=noise, size=1024) if noise else np.zeros(1024)

@@ -29,7 +29,7 @@ def rows(columns: np.ndarray) -> str:
 
 @pytest.fixture
 def hit(tmp_path: Path) -> Path:
-    """A hit on one mode at 512 Hz, in the dummy format under a misleading name."""
+    """Write a hit on one mode at 512 Hz in the dummy format under a misleading name."""
     time = np.arange(12800) / RATE
     pulse = np.where(np.abs(time - 0.01) < 1e-3, 100 * np.cos(np.pi * (time - 0.01) / 2e-3) ** 2, 0.0)
     ringing = np.exp(-2 * np.pi * 512 * 0.02 * time) * np.sin(2 * np.pi * 512 * time)
@@ -40,7 +40,7 @@ def hit(tmp_path: Path) -> Path:
 
 
 def plugin(folder: Path, package: str, code: str) -> Path:
-    """A package whose entry point of the same name leads to `code`."""
+    """Make a package whose entry point of the same name leads to `code`."""
     about = folder / f"{package}-1.0.dist-info"
     about.mkdir(parents=True)
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")

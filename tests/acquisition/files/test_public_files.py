@@ -15,7 +15,10 @@ DATA = Path(__file__).parents[2] / "data"
 
 def test_an_analysers_mat_file_with_frf_and_coherence() -> None:
     path = DATA / "vibrationtesting" / "case1.mat"
-    assert inspect_file(path).problems == "it does not say: the unit of Hf_chan_2 (--unit, such as m/N, um/N, g/N)"
+    assert (
+        inspect_file(path).problems
+        == "it does not say: the unit of Hf_chan_2 (Description.unit, such as m/N, um/N, g/N)"
+    )
     frf = read_frf(path, Description(unit="m/s^2/N", averages=10))
     raw = scipy.io.loadmat(path, squeeze_me=True)
     assert frf.frequency == pytest.approx(raw["Freq_domain"][1:])
@@ -36,8 +39,8 @@ def test_the_hit_beside_it_is_taken_by_its_names() -> None:
 def test_receptances_of_several_points_in_big_endian() -> None:
     path = DATA / "vibrationtesting" / "mckiddat.mat"
     said = inspect_file(path).problems
-    assert "which of its 3 FRFs is meant: 1 Recep:1, 2 Recep:2, 3 Recep:3 (--response 1)" in said
-    assert "--unit" in said
+    assert "which of its 3 FRFs is meant: 1 Recep:1, 2 Recep:2, 3 Recep:3 (Description.response 1)" in said
+    assert "Description.unit" in said
     frf = read_frf(path, Description(response=2, unit="m/N"))
     assert frf.receptance == pytest.approx(scipy.io.loadmat(path)["Recep"][:, 1])
 
@@ -85,7 +88,7 @@ def test_a_uff_frf_with_signs_that_are_no_ascii() -> None:
 
 
 def lengthened(name: str, n: int) -> str:
-    """An LVM file with so many rows, as its header says."""
+    """Write an LVM file with as many rows as its header states."""
     text = (DATA / "lvm_read" / name).read_text("latin-1")
     head, rows = text.rsplit("X_Value", 1)[0], text.rsplit("X_Value", 1)[1].splitlines()
     values = [row for row in rows[1:] if row.strip()]
@@ -113,7 +116,7 @@ def test_lvm_with_empty_channels_and_several_responses(tmp_path: Path) -> None:
     assert hit.force[0] == pytest.approx(7.254639)
     three = tmp_path / "three.lvm"
     three.write_text(lengthened("no_decimal_separator.lvm", 10), encoding="latin-1")
-    assert "1 ax, 2 ay, 3 az (--response 1)" in inspect_file(three).problems
+    assert "1 ax, 2 ay, 3 az (Description.response 1)" in inspect_file(three).problems
     columns = ("force [N]=ax", "acceleration [g]=az")
     assert read_hits(three, Description(columns=columns))[0].acceleration[0] == pytest.approx(0.021503 * 9.80665)
 

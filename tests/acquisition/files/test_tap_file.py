@@ -79,6 +79,7 @@ def same_frf(a: Frf, b: Frf) -> bool:
     )
 
 
+@pytest.mark.quick
 def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> None:
     path = tmp_path / "tap.h5"
     content = write_tap(path, tap)

@@ -33,6 +33,7 @@ def pulse(peak: float, start: float = 0.0, width: float = 0.6e-3) -> NDArray[np.
     return np.where(inside, peak * np.sin(np.pi * (TIME - start) / width) ** 2, 0.0)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("width", [0.3e-3, 0.6e-3, 1e-3, 4e-3])
 def test_single_hits_hard_or_soft_tipped_are_good(width: float) -> None:
     assert check_hit(hit(pulse(200, width=width))) == HitFlags.OK

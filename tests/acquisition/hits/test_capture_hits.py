@@ -157,7 +157,7 @@ RESTING = Trigger(level=100.0, n_samples=50, pre_trigger=10, rest_rms=1.0)
 
 
 def searched(source: Recorded, trigger: Trigger = RESTING) -> tuple[list[float], HitSearch, list[bool]]:
-    """Times of the hits found, the search, and whether it was armed after each block."""
+    """Return the times of the hits, the search, and whether it was armed after each block."""
     search = HitSearch(source.channels, RATE, trigger)
     hits, armed = [], []
     for block in source.blocks():

@@ -8,6 +8,8 @@ import pytest
 from acquisition import Hit
 from acquisition.hits.pulse import find_pulse
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("half", [3, 500, 1023, 1024, 5000])
 def test_a_triangle_reaches_to_5_percent_of_its_peak(half: int) -> None:

@@ -23,7 +23,7 @@ H = 1e-6 / (1 + 0.2j * F)
 
 
 def uff_with(path: Path, *, binary: bool = False, unit: str = "m/s^2", direction: tuple[int, int] = (1, 1)) -> Path:
-    """An accelerance of H, as the format has it; binary: little endian, double."""
+    """Write an accelerance of H as the format demands; binary: little endian, double."""
     pairs = np.stack([H.real, H.imag], axis=1).ravel()
     body = pairs.astype("<f8").tobytes() if binary else b"\n".join(b"%20.11E" % v for v in pairs) + b"\n"
     first = f"    58b     1     2{11:12d}{len(body):12d}     0     0           0           0" if binary else "    58"
@@ -65,7 +65,7 @@ def test_a_hammer_against_the_axis_turns_the_frf_round(tmp_path: Path) -> None:
 
 def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None:
     path = uff_with(tmp_path / "a.uff", unit="NONE")
-    assert "--unit" in inspect_file(path).problems
+    assert "Description.unit" in inspect_file(path).problems
     assert "a unit of displacement" in inspect_file(path, Description(unit="m/N")).problems
     assert read_frf(path, Description(unit="g/N")).accelerance == pytest.approx(9.80665 * H[1:], rel=1e-10)
     system = (
@@ -76,7 +76,7 @@ def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None
 
 
 def mat_73(path: Path, variables: dict[str, Any]) -> Path:
-    """A file as MATLAB -v7.3 writes it: HDF5 behind a header of 512 bytes, transposed, complex as pairs."""
+    """Write a file as MATLAB -v7.3 does: HDF5 behind a header of 512 bytes, transposed, complex as pairs."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in variables.items():
             values = np.atleast_2d(value).T
@@ -140,7 +140,7 @@ def test_signal_calc_has_the_frequency_in_the_first_column(tmp_path: Path) -> No
 def test_vectors_over_time_with_a_rate(tmp_path: Path) -> None:
     force, acceleration = np.sin(np.arange(50.0)), np.cos(np.arange(50.0))
     scipy.io.savemat(tmp_path / "a.mat", {"fs": 2048.0, "force": force, "acc": acceleration})
-    assert "--force-unit" in inspect_file(tmp_path / "a.mat").problems
+    assert "Description.force_unit" in inspect_file(tmp_path / "a.mat").problems
     (hit,) = read_hits(tmp_path / "a.mat", Description(unit="g", force_unit="lbf"))
     assert hit.sample_rate == 2048
     assert hit.force == pytest.approx(force * 4.4482216152605)
@@ -152,7 +152,7 @@ def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
     top = 1 if kind is np.float32 else -float(np.iinfo(kind).min)
     scipy.io.wavfile.write(tmp_path / "a.wav", 48000, (shares * top).astype(kind))
     assert (
-        "--full-scale 500,50"
+        "Description.full_scale 500,50"
         in inspect_file(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).problems
     )
     said = Description(columns=("force [N]", "acceleration [m/s^2]"), full_scale=(500.0, 50.0))
@@ -258,7 +258,7 @@ def test_a_frequency_that_is_there_twice_is_refused(tmp_path: Path) -> None:
 
 
 def one_of_each(folder: Path) -> dict[str, Path]:
-    """A small sound file of each format."""
+    """Write a small sound file of each format."""
     generator = np.random.default_rng(1)
     hit = Hit(generator.normal(size=60), generator.normal(size=60), 1000.0)
     made = {}

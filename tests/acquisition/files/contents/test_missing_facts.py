@@ -56,17 +56,21 @@ def test_headings_and_options_in_any_unit_give_the_same_receptance(
 
 def test_all_that_is_missing_is_said_in_one_message(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", rows(F, H.real, H.imag))
-    with pytest.raises(DataError, match=r'what its columns are .*--columns "frequency \[Hz\],real \[m/N\],imag"'):
+    with pytest.raises(
+        DataError, match=r'what its columns are .*Description.columns "frequency \[Hz\],real \[m/N\],imag"'
+    ):
         read_recording(path)
     said = complaint(path, columns=("frequency", "real", "imag"))
-    assert "--unit, such as m/N" in said
+    assert "Description.unit, such as m/N" in said
     assert complaint(path, columns=("frequency", "real", "imag"), unit="g").endswith(
-        "(--force-unit N, or both as --unit g/N)"
+        "(Description.force_unit N, or both as Description.unit g/N)"
     )
     assert not complaint(path, columns=("frequency [Hz]", "real [um/N]", "imag"))
     hit = put(tmp_path / "hit.csv", "time\tforce\tacc\n" + rows(F, F, F))
     said = complaint(hit)
-    assert [option in said for option in ("--rate", "--unit", "--force-unit")] == [True] * 3
+    assert [option in said for option in ("Description.rate", "Description.unit", "Description.force_unit")] == [
+        True
+    ] * 3
 
 
 def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
@@ -78,7 +82,7 @@ def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
     level = 20 * np.log10(size / 1e-6)
     in_db = put(tmp_path / "b.csv", "f (Hz);Mag (dB re 1 um/N);Phase (rad)\n" + rows(F, level, phase, separator=";"))
     assert read_frf(in_db).receptance == pytest.approx(H, rel=1e-6)
-    assert "--unit m/N: the file says 1 um/N" in complaint(in_db, unit="m/N")
+    assert "Description.unit m/N: the file says 1 um/N" in complaint(in_db, unit="m/N")
     path = put(tmp_path / "c.csv", "f (Hz);Mag (dB);Phase (rad)\n" + rows(F, level, phase, separator=";"))
     assert "the unit of Mag" in complaint(path)
     assert read_frf(path, Description(unit="um/N")).receptance == pytest.approx(H, rel=1e-6)
@@ -88,12 +92,12 @@ def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
 
 def test_options_that_the_file_contradicts_are_refused(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", "Freq (Hz)\tReal (um/N)\tImag (um/N)\n" + rows(F, H.real, H.imag))
-    assert "--unit m/N: the file says um/N" in complaint(path, unit="m/N")
+    assert "Description.unit m/N: the file says um/N" in complaint(path, unit="m/N")
     assert not complaint(path, unit="µm/N")
-    assert "--quantity acceleration" in complaint(path, quantity="acceleration")
+    assert "Description.quantity acceleration" in complaint(path, quantity="acceleration")
     assert "leave the option out" in complaint(path, rate=100.0)
-    assert "--averages 0" in complaint(path, averages=0)
-    assert "--response 2: it holds 1" in complaint(path, response=2)
+    assert "Description.averages 0" in complaint(path, averages=0)
+    assert "Description.response 2: it holds 1" in complaint(path, response=2)
     assert "'nonsense' is none of time" in complaint(path, columns=("nonsense", "real", "imag"))
     assert "no column 4" in complaint(path, columns=("frequency", "-", "real", "imag"))
 

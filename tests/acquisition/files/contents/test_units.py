@@ -6,6 +6,8 @@ import pytest
 
 from acquisition.files.contents.units import parse_unit
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize(
     ("text", "quantity", "factor"),

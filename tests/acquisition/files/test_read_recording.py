@@ -9,6 +9,8 @@ import pytest
 
 from acquisition import DataError, Description, HitFlags, check_hit, inspect_file, read_frf, read_hits, read_recording
 
+pytestmark = pytest.mark.quick
+
 N = 2000
 RATE = 5000.0
 TIME = np.arange(N) / RATE
@@ -92,7 +94,9 @@ def test_swapped_columns_are_refused(tmp_path: Path) -> None:
 def test_an_frf_table_without_a_unit_is_asked_for_it(tmp_path: Path) -> None:
     frequency = np.arange(1.0, 50.0)
     path = table(tmp_path / "frf.txt", "Freq Real Imag", frequency, 1e-6 / frequency, -2e-6 / frequency, separator=" ")
-    with pytest.raises(DataError, match=r"does not say: the unit of Real \(--unit, such as m/N, um/N, g/N\)$"):
+    with pytest.raises(
+        DataError, match=r"does not say: the unit of Real \(Description.unit, such as m/N, um/N, g/N\)$"
+    ):
         read_frf(path)
     frf = read_frf(path, Description(unit="m/N"))
     assert frf.receptance == pytest.approx((1e-6 - 2e-6j) / frequency)
@@ -112,7 +116,7 @@ def write(path: Path, text: str) -> Path:
         ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
         (
             "time_s,force_N,acc_g\n0,1,x\n",
-            "acc holds 'x' in line 2, which is no number; mend it there, or leave acc out of --columns",
+            "acc holds 'x' in line 2, which is no number; mend it there, or leave acc out of Description.columns",
         ),
         ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n0.2,1,2\n", "line 3: 2 numbers where other rows have 3"),
         ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),

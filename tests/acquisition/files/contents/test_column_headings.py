@@ -11,6 +11,8 @@ from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, ro
 
 from acquisition import DataError, Description, inspect_file, read_frf, read_recording
 
+pytestmark = pytest.mark.quick
+
 
 def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
     heading = "Freq (Hz),Real (m/N),Imag (m/N)\n"
@@ -20,7 +22,7 @@ def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(skip=4)))
     npy = tmp_path / "a.npy"
     np.save(npy, H)
-    with pytest.raises(DataError, match="--skip 4: a NumPy file is no text of lines; leave the option out"):
+    with pytest.raises(DataError, match=r"Description\.skip 4: a NumPy file is no text of lines; leave the option out"):
         inspect_file(npy, Description(skip=4))
 
 
@@ -62,7 +64,7 @@ def test_headings_that_name_the_frf_in_brackets(tmp_path: Path, heading: str, un
 
 def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "w,re,im\n" + rows(2 * np.pi * F, H.real, H.imag, separator=","))
-    assert '--columns "frequency [Hz]=w,real=re,imag=im", or [rad/s]' in complaint(path)
+    assert 'Description.columns "frequency [Hz]=w,real=re,imag=im", or [rad/s]' in complaint(path)
     answer = ("frequency [rad/s]=w", "real=re", "imag=im")
     assert is_h(read_frf(path, Description(columns=answer, unit="m/N")))
 
@@ -70,8 +72,8 @@ def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path
 def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "".join(SPELLINGS["numpy"](h) + "\n" for h in H))
     said = complaint(path)
-    assert "the unit of column 1 (--unit" in said
-    assert "the frequencies of its lines (--spacing 0.5 --start 0 in Hz)" in said
+    assert "the unit of column 1 (Description.unit" in said
+    assert "the frequencies of its lines (Description.spacing 0.5 Description.start 0 in Hz)" in said
     assert is_h(read_frf(path, Description(unit="m/N", spacing=1.0, start=1.0)))
     two = put(tmp_path / "b.txt", rows(H.real, H.imag))
     assert is_h(read_frf(two, Description(columns=("real [m/N]", "imag"), spacing=1.0, start=1.0)))
@@ -82,9 +84,11 @@ def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -
 
 def test_a_spacing_is_refused_where_the_file_has_an_axis(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
-    assert "--spacing, --start: the file holds its frequencies, Freq; leave them out" in complaint(path, spacing=1.0)
+    assert "Description.spacing, Description.start: the file holds its frequencies, Freq; leave them out" in complaint(
+        path, spacing=1.0
+    )
     hit = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g\n" + rows(TIME, FORCE, RESPONSE))
-    assert "--spacing: the file holds signals over time; leave the option out" in complaint(hit, spacing=1.0)
+    assert "Description.spacing: the file holds signals over time; leave the option out" in complaint(hit, spacing=1.0)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +111,7 @@ def test_columns_that_are_not_all_named_or_called_the_same_are_refused(tmp_path:
     text = rows(np.arange(59.0), F, H.real, H.imag)
     path = put(tmp_path / "a.txt", text)
     said = complaint(path, columns=("frequency", "real [m/N]", "imag"))
-    assert "--columns names 3 of its 4 columns, which are column 1, column 2, column 3, column 4" in said
+    assert "Description.columns names 3 of its 4 columns, which are column 1, column 2, column 3, column 4" in said
     assert '"-" for what is left out' in said
     twice = put(tmp_path / "b.txt", "No.\tx\tx\tx\n" + text)
     said = complaint(twice, columns=("frequency=x", "real [m/N]=3", "imag=4"))
@@ -118,7 +122,7 @@ def test_columns_that_are_not_all_named_or_called_the_same_are_refused(tmp_path:
 def test_a_column_is_named_once(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", rows(np.arange(59.0), F, H.real, H.imag))
     said = complaint(path, columns=("frequency [Hz]=2", "real [m/N]", "imag=4"))
-    assert "--columns 'real [m/N]': column 2 is named twice; name each column once" in said
+    assert "Description.columns 'real [m/N]': column 2 is named twice; name each column once" in said
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 0.3125, 2.5])
@@ -143,7 +147,7 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + text)
     assert (
         complaint(path)
-        == 'it does not say: the sensitivity of the sensor, as its FRF is in V/N (--sensitivity "10.2 mV/g")'
+        == 'it does not say: the sensitivity of the sensor, as its FRF is in V/N (Description.sensitivity "10.2 mV/g")'
     )
     assert is_h(read_frf(path, Description(sensitivity=("10.2 mV/g",))))
     assert "give that of the sensor" in complaint(path, sensitivity=("2.25 mV/N",))
@@ -154,6 +158,8 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
         assert is_h(read_frf(both, Description(unit="V/V", sensitivity=sensors)))
     assert "the sensitivity of hammer and sensor" in complaint(both, unit="V/V")
     plain = put(tmp_path / "c.csv", "Freq (Hz),Real (g/N),Imag (g/N)\n" + text)
-    assert "--sensitivity: its FRF is not in volts; leave it out" in complaint(plain, sensitivity=("10.2 mV/g",))
+    assert "Description.sensitivity: its FRF is not in volts; leave it out" in complaint(
+        plain, sensitivity=("10.2 mV/g",)
+    )
     mixed = put(tmp_path / "d.csv", "Freq (Hz),Real (V/N),Imag (mV/N)\n" + text)
     assert "they must be the same" in complaint(mixed, sensitivity=("10.2 mV/g",))

@@ -11,11 +11,13 @@ from written_tables import FORCE, HIT, RESPONSE, F, H, complaint, is_h, numeral,
 from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
 from acquisition.files.read_cut import read_cut_recording
 
+pytestmark = pytest.mark.quick
+
 HEAD = "Time (s){0}Force (N){0}Acc (m/s^2){0}Temp\n"
 
 
 def cells_of(separator: str, *changed: tuple[int, int, str], ends: Sequence[int] = (400, 400, 400, 400)) -> str:
-    """The hit and a temperature, some cells (row, column, text) changed, each column up to its end."""
+    """Write the hit and a temperature with some cells (row, column, text) changed, each column up to its end."""
     cells = [[cell if i < end else "" for cell, end in zip(row, ends, strict=True)] for i, row in enumerate(HIT)]
     for row, column, text in changed:
         cells[row][column] = text
@@ -28,7 +30,9 @@ def test_a_gap_in_a_column_that_is_used_is_refused_with_its_place(
     tmp_path: Path, separator: str, column: int, name: str
 ) -> None:
     path = put(tmp_path / "a.csv", cells_of(separator, (40, column, "")))
-    assert complaint(path).startswith(f"{name} is empty in line 42; mend it there, or leave {name} out of --columns")
+    assert complaint(path).startswith(
+        f"{name} is empty in line 42; mend it there, or leave {name} out of Description.columns"
+    )
 
 
 @pytest.mark.parametrize("text", ["", "overflow", "1,234"])
@@ -79,7 +83,9 @@ def test_numbers_beside_the_first_rows_are_notes_where_all_rows_have_as_many_cel
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
     text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
     path = put(tmp_path / "a.csv", text)
-    assert complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (--response 1)"
+    assert (
+        complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (Description.response 1)"
+    )
     assert read_hits(path, Description(response=1))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
     assert "Acc y is empty in line 9" in complaint(path, response=2)
 

@@ -20,7 +20,7 @@ THOUSANDS = {
 
 @st.composite
 def grouped_tables(draw: st.DrawFn) -> tuple[str, np.ndarray, str]:
-    """A hit in some layout with thousands apart, its force, and how the text is encoded."""
+    """Draw a hit with separated thousands in some layout, its force, and the encoding of the text."""
     decimal = draw(st.sampled_from([".", ","]))
     thousands = draw(st.sampled_from(THOUSANDS[decimal]))
     separator = draw(st.sampled_from(["\t", ";", ","]))
@@ -57,7 +57,7 @@ def test_thousands_apart_between_blanks(tmp_path: Path, decimal: str, thousands:
 
 
 def doubtful(decimal: str, force: str, *others: str) -> str:
-    """A hit whose forces are all written so, but for some; its time and acceleration with this decimal sign."""
+    """Write a hit with ambiguous forces but for some; its time and acceleration have this decimal sign."""
     forces = [*others, *[force] * (len(HIT) - len(others))]
     lines = [f"{t};{cell};{a}".replace(".", decimal) for (t, _, a, _), cell in zip(HIT, ["@"] * len(HIT), strict=True)]
     return "Time (s);Force (N);Acc (g)\n" + "".join(
@@ -112,16 +112,19 @@ def test_what_another_number_shows_is_not_in_doubt(
 def test_a_person_says_which_sign_is_the_decimal_one(tmp_path: Path, force: str, said: str, value: float) -> None:
     whole = "".join(f"{place};{force if place else 7};{place % 7}\n" for place in range(len(HIT)))
     path = put(tmp_path / "a.csv", "Time (ms);Force (N);Acc (g)\n" + whole)
-    doubt = "Force holds '1,234' in line 3, which may be 1.234 or 1234 (--decimal comma or --decimal point)"
+    remedy = "Description.decimal comma or Description.decimal point"
+    doubt = f"Force holds '1,234' in line 3, which may be 1.234 or 1234 ({remedy})"
     assert complaint(path).partition(";")[0] == (doubt if "," in force else "")
     assert read_hits(path, Description(decimal=said))[0].force[1:] == pytest.approx(value, rel=1e-12)
 
 
 def test_a_decimal_sign_that_is_none_or_of_no_text_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="--decimal dot: is no decimal sign; give comma or point"):
+    with pytest.raises(DataError, match=r"Description\.decimal dot: is no decimal sign; give comma or point"):
         read_hits(put(tmp_path / "a.csv", doubtful(".", "1,234")), Description(decimal="dot"))
     np.save(tmp_path / "a.npy", np.ones((8, 2)))
-    with pytest.raises(DataError, match="--decimal comma: a NumPy file is no text of lines; leave the option out"):
+    with pytest.raises(
+        DataError, match=r"Description\.decimal comma: a NumPy file is no text of lines; leave the option out"
+    ):
         read_hits(tmp_path / "a.npy", Description(decimal="comma"))
 
 

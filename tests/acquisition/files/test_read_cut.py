@@ -31,7 +31,7 @@ def test_a_table_in_g_is_read_in_si(tmp_path: Path) -> None:
 def test_a_wav_file_needs_its_full_scale_and_unit(tmp_path: Path) -> None:
     path = tmp_path / "cut.wav"
     scipy.io.wavfile.write(path, 48000, (WAVE * 32000).astype(np.int16))
-    with pytest.raises(DataError, match="--full-scale"):
+    with pytest.raises(DataError, match=r"Description\.full_scale"):
         read_cut_recording(path)
     sound = read_cut_recording(path, Description(full_scale=(500.0,), unit="m/s^2"))
     assert sound.sample_rate == 48000.0
@@ -97,12 +97,12 @@ def test_a_damaged_flac_or_mp3_is_refused_and_so_it_is_without_soundfile(
 
 
 def test_an_accelerometer_is_no_microphone(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="acceleration moves; leave --sensor microphone out"):
+    with pytest.raises(DataError, match=r"acceleration moves; leave Description\.sensor microphone out"):
         read_cut_recording(table(tmp_path / "cut.csv", "time [s],acceleration [g]"), HEARD)
 
 
 def test_a_unit_that_the_file_does_not_say_is_asked_for(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="--unit"):
+    with pytest.raises(DataError, match=r"Description\.unit"):
         read_cut_recording(table(tmp_path / "cut.csv", "time [s],acceleration"))
 
 
@@ -202,15 +202,25 @@ def test_a_channel_of_a_sound_file_is_the_tachometer_and_needs_no_full_scale(tmp
     ("heading", "values", "said", "text"),
     [
         ("Tacho [V]", 0 * WAVE + 4.9, Description(), "Tacho: 0 pulses in 0.0781 s, less than two turns of 1"),
-        ("Tacho [V]", WAVE, Description(tacho="4"), "--tacho: nothing called '4' in the file, which holds time"),
+        (
+            "Tacho [V]",
+            WAVE,
+            Description(tacho="4"),
+            "Description.tacho: nothing called '4' in the file, which holds time",
+        ),
         ("n [rpm]", 0 * WAVE, Description(), "n: stands at 0 rpm all along"),
-        ("n [rpm]", 0 * WAVE + 6000, Description(pulses=2), "--pulses 2: n is the speed itself"),
-        ("other", SPEED, Description(pulses=2), "--pulses 2: no column is a tachometer; name it with --tacho"),
+        ("n [rpm]", 0 * WAVE + 6000, Description(pulses=2), "Description.pulses 2: n is the speed itself"),
+        (
+            "other",
+            SPEED,
+            Description(pulses=2),
+            "Description.pulses 2: no column is a tachometer; name it with Description.tacho",
+        ),
         (
             "n",
             SPEED,
             Description(columns=("time [s]", "acceleration [m/s^2]", "speed")),
-            'the unit of the speed in n (--columns "speed [rpm]=n")',
+            'the unit of the speed in n (Description.columns "speed [rpm]=n")',
         ),
     ],
 )

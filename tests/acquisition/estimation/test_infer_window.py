@@ -12,7 +12,7 @@ from tests.modal.test_uncertainty import tap
 
 
 def under(hit: Hit, time_constant: float) -> Hit:
-    """The response under a window from the record's start on."""
+    """Return the hit with a response under a window from the start of the record."""
     fall = np.exp(-np.arange(hit.force.size) / hit.sample_rate / time_constant)
     return replace(hit, acceleration=hit.acceleration * fall)
 

@@ -72,7 +72,7 @@ def test_a_level_says_what_it_is_a_multiple_of(tmp_path: Path, unit: str, refere
     text = f"Frequency (Hz)\tMagnitude ({unit})\tPhase (deg)\n" + rows(F, level, DEGREES)
     path = put(tmp_path / "a.txt", text)
     assert is_h(read_frf(path))
-    assert "--unit m/N: the file says" in complaint(path, unit="m/N")
+    assert "Description.unit m/N: the file says" in complaint(path, unit="m/N")
 
 
 @pytest.mark.parametrize("unit", ["dB", "dBMag", "dB (rms)", "dB re 1"])

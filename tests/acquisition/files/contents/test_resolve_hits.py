@@ -98,8 +98,11 @@ def test_a_hit_before_the_structure_is_at_rest_is_none_of_its_own(tmp_path: Path
 def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> None:
     time, force, response = tapped([0.3], 1.2)
     path = put(tmp_path / "a.txt", "time_s\tforce_V\tacc_mV", time, 2.25e-3 * force, 1e3 * 10e-3 / 9.80665 * response)
-    assert 'sensitivity of each of force [V], acc [mV], in their order (--sensitivity "' in inspect_file(path).problems
-    assert "--sensitivity" in inspect_file(path, Description(sensitivity=("2.25 mV/N",))).problems
+    assert (
+        'sensitivity of each of force [V], acc [mV], in their order (Description.sensitivity "'
+        in inspect_file(path).problems
+    )
+    assert "Description.sensitivity" in inspect_file(path, Description(sensitivity=("2.25 mV/N",))).problems
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g"))
     (hit,) = read_hits(path, said)
     assert hit.force == pytest.approx(force, abs=1e-5)
@@ -107,10 +110,12 @@ def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> No
     assert ("sensitivity", "option") in [(fact.name, fact.origin) for fact in inspect_file(path, said).facts]
     for wrong in ("2.25", "2.25 N/mV", "0 mV/N", "2.25 mV/furlong"):
         text = inspect_file(path, Description(sensitivity=(wrong, "10 mV/g"))).problems
-        assert f"--sensitivity {wrong!r}: give volts a unit" in text
+        assert f"Description.sensitivity {wrong!r}: give volts a unit" in text
     three = put(tmp_path / "c.txt", "time\tx_V\ty_V\tz_V", time, force, response, response)
     asked = inspect_file(three).problems
-    assert [word in asked for word in ("--sensitivity", "--response", "--rate")] == [True] * 3
+    assert [word in asked for word in ("Description.sensitivity", "Description.response", "Description.rate")] == [
+        True
+    ] * 3
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g", "10 mV/g"), response=2, rate=RATE)
     assert inspect_file(three, said).problems == ""
     named = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g", time, force, response)

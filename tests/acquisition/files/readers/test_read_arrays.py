@@ -45,8 +45,8 @@ def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> 
     np.save(tmp_path / "H.npy", H)
     said = complaint(tmp_path / "H.npy")
     assert said == (
-        "it does not say: the unit of array (--unit, such as m/N, um/N, g/N), the frequencies of its lines "
-        "(--spacing 0.5 --start 0 in Hz)"
+        "it does not say: the unit of array (Description.unit, such as m/N, um/N, g/N), the frequencies of its lines "
+        "(Description.spacing 0.5 Description.start 0 in Hz)"
     )
     assert is_h(read_frf(tmp_path / "H.npy", Description(unit="m/N", spacing=1.0, start=1.0)))
 
@@ -55,7 +55,7 @@ def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> 
 def test_of_several_frfs_one_is_chosen(tmp_path: Path, shape: tuple[int, ...]) -> None:
     rows = np.array([H, 2 * H, 3 * H])
     np.save(tmp_path / "H.npy", rows.T if shape[0] == 59 else rows.reshape(shape))
-    assert "which of its 3 FRFs is meant: 1 array:1, 2 array:2, 3 array:3 (--response 1)" in complaint(
+    assert "which of its 3 FRFs is meant: 1 array:1, 2 array:2, 3 array:3 (Description.response 1)" in complaint(
         tmp_path / "H.npy"
     )
     said = Description(unit="m/N", spacing=1.0, start=1.0, response=2)
@@ -67,7 +67,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
     hit = np.zeros(400, [("t", "f8"), ("force", "f4"), ("acc", "f4")])
     hit["t"], hit["force"][20:24], hit["acc"][22:] = time, 50.0, np.sin(np.arange(378))
     np.save(tmp_path / "hit.npy", hit)
-    assert "the unit of force (--force-unit" in complaint(tmp_path / "hit.npy")
+    assert "the unit of force (Description.force_unit" in complaint(tmp_path / "hit.npy")
     said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
     assert read_hits(tmp_path / "hit.npy", said)[0].sample_rate == pytest.approx(4000)
     np.save(tmp_path / "rows.npy", np.stack([hit["force"], hit["acc"]]))
@@ -78,7 +78,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [npz, hdf5])
 def test_names_that_are_known_need_a_unit_alone(tmp_path: Path, make: Any) -> None:
     path = make(tmp_path / ("a.npz" if make is npz else "a.h5"), freq=F, H=H, coherence=np.full(59, 0.9))
-    assert complaint(path) == "it does not say: the unit of H (--unit, such as m/N, um/N, g/N)"
+    assert complaint(path) == "it does not say: the unit of H (Description.unit, such as m/N, um/N, g/N)"
     frf = read_frf(path, Description(unit="m/N"))
     assert is_h(frf)
     assert frf.coherence == pytest.approx(0.9)
@@ -96,7 +96,9 @@ def test_data_sets_of_hdf5_by_path(tmp_path: Path, suffix: str) -> None:
     )
     said = complaint(path)
     assert "which of its 2 FRFs is meant: 1 test/points/p1, 2 test/points/p2" in said
-    assert '--columns "frequency [Hz]=test/lines,frf=test/points/p1", or [rad/s]; or --spacing' in said
+    assert (
+        'Description.columns "frequency [Hz]=test/lines,frf=test/points/p1", or [rad/s]; or Description.spacing' in said
+    )
     columns = ("frequency [Hz]=test/lines", "frf [m/N]=test/points/p2")
     assert is_h(read_frf(path, Description(columns=columns)), 2 * H)
     content = path.read_bytes()
@@ -111,20 +113,20 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
     scipy.io.savemat(path, {"H21": np.stack([H.real, H.imag], axis=1), "df": 1.0})
     said = complaint(path)
     assert "what its columns are (H21:1, H21:2)" in said
-    assert "--spacing" in said
+    assert "Description.spacing" in said
     columns = ("real [m/N]=H21:1", "imag=H21:2")
     assert is_h(read_frf(path, Description(columns=columns, spacing=1.0, start=1.0)))
     scipy.io.savemat(path, {"FRF": np.stack([2 * np.pi * F, H], axis=1)})  # an axis of complex type
     said = complaint(path)
     assert "the unit of FRF:2" in said
-    assert '--columns "frequency [Hz]=FRF:1,frf=FRF:2", or [rad/s]' in said
+    assert 'Description.columns "frequency [Hz]=FRF:1,frf=FRF:2", or [rad/s]' in said
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=FRF:1", "frf [m/N]=FRF:2"))))
 
 
 def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> None:
     path, time = tmp_path / "a.mat", np.arange(200.0)
     scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
-    assert '--columns "frequency [Hz]=w,frf=ts", or [rad/s]' in complaint(path)
+    assert 'Description.columns "frequency [Hz]=w,frf=ts", or [rad/s]' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
     poles = np.array([-1 + 9j, -1 - 9j])
     scipy.io.savemat(path, {"fs": 1.0, "u": time, "y": time, "poles": poles})
@@ -145,7 +147,7 @@ def test_siglab_has_volts_over_volts_and_the_units_beside(tmp_path: Path) -> Non
     channels[:] = [dict(zip(("label", "euscale_fac", "eu_string", "eu_on_off"), row, strict=True)) for row in named]
     measured = {"xcmeas": cells, "scmeas": channels, "fdxvec": F, "navg": 5}
     scipy.io.savemat(path, {"SampleRate": 2560, "SLm": measured}, appendmat=False)
-    assert "1 sensor over hammer, 2 laser over hammer (--response 1)" in complaint(path)
+    assert "1 sensor over hammer, 2 laser over hammer (Description.response 1)" in complaint(path)
     frf = read_frf(path, Description(response=1))
     assert frf.accelerance == pytest.approx(H * 100 / 40)
     assert frf.coherence == pytest.approx(0.3)
@@ -169,7 +171,7 @@ def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
     (hit,) = read_hits(path, said)
     assert hit.sample_rate == pytest.approx(2000)
     two = npz(tmp_path / "two.npz", fs=2000, force=np.stack([force, force]), acc=np.stack([response, response]))
-    assert "which force of force:1, force:2 goes with which response (--columns" in complaint(two)
+    assert "which force of force:1, force:2 goes with which response (Description.columns" in complaint(two)
     columns = ("force [N]=force:2", "acceleration [g]=acc:2")
     assert len(read_hits(two, Description(columns=columns, rate=2000))) == 1
 

@@ -27,7 +27,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def damaged(content: bytes, chance: random.Random) -> bytes:
-    """A file with one kind of damage; in half of them the end with its seal is gone as well."""
+    """Return a file with one kind of damage; half of them lose their end with the checksum too."""
     spoilt = bytearray(content)
     kind = chance.choice(("bit", "bits", "cut", "zeros"))
     at = chance.randrange(len(spoilt))
@@ -43,7 +43,7 @@ def damaged(content: bytes, chance: random.Random) -> bytes:
 
 
 def refused(recording: Path, rounds: int) -> int:
-    """Number of damaged copies that were refused; others must be whole."""
+    """Count the rejected copies; the others must be whole."""
     content, count = recording.read_bytes(), 0
     for seed in range(rounds):
         spoilt = damaged(content, random.Random(seed))

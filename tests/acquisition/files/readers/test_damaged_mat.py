@@ -24,7 +24,7 @@ from acquisition.files.convert import EXPORT_FORMATS
 from acquisition.files.readers import mat_variables
 from acquisition.files.writers import ExportLabels
 
-DATA = Path(__file__).parents[2] / "data"
+DATA = Path(__file__).parents[3] / "data"
 F = np.arange(2.0, 100.0, 2.0)
 H = np.asarray(1e-6 / (1 + 0.2j * F), np.complex128)
 LENGTHS = (0, 1, 5, 7, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
@@ -83,7 +83,7 @@ SOUND = sound_files()
 
 
 def damaged(content: bytes, chance: random.Random) -> bytes:
-    """A sound file with one kind of damage."""
+    """Return a sound file with one kind of damage."""
     spoilt, size = bytearray(content), len(content)
     kind = chance.choice(("bit", "bits", "cut", "zeros", "length", "length", "length", "moved"))
     if kind in ("bit", "bits"):
@@ -151,7 +151,7 @@ def forks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Forks]:
 
 
 def outcome(path: Path) -> str:
-    """What becomes of a file."""
+    """Return how a file was read."""
     try:
         if inspect_file(path).problems:
             return "asked about"

@@ -17,7 +17,7 @@ from acquisition import DataError, Description, inspect_file, read_frf, read_hit
 def test_a_file_of_the_force_is_refused_beside_an_frf(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
     force = put(tmp_path / "b.txt", rows(TIME, FORCE))
-    assert "--force: the file holds an FRF; leave the option out" in complaint(path, force=force)
+    assert "Description.force: the file holds an FRF; leave the option out" in complaint(path, force=force)
 
 
 def test_two_files_with_headings_need_no_word(tmp_path: Path) -> None:
@@ -30,7 +30,7 @@ def test_two_files_with_headings_need_no_word(tmp_path: Path) -> None:
 def test_a_file_a_channel(tmp_path: Path) -> None:
     force = put(tmp_path / "impact.txt", rows(TIME, FORCE, end="\r\n"))
     response = put(tmp_path / "accel.txt", rows(TIME, RESPONSE, end="\r\n"))
-    assert "--force FILE where the force stands in another" in complaint(response)
+    assert "Description.force FILE where the force stands in another" in complaint(response)
     columns = ("time [s]", "acceleration [m/s^2]", "time [s]", "force [N]")
     (hit,) = read_hits(response, Description(force=force, columns=columns))
     assert hit.force == pytest.approx(FORCE, abs=1e-9)
@@ -67,7 +67,7 @@ def test_a_lost_sample_is_no_want_of_digits(tmp_path: Path, lost: int) -> None:
     path = put(tmp_path / "a.txt", rows(time, np.resize(FORCE, 1000), np.resize(RESPONSE, 1000)))
     said = complaint(path, columns=("time [ms]", "force [N]", "acceleration [g]"))
     assert "its time steps are uneven" in said
-    assert "give --rate" in said
+    assert "give Description.rate" in said
 
 
 SIGNAL_CALC = (

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from acquisition import Channel
 from acquisition.hit import TapInputs
+
+pytestmark = pytest.mark.quick
 
 HAMMER = Channel("force", 1e-2, 5.0)
 X, Y = (Channel("acceleration", 1e-2, 5.0, direction=name) for name in ("x", "y"))

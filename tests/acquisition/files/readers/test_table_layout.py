@@ -132,7 +132,9 @@ def test_a_column_of_words_is_told(tmp_path: Path) -> None:
 
 def test_numbers_above_a_text_are_no_table(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "1 a\n2 b\n3 c\n" + "words alone\n" * 20 + "4 words\n")
-    with pytest.raises(DataError, match=r"a\.txt: line 1: no rows of numbers begin here; pass over .* --skip"):
+    with pytest.raises(
+        DataError, match=r"a\.txt: line 1: no rows of numbers begin here; pass over .* Description.skip"
+    ):
         inspect_file(path)
 
 
@@ -158,7 +160,9 @@ def test_notes_to_the_right_in_a_few_rows(tmp_path: Path) -> None:
 def test_a_broken_first_row_is_no_heading(tmp_path: Path) -> None:
     text = rows(F, H.real, H.imag, separator=",")
     path = put(tmp_path / "a.csv", "Freq (Hz),Real (m/N),Imag (m/N)\nx,1e-6,2e-7\n" + text)
-    with pytest.raises(DataError, match=r"line 2: 'x,1e-6,2e-7' is no row of numbers; mend it, or .* --skip 2$"):
+    with pytest.raises(
+        DataError, match=r"line 2: 'x,1e-6,2e-7' is no row of numbers; mend it, or .* Description.skip 2$"
+    ):
         read_recording(path)
     assert is_h(read_frf(path, Description(skip=2, columns=("frequency", "real [m/N]", "imag"))))
 
@@ -175,8 +179,7 @@ SEPARATORS = ("\t", ";", ",", " ", " \t ", "   ")
 
 @st.composite
 def layouts(draw: st.DrawFn) -> tuple[str, bool, bool]:
-    """A table of frequency, real and imaginary part as somebody may write it; whether it says what they are, and
-    whether an index stands before them."""
+    """Draw a table of frequency, real and imaginary part, whether it names them, and whether an index comes first."""
     separator = draw(st.sampled_from(SEPARATORS))
     comma = separator != "," and draw(st.booleans())
     form = draw(st.sampled_from(["%.9e", "%16.8e", "%.12g", "%+.9E"]))

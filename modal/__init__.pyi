@@ -1,4 +1,4 @@
-"""From an FRF to natural frequencies, damping ratios and stiffnesses."""
+"""Modal analysis: natural frequencies, damping ratios and stiffnesses from an FRF."""
 
 from .bands.extract_modes import extract_modes
 from .bands.extraction import Extraction, FittedBand, candidate_frequencies, stabilisation_charts

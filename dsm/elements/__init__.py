@@ -1,4 +1,4 @@
-"""Beam elements as power series, and where the nodes are."""
+"""Beam elements as power series, and the nodes between them."""
 
 from dsm.elements.beam_elements import Nodes, link_elements, place_nodes, stiffness_elements
 from dsm.elements.element_series import (

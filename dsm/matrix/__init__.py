@@ -1,4 +1,4 @@
-"""The dynamic stiffness matrix: assembly, condensation, count of modes."""
+"""Dynamic stiffness matrix: assembly, condensation, count of modes."""
 
 from dsm.matrix.assemble import HeldDof, assemble
 from dsm.matrix.condense import condense_damped, condense_to_node, damped_blocks

@@ -1,4 +1,4 @@
-"""The spindle as plain data: segments, materials, bearings, masses, joints."""
+"""Spindle as plain data: segments, materials, bearings, masses, joints."""
 
 from dsm.spindle.attachments import Bearing, Damping, Joint, LumpedMass, Supports, damping_of_bearings, supports
 from dsm.spindle.sections import CrossSection, Sections, sections

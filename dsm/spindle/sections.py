@@ -15,7 +15,7 @@ from dsm.spindle.spindle import Spindle
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """What a beam is made of at some places; all of one shape, worked out when asked for."""
+    """Cross-sections of a beam at some places, all arrays of one shape."""
 
     outer: Floats
     """Outer diameter (m)."""
@@ -50,10 +50,10 @@ class CrossSection:
 
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """The segments of a shaft as arrays, from the tool tip on."""
+    """Segments of a shaft as arrays, from the tool tip on."""
 
     ends: Floats
-    """Places where segments begin and end (m), shape (n_segments + 1,)."""
+    """Ends of the segments (m), shape (n_segments + 1,)."""
     diameters: Floats
     """Outer at both ends, bore at both ends, outer of the mass at both ends (m), shape (6, n_segments)."""
     material: Floats
@@ -61,15 +61,15 @@ class Sections:
 
     @cached_property
     def is_cone(self) -> Flags:
-        """Which segments have a diameter that changes, shape (n_segments,)."""
+        """Which segments are conical, shape (n_segments,)."""
         return np.asarray((self.diameters[::2] != self.diameters[1::2]).any(axis=0))
 
     def segment_at(self, position: Floats) -> Indices:
-        """Index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
+        """Return the index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
         return np.asarray(np.searchsorted(self.ends[1:-1], position))
 
     def at(self, segment: Indices, position: Floats) -> CrossSection:
-        """The cross-sections of segments at positions (m), in the shape of these."""
+        """Return the cross-sections of segments at positions (m), in the shape of these."""
         segment = np.broadcast_to(segment, position.shape)
         outer, bore, heavy = self.diameters[::2, segment]
         if self.is_cone.any():
@@ -82,12 +82,12 @@ class Sections:
 
 @lru_cache(maxsize=32)
 def sections(spindle: Spindle) -> Sections:
-    """The cross-sections of a spindle."""
+    """Return the cross-sections of a spindle."""
     return sections_of_segments(spindle.segments, spindle.material)
 
 
 def sections_of_segments(segments: Sequence[Segment], common: Material) -> Sections:
-    """Those of segments, some of them of the common material."""
+    """Return the cross-sections of segments, some of them of the common material."""
     rows = []
     for segment in segments:
         (outer, bore), (end_outer, end_bore) = segment.diameters_at(0.0), segment.diameters_at(1.0)

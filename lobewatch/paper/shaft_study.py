@@ -27,7 +27,7 @@ from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
 
 
 def surrogate_spindle(bearing_stiffness: float, theory: Theory = "euler-bernoulli") -> Spindle:
-    """The packaged surrogate (26 segments, fitted to the paper's frequencies), each bearing as stiff as given (N/m)."""
+    """Return the packaged surrogate (26 segments, fitted to the paper's frequencies) with this bearing stiffness (N/m)."""
     text = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
     machine = parse_machine_file(text)
     spindle = machine.model(machine.tap.tool)
@@ -40,7 +40,7 @@ STIFFNESS_CURVE_POINTS = 300
 WHIRL_SPEEDS_RPM = np.linspace(0.0, 150e3, 61)
 """Speeds of Figs. 7 and 9 (rpm)."""
 OPERATING_SPEED_RPM = 24000.0
-"""The fastest that the machine of the example turns (rpm)."""
+"""Highest speed of the machine in the example (rpm)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class ShaftStudy:
     new: Calibration
     """Bearings calibrated to the measured frequency."""
     old: Calibration
-    """Those bearings calibrated to the frequency after the fall."""
+    """Bearings calibrated to the frequency after the drop."""
     critical_speeds: tuple[float, float]
     """Critical speed on rigid and on calibrated bearings (rpm)."""
     curve: tuple[Floats, Floats]
@@ -70,7 +70,7 @@ class ShaftStudy:
 
 
 def study_shaft(theory: Theory) -> ShaftStudy:
-    """All of it by "euler-bernoulli" or "timoshenko"."""
+    """Study the shaft by one beam theory."""
     shaft = surrogate_spindle(printed.BEARING_STIFFNESS, theory)
     rigid = surrogate_spindle(math.inf, theory)
     new = calibrate(shaft, printed.FREQUENCY)
@@ -93,7 +93,7 @@ def study_shaft(theory: Theory) -> ShaftStudy:
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
-    """Numbers of the model at rest and of the model that spins; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Return the numbers at rest and of the spinning spindle; plain is Euler-Bernoulli, shear Timoshenko theory."""
     return (
         NumberGroup(
             "The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_numbers_at_rest(plain, shear))
@@ -173,13 +173,13 @@ class StiffnessStudy:
     static: tuple[float, float]
     """Exact static stiffness (N/m)."""
     linearized: tuple[float, float]
-    """The same by (30) to (36), linearised at the natural frequency (N/m)."""
+    """Static stiffness by (30) to (36), linearized at the natural frequency (N/m)."""
     modal: tuple[float, float]
     """Modal stiffness of mode 1 (N/m)."""
 
 
 def study_stiffness(old: Calibration) -> StiffnessStudy:
-    """From the bearings calibrated to the frequency before and after the fall."""
+    """Study the tip stiffness from the bearings calibrated to the frequency before and after the drop."""
     pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
     before, after = (static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
     return StiffnessStudy(
@@ -190,7 +190,7 @@ def study_stiffness(old: Calibration) -> StiffnessStudy:
 
 
 def stiffness_section(study: StiffnessStudy) -> NumberGroup:
-    """Numbers of the tip stiffness."""
+    """Return the numbers of the tip stiffness."""
     old = printed.OLD_STIFFNESS
     ratio = round(old / printed.STIFFNESS, 4)
     static, modal = study.linearized[1] / study.linearized[0], study.modal[1] / study.modal[0]

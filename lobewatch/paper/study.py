@@ -24,7 +24,7 @@ from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
 def evaluate_claims(
     plain: ShaftStudy, shear: ShaftStudy, meshes: FiniteElementStudy, stiffness: StiffnessStudy, lobes: LobeStudy
 ) -> tuple[Claim, ...]:
-    """In the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Evaluate the claims in the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
     return (
         _validation_claim(meshes),
         *_bearing_claims(plain, shear),
@@ -110,10 +110,10 @@ def _mode_claim(lobes: LobeStudy) -> Claim:
 
 @dataclass(frozen=True, eq=False)
 class PaperStudy:
-    """What was computed for the comparison."""
+    """Results of the comparison with the paper."""
 
     plain: ShaftStudy
-    """Shaft by Euler-Bernoulli theory, the paper's."""
+    """Shaft by Euler-Bernoulli theory, as in the paper."""
     shear: ShaftStudy
     """Shaft by Timoshenko theory."""
     meshes: FiniteElementStudy
@@ -129,7 +129,7 @@ class PaperStudy:
 
     @property
     def sections(self) -> tuple[NumberGroup, ...]:
-        """Every number of the paper beside ours, in the order of the paper."""
+        """Every number of the paper with ours, in the order of the paper."""
         at_rest, spinning = shaft_sections(self.plain, self.shear)
         return (
             element_section(self.element),
@@ -143,12 +143,18 @@ class PaperStudy:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """What the paper claims, and whether it holds."""
+        """Claims of the paper, and whether they hold."""
         return evaluate_claims(self.plain, self.shear, self.meshes, self.stiffness, self.lobes)
 
 
 def study_paper() -> PaperStudy:
-    """All of it on the packaged surrogate: about a second of CPU."""
+    """Run the whole comparison on the packaged surrogate, in about a second of CPU.
+
+    Returns
+    -------
+    PaperStudy
+        All studies, with their numbers and claims.
+    """
     plain, shear = study_shaft("euler-bernoulli"), study_shaft("timoshenko")
     tap = study_tap(plain.new.spindle)
     stiffness = study_stiffness(plain.old)

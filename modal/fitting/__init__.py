@@ -1,4 +1,4 @@
-"""Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
+"""Least-squares fit of a few neighbouring modes in one FRF, or in several with common poles."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
+"""Least-squares fit of a few neighbouring modes in one FRF, or in several with common poles."""
 
 from .band_fit import MAX_RESIDUAL_TERMS, MIN_RESIDUAL_TERMS, BandFit
 from .fit_band import (

@@ -48,7 +48,7 @@ def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures
         ({"jackknife": 2 * UNCERTAIN, "n_hits": 5}, "uncertain", Trust.REJECTED),
         ({"coherence": 0.49}, "low-coherence", Trust.DOUBTFUL),
         ({"edge_distance": 0.9}, "cut-by-edge", Trust.DOUBTFUL),
-        ({"left_ringing": 0.051}, "still-ringing", Trust.DOUBTFUL),
+        ({"remaining_decay": 0.051}, "still-ringing", Trust.DOUBTFUL),
         ({"remarks": (Remark("several-modes", "", "a text"),)}, "several-modes", Trust.DOUBTFUL),
     ],
 )
@@ -67,7 +67,7 @@ def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> N
         {"damping_ratio": 0.07, "half_power_damping": None},
         {"coherence": 0.51},
         {"edge_distance": 1.1},
-        {"left_ringing": 0.049},
+        {"remaining_decay": 0.049},
         {"covariance": UNCERTAIN, "phase_deg": 29.0},
         {"covariance": UNCERTAIN / 10, "phase_deg": 60.0},
     ],
@@ -104,7 +104,7 @@ def test_what_three_quarters_of_two_or_more_others_have_is_trusted_all_the_same(
         ({"covariance": 3 * UNCERTAIN}, "uncertain"),
         ({"coherence": 0.49}, "low-coherence"),
         ({"edge_distance": 0.9}, "cut-by-edge"),
-        ({"left_ringing": 0.051}, "still-ringing"),
+        ({"remaining_decay": 0.051}, "still-ringing"),
         ({"remarks": (Remark("smoothed-lines", "", "a text"),)}, "smoothed-lines"),
     ],
 )

@@ -11,6 +11,12 @@ from collections.abc import Mapping
 
 OPTION_NAMES: Mapping[str, str] = {
     "Description.unit": "--unit",
+    # modal
+    "ModeEdits.add": "--add",
+    "ModeEdits.drop": "--drop",
+    "ModeEdits.fix": "--fix",
+    "modal.synthesize_frf": "lobewatch modes --figure",
+    "numpy.conj": "on the command line: --conjugate",
 }
 """Option or command for each field or function that a message names."""
 

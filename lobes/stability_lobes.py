@@ -255,7 +255,7 @@ class RadialLobes:
 
 
 def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:
-    """Compute the limits of a cut at several immersions, by any method:
+    """Compute the limits of a cut at several immersions, by any method.
 
         radial_lobes(lambda cut: stability_boundary(x, y, cut, speeds, 0.02), cut, np.linspace(0.05, 1, 20))
 

@@ -18,7 +18,8 @@ from modal.bands.fit_peaks import (
     refit_with_real_constants,
     replace_band,
 )
-from modal.fitting import MIN_RESIDUAL_TERMS, fit_band
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
+from modal.fitting.fit_band import fit_band
 from modal.modes.mode_edits import ModeEdits
 from modal.poles import select_physical_poles
 

@@ -13,7 +13,7 @@ from modal.arrays import Complexes, Floats
 from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
-from modal.fitting import BandFit
+from modal.fitting.band_fit import BandFit
 from modal.hit_scatter import (
     MIN_HITS_FOR_JACKKNIFE,
     add_linearity_remarks,

@@ -28,12 +28,19 @@ MAX_DAMPING_STEPS = 100
 
 
 class UnreachableDampingError(ValueError):
-    """Raised if no dampers give the mode the measured damping ratio."""
+    """Raised if no dampers give the mode the measured damping ratio.
+
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    limit : float
+        Least or largest damping ratio that the mode can have (-), whichever was passed.
+    """
 
     def __init__(self, message: str, limit: float) -> None:
         super().__init__(message)
         self.limit = limit
-        """The least or largest damping ratio that the mode can have (-), whichever was passed."""
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,13 @@ def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPr
 class UnreachableFrequencyError(ValueError):
     """Raised if no bearing stiffness puts the mode at the measured frequency.
 
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    reachable : tuple of float
+        Frequencies of the mode without the calibrated bearings and with rigid ones (Hz).
+
     Examples
     --------
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
@@ -84,7 +91,6 @@ class UnreachableFrequencyError(ValueError):
     def __init__(self, message: str, reachable: tuple[float, float]) -> None:
         super().__init__(message)
         self.reachable = reachable
-        """Frequencies of the mode without the calibrated bearings and with rigid ones (Hz)."""
 
 
 @dataclass(frozen=True)

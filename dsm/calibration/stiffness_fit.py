@@ -189,12 +189,19 @@ class StiffnessFit:
 
 
 class StiffnessFitError(ArithmeticError):
-    """Raised if no minimum was found; holds the best estimate."""
+    """Raised if no minimum was found; holds the best estimate.
+
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    best : StiffnessFit
+        Best estimate; not reliable.
+    """
 
     def __init__(self, message: str, best: StiffnessFit) -> None:
         super().__init__(message)
         self.best = best
-        """The best estimate; not to be trusted."""
 
 
 MAX_LOG_FACTOR_CHANGE = math.log(30.0)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Floats
-from dsm.elements import GAUSS_POINTS
+from dsm.elements.element_series import GAUSS_POINTS
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes, evaluate_between_nodes
 from dsm.spindle.sections import sections

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Floats, Indices
-from dsm.elements import count_series_terms, transfer_series
+from dsm.elements.element_series import count_series_terms, transfer_series
 from dsm.spindle.sections import Sections, sections
 from dsm.spindle.segment import SAME_PLACE, nearest_index
 from dsm.spindle.spindle import Spindle, Theory

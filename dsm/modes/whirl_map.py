@@ -54,7 +54,6 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     >>> round(critical_speed(laden)), round(60 * natural_frequencies(laden, 1)[0])
     (21819, 21250)
     """
-
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
     require_support(spindle)

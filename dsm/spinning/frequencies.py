@@ -167,6 +167,17 @@ def _has_expected_counts(chain: SpinningChain, w: Floats, sign: Floats, width: F
 class UnstableSpinError(ArithmeticError):
     """Raised if modes grow at this speed: mostly between the critical speeds of the two planes.
 
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    frequency : ndarray
+        Lowest frequencies of the other modes, as many as requested (Hz).
+    unstable : int
+        Number of growing modes.
+    proved : int
+        Number of proved ones. Each frequency is proved; completeness only if all growing modes are.
+
     Examples
     --------
     >>> pins = [(place, dof) for place in (0.0, 0.5) for dof in ("u", "v")]
@@ -181,11 +192,8 @@ class UnstableSpinError(ArithmeticError):
     def __init__(self, message: str, frequency: Floats, unstable: int, proved: int) -> None:
         super().__init__(message)
         self.frequency = frequency
-        """The lowest frequencies of the other modes, as many as were asked for (Hz)."""
         self.unstable = unstable
-        """Number of modes that grow."""
         self.proved = proved
-        """How many of them are proved to. Each frequency is proved; that none is missed only if all these are."""
 
 
 def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Floats:

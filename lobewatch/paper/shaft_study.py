@@ -27,7 +27,7 @@ from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
 
 
 def surrogate_spindle(bearing_stiffness: float, theory: Theory = "euler-bernoulli") -> Spindle:
-    """Return the packaged surrogate (26 segments, fitted to the paper's frequencies) with this bearing stiffness (N/m)."""
+    """Return the surrogate (26 segments, fitted to the paper's frequencies) with a bearing stiffness (N/m)."""
     text = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
     machine = parse_machine_file(text)
     spindle = machine.model(machine.tap.tool)

@@ -84,15 +84,15 @@ def _decay_claims(stiffness: StiffnessStudy, lobes: LobeStudy) -> tuple[Claim, C
             "With f_1 the tip stiffness falls by 10 %, from K_exp to K_theo.",
             "fails",
             "K_theo is 0.9 K_exp in every digit. On the surrogate the static stiffness falls by "
-            f"{format_share(static)}, that of the mode, which an FRF shows, by {format_share(modal)}. Lobewatch takes K "
-            "from each new tap test.",
+            f"{format_share(static)}, that of the mode, which an FRF shows, by {format_share(modal)}. Lobewatch takes "
+            "K from each new tap test.",
         ),
         Claim(
             "A fall of f_1 by 10 % shifts the stability lobes significantly.",
             "holds",
             f"Sideways: pockets go with f_1 ({before:.0f} to {after:.0f} rpm), and at the speed of that pocket "
-            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit is left. Down it is K that counts: of "
-            f"the lowest limit {format_share(lobes.share(lobes.by_model))} is left with the model's K, "
+            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit is left. Down it is K that counts: "
+            f"of the lowest limit {format_share(lobes.share(lobes.by_model))} is left with the model's K, "
             f"{format_share(lobes.share(lobes.by_rule))} by the paper's rule.",
         ),
     )
@@ -103,8 +103,8 @@ def _mode_claim(lobes: LobeStudy) -> Claim:
     return Claim(
         "More modes than the first hardly matter for the lobes (its reference [18]).",
         "holds in part",
-        f"In the feed alone the lowest limit of one mode is {format_share(lowest)} off that of six of the surrogate; on "
-        f"the side of a pocket, which they move, the limit is off by up to {format_share(worst)}.",
+        f"In the feed alone the lowest limit of one mode is {format_share(lowest)} off that of six of the surrogate; "
+        f"on the side of a pocket, which they move, the limit is off by up to {format_share(worst)}.",
     )
 
 

@@ -18,7 +18,8 @@ from modal.bands.residual_analysis import (
     residual_noise,
     systematic_error,
 )
-from modal.fitting import MAX_RESIDUAL_TERMS, fit_band, mode_pair_gain, residual_term_gain
+from modal.fitting.band_fit import MAX_RESIDUAL_TERMS
+from modal.fitting.fit_band import fit_band, mode_pair_gain, residual_term_gain
 from modal.poles import select_physical_poles
 
 HIDDEN_MODE_F_RATIO = 40.0

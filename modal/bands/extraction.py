@@ -11,7 +11,7 @@ import numpy as np
 from acquisition import Frf, infer_recorded_share
 from modal.arrays import Complexes, Floats
 from modal.bands.find_resonances import Resonance
-from modal.fitting import BandFit
+from modal.fitting.band_fit import BandFit
 from modal.poles import StabilisationChart, fit_lscf_poles, select_physical_poles
 
 FIXED_MODE = "held"

@@ -11,7 +11,8 @@ import numpy as np
 from modal.arrays import Flags, Floats
 from modal.bands.extraction import BandData, Extraction, FittedBand
 from modal.bands.find_resonances import Resonance
-from modal.fitting import MIN_RESIDUAL_TERMS, BandFit, fit_band, fit_real_constants, remove_residual_terms
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit
+from modal.fitting.fit_band import fit_band, fit_real_constants, remove_residual_terms
 from modal.poles import select_physical_poles
 
 JOINT_FIT_DISTANCE = 4.0

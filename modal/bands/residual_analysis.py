@@ -9,7 +9,8 @@ import numpy as np
 
 from modal.arrays import Complexes, Flags, Floats
 from modal.bands.extraction import FittedBand
-from modal.fitting import MAX_RESIDUAL_TERMS, BandFit, refit_nearby
+from modal.fitting.band_fit import MAX_RESIDUAL_TERMS, BandFit
+from modal.fitting.fit_band import refit_nearby
 
 RESIDUAL_BLOCKS = 48
 """Blocks of lines whose mean residuals are compared with white noise."""

@@ -13,7 +13,7 @@ from modal.arrays import Floats
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
 from modal.bands.residual_analysis import residual_near_mode
-from modal.fitting import MIN_RESIDUAL_TERMS
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.modes.measurement_effects import common_delay
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
 from modal.quality.trust import MAX_MISFIT_RATIO, MAX_REMAINING_DECAY, MIN_MISFIT_SHARE, relative_error, trust_rules

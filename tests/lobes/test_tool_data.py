@@ -131,7 +131,7 @@ def test_the_page_holds_what_the_tables_hold() -> None:
 
 
 def page_rows() -> list[list[str]]:
-    """What is known, a row for each group, tool material and kind of cut."""
+    """Return the published ranges, a row for each group, tool material and kind of cut."""
     rows = []
     for group, name in GROUPS.items():
         for tool in TOOL_MATERIALS:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
 from modal import Mode, fit_modes, pick_peaks, synthesize_frf
-from modal.fitting import MIN_RESIDUAL_TERMS, fit_band, mode_pair_gain
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
+from modal.fitting.fit_band import fit_band, mode_pair_gain
 
 LINES = np.arange(5.0, 6000.0, 5.0)
 NEIGHBOURS = [Mode(900.0, 0.03, 4e7), Mode(2900.0, 0.03, 3e7)]

@@ -123,7 +123,7 @@ def test_errors_of_all_four_values_go_together(phase: float) -> None:
 
 
 def test_standard_errors_of_a_heavily_damped_complex_mode_are_its_scatter() -> None:
-    """zeta 0.2, 50 degrees: half of the slope of the turned part counts, which a lightly damped mode hardly shows."""
+    """Check zeta 0.2 with 50 degrees: half of the slope of the rotated part counts, unlike with light damping."""
     lines, truth = np.arange(5.0, 6000.0, 5.0), Mode(1500.0, 0.2, 3e7, phase_deg=50.0)
     exact = synthesize_frf([truth], lines).accelerance
     values, errors = [], []

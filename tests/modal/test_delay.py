@@ -15,7 +15,7 @@ REAL = [Mode(700.0, 0.02, 6e7), Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.02, 9e7)
 
 
 def measured(modes: list[Mode], skew: float, seed: int = 0) -> Frf:
-    """The response sampled so much later than the force (s), in noise of 0.2 % of the largest accelerance."""
+    """Return the response sampled later than the force (s), with noise of 0.2 % of the largest accelerance."""
     exact = synthesize_frf(modes, LINES).accelerance * np.exp(2j * np.pi * LINES * skew)
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) * 0.002 * np.max(np.abs(exact))
     return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])

@@ -12,8 +12,10 @@ TRUE, OTHER = Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.03, 8e7)
 
 
 def drifting(random: np.random.Generator) -> Frf:
-    """A mode, in half of the cases another one, noise, and a drift of 2e-4 to 2 m/N x (1 Hz/f)^2 of random phase; half
-    of the drifts behind a high-pass filter of 0.3 to 3 Hz and first or second order."""
+    """Return one or two modes with noise and a drift of 2e-4 to 2 m/N x (1 Hz/f)^2 of random phase.
+
+    Half of the drifts are behind a high-pass filter of 0.3 to 3 Hz and first or second order.
+    """
     f = np.arange(1.0, 4000.0, 1.0) * random.choice([0.5, 1.0, 5.0])
     f = f[f <= 4000.0]
     drift = 10 ** random.uniform(np.log10(2e-4), np.log10(2)) / f**2 * np.exp(2j * np.pi * random.uniform())

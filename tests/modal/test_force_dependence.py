@@ -33,7 +33,7 @@ def softening(seed: int, per_100_newton: float, hits: int = 10, spread: float = 
 
 
 def said(hits: list[Hit]) -> list[str]:
-    """What is said of the first mode."""
+    """Return the remarks on force dependence of the first mode."""
     mode: Mode = fit_modes(estimate_frf(hits), hits=hits)[0]
     return [remark.text for remark in mode.remarks if remark.code == "force-dependent"]
 

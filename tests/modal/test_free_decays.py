@@ -28,7 +28,7 @@ def decay(*modes: tuple[float, float, float, float]) -> NDArray[np.float64]:
 
 
 def noisy_decays(seed: int, count: int = 3) -> NDArray[np.float64]:
-    """A strong mode beside a weaker one, each decay with sizes and phases of its own; noise of 1 %."""
+    """Return decays of a strong and a weaker mode, each with its own sizes and phases, with noise of 1 %."""
     random = np.random.default_rng(seed)
     records = [
         decay((900.0, 0.03, random.uniform(60, 140), random.uniform(0, 6)), (1100.0, 0.02, 30.0, random.uniform(0, 6)))

@@ -18,7 +18,7 @@ TWO = [ALONE, Mode(2600.0, 0.03, 6e7)]
 
 
 def loaded(modes: list[Mode], mass: float) -> Frf:
-    """What an accelerometer of this mass (kg) would measure: K - w^2 (M + mass) of the structure it rides on."""
+    """Return the FRF measured by an accelerometer of this mass (kg): K - w^2 (M + mass) of the structure."""
     free = synthesize_frf(modes, F).receptance
     return Frf(F, 1 / (1 / free - mass * (2 * np.pi * F) ** 2), measured_as="accelerance")
 

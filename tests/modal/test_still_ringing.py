@@ -14,8 +14,12 @@ DAMPING, STIFFNESS, RATE = 0.02, 3.5e7, 25600.0
 
 
 def cut_off(frequency: float, left: float, late: float = 0.0, zeros: int = 0, noise: float = 2e-4) -> Frf:
-    """Accelerance of a mode after an impulse, `late` of the record after its start, when the record ends with so much
-    of it left; behind it zeros for so many times its length. The transform is integrated in closed form."""
+    """Return the accelerance of a mode after an impulse whose record ends with the share `left` of it.
+
+    The impulse is `late` of the record after its start; zeros for `zeros` times its length are appended. The transform
+    is
+    integrated in closed form.
+    """
     w = 2 * np.pi * frequency
     pole = w * (-DAMPING + 1j * np.sqrt(1 - DAMPING**2))
     residue = w**2 / STIFFNESS / (2j * pole.imag)

@@ -13,7 +13,7 @@ LINES = np.arange(1000.0, 2600.0, 2.0)
 
 
 def windowed(mode: Mode, tau: float) -> Frf:
-    """The transform of the impulse response 1/(m w_d) exp(-zeta w t) sin(w_d t), times exp(-t/tau)."""
+    """Return the transform of the impulse response 1/(m w_d) exp(-zeta w t) sin(w_d t), times exp(-t/tau)."""
     w = 2 * np.pi * mode.frequency
     w_d, mass = w * np.sqrt(1 - mode.damping_ratio**2), mode.stiffness / w**2
     s = 2j * np.pi * LINES + mode.damping_ratio * w + 1 / tau

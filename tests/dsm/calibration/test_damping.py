@@ -57,9 +57,9 @@ def finite_elements(spindle: Spindle) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def quadratic_modes(spindle: Spindle, loss_factor: float) -> NDArray[np.complex128]:
-    """The s with Im s > 0 of (s^2 M + s C + (1 + i eta) K) x = 0.
+    """Return the s with Im s > 0 of (s^2 M + s C + (1 + i eta) K) x = 0.
 
-    In undamped modes, M = 1 and K = L^2, with p = L x, v = s x: (p, v)/s = A (p, v), which rounding does not hurt.
+    In undamped modes, M = 1 and K = L^2, with p = L x, v = s x: (p, v)/s = A (p, v), which limits rounding.
     """
     stiffness, mass = finite_elements(spindle)
     damping = np.zeros_like(mass)
@@ -85,7 +85,7 @@ def test_mass_on_springs_and_dampers(zeta: float) -> None:
 
 @pytest.mark.parametrize("damping", [3e2, 3e3, 1e5])
 def test_damper_and_spring_before_a_compliant_housing(damping: float) -> None:
-    """m s^2 + 2 (k + c s) h/(k + c s + h) = 0 is a cubic."""
+    """Solve m s^2 + 2 (k + c s) h/(k + c s + h) = 0, which is a cubic."""
     h = 4e7
     roots = np.roots([MASS * damping, MASS * (STIFFNESS + h), 2 * damping * h, 2 * STIFFNESS * h])
     s = roots[np.argmax(roots.imag)]
@@ -131,7 +131,7 @@ def test_the_peak_of_the_receptance_is_as_wide_as_the_mode_says() -> None:
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(0, 300), min_size=3, max_size=3), st.floats(0, 0.005))
 def test_light_damping_is_that_of_first_order(dampers: list[float], eta: float) -> None:
-    """zeta = eta/2 + sum of c phi^2/(2 w); d w^2/d k = phi^2 by differences."""
+    """Compare with zeta = eta/2 + sum of c phi^2/(2 w); d w^2/d k = phi^2 by differences."""
     a, b, c = dampers
     spindle = stepped((a, b, c))
     w = 2 * np.pi * natural_frequencies(spindle, 3)

@@ -21,7 +21,7 @@ LENGTH, RIGIDITY, MASS = 0.7, 3.0, 0.2
 
 
 def one_element() -> DynamicStiffness:
-    """A free beam of one element with the bending stiffness, mass per length and length above."""
+    """Return a free beam of one element with the bending stiffness, mass per length and length above."""
     segment = Segment(LENGTH, 0.1)
     youngs_modulus, density = RIGIDITY / segment.second_moment, MASS / segment.area
     longest = 4 / LENGTH**2 * math.sqrt(RIGIDITY / MASS) / (2 * math.pi)

@@ -55,7 +55,7 @@ def rich_spindles(draw: st.DrawFn) -> Spindle:
 
 
 def log_slope(scaled: Callable[[float], Spindle], count: int) -> NDArray[np.float64]:
-    """d ln f^2 / d ln k of each mode by a central difference."""
+    """Return d ln f^2 / d ln k of each mode by a central difference."""
     low, high = (find_modes(scaled(math.exp(d)), count).frequency for d in (-STEP, STEP))
     return np.asarray(np.log(high / low) / STEP)
 
@@ -87,7 +87,7 @@ def test_a_share_is_the_slope_of_the_frequency(spindle: Spindle, kind: str, inde
 
 
 def stiffened(spindle: Spindle, kind: str, index: int, factor: float) -> Spindle:
-    """The spindle with one of its parts stiffer by a factor."""
+    """Return the spindle with one of its parts stiffer by a factor."""
     segments, bearings, joints = list(spindle.segments), list(spindle.bearings), list(spindle.joints)
     if kind == "segment":
         stuff = segments[index].material or spindle.material

@@ -61,7 +61,7 @@ def error(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 def with_cones(shaft: Spindle, number: int, outer: float, bore: float = 0.0) -> Spindle:
-    """The same with a segment that widens to these diameters."""
+    """Return the shaft with a segment that widens to these diameters."""
     segments = list(shaft.segments)
     segments[number] = replace(segments[number], end_outer_diameter=outer, end_bore_diameter=bore)
     return replace(shaft, segments=segments)

@@ -26,7 +26,7 @@ def cantilever() -> NDArray[np.float64]:
 
 
 def stiffness(w2: float) -> NDArray[np.float64]:
-    """The same at w^2 from the textbook form."""
+    """Return the stiffness at w^2 from the textbook form."""
     x = w2**0.25
     s, c, sh, ch = math.sin(x), math.cos(x), math.sinh(x), math.cosh(x)
     rows = [[x**3 * (s * ch + c * sh), -(x**2) * s * sh], [-(x**2) * s * sh, x * (s * ch - c * sh)]]

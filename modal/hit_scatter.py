@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from acquisition import Frf, Hit, Remark, remove_sensor_mass
-from acquisition.estimation import compute_cross_spectra, propagate_force_noise_through
+from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.arrays import Complexes, Floats
 from modal.bands.extraction import Extraction, FittedBand
 from modal.modes.mode import Mode

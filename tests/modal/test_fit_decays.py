@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import Structure
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
 from modal import Mode, fit_decays, follow_mode, predominant_mode, select_credible_modes
-from tests.modal.test_uncertainty import PRE_TRIGGER, TRUTH, first_mode, tap
+from tests.modal.test_hit_scatter import PRE_TRIGGER, TRUTH, first_mode, tap
 
 RATE, SIZE = 6400.0, 1024
 TIME = np.arange(SIZE) / RATE

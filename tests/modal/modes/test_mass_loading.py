@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Frf, Hit, estimate_frf, remove_sensor_mass
 from modal import Mode, fit_modes, mass_loading, synthesize_frf, with_mass_uncertainty
-from tests.modal.test_uncertainty import tap
+from tests.modal.test_hit_scatter import tap
 
 F = np.arange(10.0, 4000.0, 2.0)
 TEN_GRAMS = 0.010

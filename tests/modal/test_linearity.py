@@ -11,7 +11,7 @@ import pytest
 from acquisition import Hit, estimate_frf
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
 from modal import Mode, fit_modes
-from tests.modal.test_uncertainty import PRE_TRIGGER, RECORD, STRUCTURE, tap
+from tests.modal.test_hit_scatter import PRE_TRIGGER, RECORD, STRUCTURE, tap
 
 
 def softening(seed: int, per_100_newton: float, hits: int = 10, spread: float = 200.0) -> list[Hit]:

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition import Frf, estimate_frf, from_accelerance, is_smoothed
 from modal import Mode, Trust, assess_trust, fit_modes, synthesize_frf
-from tests.modal.test_uncertainty import tap
+from tests.modal.test_hit_scatter import tap
 
 F = np.arange(2.0, 3200.0, 2.0)
 KERNELS = {"three": np.ones(3) / 3, "five": np.ones(5) / 5, "hann": np.array([0.25, 0.5, 0.25])}

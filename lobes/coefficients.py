@@ -120,15 +120,20 @@ class CuttingCoefficients:
 
     def __post_init__(self) -> None:
         """Check the coefficients."""
-        if not (np.isfinite(self.tangential) and self.tangential > 0):
-            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-        if not (np.isfinite(self.radial) and self.radial >= 0):
-            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        check_coefficients(self.tangential, self.radial)
 
     @property
     def names(self) -> tuple[str, ...]:
         """All names of the material."""
         return (self.material, *self.equivalents)
+
+
+def check_coefficients(tangential: float, radial: float) -> None:
+    """Raise ValueError unless Ktc is > 0 and Krc >= 0, both finite (Pa)."""
+    if not (np.isfinite(tangential) and tangential > 0):
+        raise ValueError(f"tangential={tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    if not (np.isfinite(radial) and radial >= 0):
+        raise ValueError(f"radial={radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
 
 
 def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[float, float]:

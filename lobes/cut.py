@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lobes.arrays import Floats
+from lobes.coefficients import check_coefficients
 from modal import Mode
 
 Direction = Literal["up", "down"]
@@ -93,10 +94,7 @@ class Cut:
             )
         if self.direction not in get_args(Direction):
             raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
-        if not (np.isfinite(self.tangential) and self.tangential > 0):
-            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-        if not (np.isfinite(self.radial) and self.radial >= 0):
-            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        check_coefficients(self.tangential, self.radial)
         if not (np.isfinite(self.helix_lag) and self.helix_lag >= 0):
             raise ValueError(
                 f"helix_lag={self.helix_lag} rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"

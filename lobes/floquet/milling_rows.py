@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -90,17 +90,7 @@ class MillingRows:
         return np.asarray(np.hypot(self.tangential, self.radial))
 
 
-_VARYING_FIELDS = (
-    "frequency",
-    "damping_ratio",
-    "stiffness",
-    "phase",
-    "vector",
-    "speed_rpm",
-    "tangential",
-    "radial",
-    "feed_angle",
-)
+_VARYING_FIELDS = [field.name for field in fields(MillingRows) if field.name not in ("cut", "direction", "axes")]
 
 
 def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:

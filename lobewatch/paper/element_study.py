@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,70 +62,40 @@ ROOT_SCAN_FREQUENCIES = np.linspace(0.05, 40.0, 1600)
 """Frequencies at which sign changes of its determinant are searched (rad/s)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ElementStudy:
-    """Errors of the printed element."""
-
-    root_error: float
-    """Largest relative error of the roots of (14) to (16) against an eigenvalue solver, over all segments."""
-    error: float
-    """Largest error of A B^-1 over all segments, over its largest entry."""
-    critical_error: float
-    """Largest error at a relative distance of 1e-6 from the frequency that equals the speed."""
-    is_finite: tuple[bool, bool]
-    """Whether A B^-1 exists at speed 0, and at a frequency that equals the speed."""
-    asymmetry: float
-    """Largest difference of K and its transpose with the signs of (23), over the largest entry."""
-    first_root: float
-    """First natural frequency of the cantilever with the right signs (rad/s)."""
-    other_root: float
-    """First natural frequency with the sign of (5) as printed (rad/s)."""
-    roots: tuple[int, int]
-    """Numbers of natural frequencies within the scan: with the right signs, and with those of (23) as printed."""
-
-
-def study_element(spindle: Spindle) -> ElementStudy:
-    """Study the segments of a round shaft, and a cantilever that is not round."""
-    segments = list(_spinning_segments(spindle))
-    frequency = printed.FREQUENCY
-    at_rest, at_speed = (printed_element(segments[0], frequency, speed) for speed in (0.0, 60 * frequency))
-    as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
-    right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
-    return ElementStudy(
-        max(_root_error(segment) for segment in segments),
-        max(_element_error(segment, frequency, ELEMENT_SPEED_RPM) for segment in segments),
-        max(_element_error(segment, frequency, 60 * frequency * (1 + 1e-6)) for segment in segments),
-        (bool(np.all(np.isfinite(at_rest))), bool(np.all(np.isfinite(at_speed)))),
-        float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed))),
-        right[0],
-        other[0],
-        (len(right), len(wrong)),
+def element_section(spindle: Spindle) -> NumberGroup:
+    """Return the numbers of the element: of the segments of a round shaft, and of a cantilever that is not round."""
+    segments, frequency = list(_spinning_segments(spindle)), printed.FREQUENCY
+    root_error = max(_root_error(segment) for segment in segments)
+    error, critical_error = (
+        max(_element_error(segment, frequency, speed) for segment in segments)
+        for speed in (ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6))
     )
-
-
-def element_section(study: ElementStudy) -> NumberGroup:
-    """Return the numbers of the element."""
-    at_rest, at_speed = ("exists" if finite else "does not exist" for finite in study.is_finite)
-    right, wrong = study.roots
+    at_rest, at_speed = (
+        "exists" if np.all(np.isfinite(printed_element(segments[0], frequency, speed))) else "does not exist"
+        for speed in (0.0, 60 * frequency)
+    )
+    as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
+    asymmetry = float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed)))
+    right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
     solver = "against an eigenvalue solver, 26 segments at 1722 Hz: right as printed"
     rounding = (
         f"signs put right, 26 segments, {ELEMENT_SPEED_RPM:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
     )
     near = f"1e-6 beside the speed of 1722 Hz; where both are equal A B^-1 {at_speed}, ours does"
-    shapes = f"a cantilever that is not round; {study.first_root:.5f} with the right sign: shapes alone are changed"
+    shapes = f"a cantilever that is not round; {right[0]:.5f} with the right sign: shapes alone are changed"
     symmetric = "in its largest entry: end forces have one sign as printed; with the right ones K is symmetric"
     highest = f"{ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s"
-    none = f"assembled as printed, that cantilever has so many frequencies below {highest}; right are {right}"
+    none = f"assembled as printed, that cantilever has so many frequencies below {highest}; right are {len(right)}"
     return NumberGroup(
         "The spinning element: eqs. (5) and (13) to (25)",
         (),
         (
-            Comparison("error of the roots", "(14)-(16)", None, study.root_error, "-", 1, solver),
-            Comparison("error of A B^-1", "(17)-(25)", None, study.error, "-", 1, rounding),
-            Comparison("the same next to w = Omega", "(17)-(25)", None, study.critical_error, "-", 1, near),
-            Comparison("first root with the sign of (5)", "(5)", None, study.other_root, "rad/s", 6, shapes),
-            Comparison("K less its transpose", "(23)", None, study.asymmetry, "-", 2, symmetric),
-            Comparison("roots with the signs of (23)", "(23)", None, wrong, "", 1, none),
+            Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
+            Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),
+            Comparison("the same next to w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
+            Comparison("first root with the sign of (5)", "(5)", None, other[0], "rad/s", 6, shapes),
+            Comparison("K less its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
+            Comparison("roots with the signs of (23)", "(23)", None, len(wrong), "", 1, none),
         ),
     )
 

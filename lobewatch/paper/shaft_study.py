@@ -8,18 +8,8 @@ from importlib import resources
 
 import numpy as np
 
-from dsm import (
-    Calibration,
-    Spindle,
-    Theory,
-    WhirlMap,
-    calibrate,
-    critical_speed,
-    natural_frequencies,
-    static_stiffness,
-    stiffness_curve,
-    whirl_map,
-)
+import dsm
+from dsm import Calibration, Spindle, Theory, WhirlMap
 from dsm.arrays import Floats
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.paper import printed
@@ -73,21 +63,21 @@ def study_shaft(theory: Theory) -> ShaftStudy:
     """Study the shaft by one beam theory."""
     shaft = surrogate_spindle(printed.BEARING_STIFFNESS, theory)
     rigid = surrogate_spindle(math.inf, theory)
-    new = calibrate(shaft, printed.FREQUENCY)
-    highest = float(natural_frequencies(rigid, 1)[0])
+    new = dsm.calibrate(shaft, printed.FREQUENCY)
+    highest = float(dsm.natural_frequencies(rigid, 1)[0])
     frequency = np.linspace(0.13, 0.9985, STIFFNESS_CURVE_POINTS) * highest
-    turning = whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
+    turning = dsm.whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
     old = surrogate_spindle(printed.OLD_BEARING_STIFFNESS, theory)
     return ShaftStudy(
         rigid,
         highest,
-        (float(natural_frequencies(shaft, 1)[0]), float(natural_frequencies(old, 1)[0])),
+        (float(dsm.natural_frequencies(shaft, 1)[0]), float(dsm.natural_frequencies(old, 1)[0])),
         new,
-        calibrate(new.spindle, printed.OLD_FREQUENCY),
-        (critical_speed(rigid), critical_speed(new.spindle)),
-        (stiffness_curve(shaft, frequency), frequency),
-        whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
-        whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
+        dsm.calibrate(new.spindle, printed.OLD_FREQUENCY),
+        (dsm.critical_speed(rigid), dsm.critical_speed(new.spindle)),
+        (dsm.stiffness_curve(shaft, frequency), frequency),
+        dsm.whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
+        dsm.whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
         (float(turning.backward[0, 0]), float(turning.forward[0, 0])),
     )
 
@@ -181,7 +171,7 @@ class StiffnessStudy:
 def study_stiffness(old: Calibration) -> StiffnessStudy:
     """Study the tip stiffness from the bearings calibrated to the frequency before and after the drop."""
     pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
-    before, after = (static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
+    before, after = (dsm.static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
     return StiffnessStudy(
         (old.static_stiffness_before, old.static_stiffness_after),
         (before, after),

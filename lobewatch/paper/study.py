@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Claim, NumberGroup, format_share
-from lobewatch.paper.element_study import ElementStudy, element_section, study_element
+from lobewatch.paper.element_study import element_section
 from lobewatch.paper.finite_elements import FiniteElementStudy, mesh_section, study_meshes
 from lobewatch.paper.lobe_study import LobeStudy, lobe_section, study_lobes
 from lobewatch.paper.shaft_study import (
@@ -118,8 +118,8 @@ class PaperStudy:
     """Shaft by Timoshenko theory."""
     meshes: FiniteElementStudy
     """Finite elements."""
-    element: ElementStudy
-    """Spinning element as printed."""
+    element: NumberGroup
+    """Numbers of the spinning element as printed."""
     tap: TapStudy
     """Tap test."""
     stiffness: StiffnessStudy
@@ -132,7 +132,7 @@ class PaperStudy:
         """Every number of the paper with ours, in the order of the paper."""
         at_rest, spinning = shaft_sections(self.plain, self.shear)
         return (
-            element_section(self.element),
+            self.element,
             at_rest,
             mesh_section(self.meshes),
             spinning,
@@ -162,7 +162,7 @@ def study_paper() -> PaperStudy:
         plain,
         shear,
         study_meshes(plain.rigid, shear.rigid, (plain.rigid_frequency, shear.rigid_frequency)),
-        study_element(plain.rigid),
+        element_section(plain.rigid),
         tap,
         stiffness,
         study_lobes(tap.measured, stiffness.modal[1] / stiffness.modal[0], tap.surrogate_modes),

@@ -90,11 +90,6 @@ def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
     tuple of str and Trust
         Code of the remark, and the verdict of this rule.
 
-    Returns
-    -------
-    iterator
-        See Yields.
-
     Examples
     --------
     >>> list(trust_rules(Mode(500.0, 0.02, 2e7, misfit=30.0, misfit_share=0.5)))

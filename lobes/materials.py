@@ -176,8 +176,8 @@ def materials_by_name() -> Mapping[str, CuttingCoefficients]:
     >>> materials_by_name()[fold_material_name("AA 7075")].names
     ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')
     """
-    known = ((name, one) for one in all_cutting_coefficients() for name in one.names)
-    return MappingProxyType({fold_material_name(name): one for name, one in known})
+    known = ((name, material) for material in all_cutting_coefficients() for name in material.names)
+    return MappingProxyType({fold_material_name(name): material for name, material in known})
 
 
 def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
@@ -230,8 +230,8 @@ def find_materials(word: str) -> list[CuttingCoefficients]:
     True
     """
     folded, known = fold_material_name(word), all_cutting_coefficients()
-    of_group = [one for one in known if folded and one.iso_group.casefold() == folded]
-    matching = of_group or [one for one in known if any(folded in fold_material_name(name) for name in one.names)]
+    in_group = [material for material in known if folded and material.iso_group.casefold() == folded]
+    matching = in_group or [m for m in known if any(folded in fold_material_name(name) for name in m.names)]
     if not matching:
         near = nearest_material_name(word, materials_by_name())
         raise ValueError(f"no material has {word!r} in a name; is {near!r} meant? Without a word all are listed")

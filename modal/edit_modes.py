@@ -115,50 +115,54 @@ class _EditPlan:
 
 
 def _drop_mode(state: Extraction, frequency: float) -> Extraction:
-    said = f"drop {frequency:g} Hz"
+    request = f"drop {frequency:g} Hz"
     place = _find_mode(state, frequency)
     if place is None:
         modes = ", ".join(f"{mode:.0f}" for band in state.bands for mode in band.fit.frequency) or "none"
-        raise ValueError(f"{said}: no mode within 1 % of it; there are modes at: {modes} Hz")
+        raise ValueError(f"{request}: no mode within 1 % of it; there are modes at: {modes} Hz")
     band, i = place
     plan = _plan_for_band(band).without(i)
     if not plan.words:
         return replace_band(state, band, None)
     fitted = plan.fitted(state)
     if fitted is None:
-        raise ValueError(f"{said}: the modes beside it cannot be fitted without it; drop them, too")
+        raise ValueError(f"{request}: the modes beside it cannot be fitted without it; drop them, too")
     return replace_band(state, band, fitted)
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    said = f"add {frequency:g} Hz"
-    plan = _plan_at_frequency(state, frequency, said)
+    request = f"add {frequency:g} Hz"
+    plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
             raise ValueError(
-                f"{said}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
+                f"{request}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
             )
     tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
     fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
-        raise ValueError(f"{said}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix")
+        raise ValueError(
+            f"{request}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix"
+        )
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
         raise ValueError(
-            f"{said}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain by "
-            f"{100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
+            f"{request}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain "
+            f"by {100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
         )
     return replace_band(state, plan.band, best)
 
 
 def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
-    said = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
+    request = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
     place = _find_mode(state, frequency)
-    plan = _plan_at_frequency(state, frequency, said) if place is None else _plan_for_band(place[0]).without(place[1])
+    plan = (
+        _plan_at_frequency(state, frequency, request) if place is None else _plan_for_band(place[0]).without(place[1])
+    )
     fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
     if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
-        raise ValueError(f"{said}: nothing of it is to be seen there; look at the picture")
+        raise ValueError(f"{request}: nothing of it is to be seen there; look at the picture")
     return replace_band(state, plan.band, fitted)
 
 
@@ -174,11 +178,11 @@ def _plan_for_band(band: FittedBand) -> _EditPlan:
     return _EditPlan(band, band.lines, band.fit.poles, band.edits or ("",) * band.fit.frequency.size)
 
 
-def _plan_at_frequency(state: Extraction, frequency: float, said: str) -> _EditPlan:
+def _plan_at_frequency(state: Extraction, frequency: float, request: str) -> _EditPlan:
     """Return the plan of the band that holds a frequency, or of a new one around it."""
     f = state.frf.frequency
     if not f[0] < frequency < f[-1]:
-        raise ValueError(f"{said}: lies outside the lines, {f[0]:g} to {f[-1]:g} Hz")
+        raise ValueError(f"{request}: lies outside the lines, {f[0]:g} to {f[-1]:g} Hz")
     for band in state.bands:
         if band.data.frequency[0] <= frequency <= band.data.frequency[-1]:
             return _plan_for_band(band)

@@ -117,8 +117,8 @@ def _modes_with_scatter(
     over_hits = (
         np.sum([jackknife_covariance(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
     )
-    judged = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
+    assessed = modes_from_band(state, band, by_hammer, over_hits, n_hits)
+    return add_linearity_remarks(state, band, assessed, hits[0], without[0]) if n_hits else assessed
 
 
 def modes_from_band(

@@ -141,11 +141,11 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     empty = Extraction(lines, np.array([line_weights(frf) for frf in lines]), ())
     peaks = _merge_resonances([find_resonances(frf) for frf in lines])
     state = iterate_bands(_fit_bands(empty, peaks))
-    beside = _with_residual_resonances(state, peaks)
-    state = state if len(beside) == len(peaks) else iterate_bands(_fit_bands(state, beside))
-    closer = tuple(refine_dense_band(band) for band in state.bands)
-    if any(new is not old for new, old in zip(closer, state.bands, strict=True)):
-        state = iterate_bands(replace(state, bands=closer))
+    extended = _with_residual_resonances(state, peaks)
+    state = state if len(extended) == len(peaks) else iterate_bands(_fit_bands(state, extended))
+    refined = tuple(refine_dense_band(band) for band in state.bands)
+    if any(new is not old for new, old in zip(refined, state.bands, strict=True)):
+        state = iterate_bands(replace(state, bands=refined))
     stray = _stray_lines(state)
     if np.any(stray):
         state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))

@@ -89,16 +89,16 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     return sorted(turning, key=lambda r: r.frequency)
 
 
-def add_residual_resonances(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
+def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[Resonance]:
     """Add resonances that stand out of the residual of a fit to the known ones, by rising frequency.
 
-    left: the measured FRF less all that was fitted. Residual peaks at known resonances and single lines (hum)
+    residual: the measured FRF less all that was fitted. Residual peaks at known resonances and single lines (hum)
     are ignored.
     """
     if not known:
         return []
     least = MIN_RESIDUAL_PEAK_SHARE * min(r.height for r in known)
-    peaks = [peak for peak in _find_peaks_at_all_scales(left, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
+    peaks = [peak for peak in _find_peaks_at_all_scales(residual, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
     turning = [peak.resonance for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
     return sorted([*known, *(new for new in turning if _is_separate_resonance(known, new))], key=lambda r: r.frequency)
 

@@ -80,7 +80,7 @@ MAX_DRIFT_FREQUENCY_SHARE = 1 / 16
 MAX_DRIFT_SCATTER = 0.1
 """Largest median scatter of a drift, relative to it."""
 DRIFT_ROUNDING_SHARE = 1e-9
-"""Share of the FRF below which nothing but drift is left."""
+"""Share of the FRF below which nothing but drift is without_drift."""
 
 
 def remove_drift(frf: Frf) -> Frf:
@@ -93,9 +93,11 @@ def remove_drift(frf: Frf) -> Frf:
     scatter, drift = min(drifts, key=lambda candidate: candidate[0], default=(np.inf, 0.0))
     if scatter > MAX_DRIFT_SCATTER:
         return frf
-    left = frf.receptance - drift / frf.frequency**2
+    without_drift = frf.receptance - drift / frf.frequency**2
     return (
-        replace(frf, receptance=left) if np.any(np.abs(left) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance)) else frf
+        replace(frf, receptance=without_drift)
+        if np.any(np.abs(without_drift) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance))
+        else frf
     )
 
 

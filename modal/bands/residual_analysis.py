@@ -20,11 +20,11 @@ MAX_WHITENESS_EXCESS = 1.0
 
 def has_white_residual(fit: BandFit) -> bool:
     """Return whether the means of neighbouring residuals are as small as those of independent errors."""
-    left = fit.complex_residual
-    length = max(2, left.shape[1] // RESIDUAL_BLOCKS)
-    blocks = left[:, : left.shape[1] // length * length].reshape(len(left), -1, length)
+    residual = fit.complex_residual
+    length = max(2, residual.shape[1] // RESIDUAL_BLOCKS)
+    blocks = residual[:, : residual.shape[1] // length * length].reshape(len(residual), -1, length)
     size = np.sum(np.abs(blocks.mean(axis=2)) ** 2) * length
-    expected = fit.sum_of_squares / left.size * blocks[..., 0].size
+    expected = fit.sum_of_squares / residual.size * blocks[..., 0].size
     return bool(size < expected * (1 + MAX_WHITENESS_EXCESS / np.sqrt(blocks[..., 0].size)))
 
 
@@ -158,13 +158,13 @@ def _trial_changes(band: FittedBand) -> Iterator[Floats]:
     """Yield the changes of the modes in trial fits, in the order of `BandFit`; 0 for modes whose peak a trial cuts."""
     fit, data, n = band.fit, band.data, band.data.frequency.size
     everything = slice(0, n)
-    tries = [
+    trials = [
         (everything, terms)
         for terms in range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
         if terms != band.terms
     ]
     for part, terms in [
-        *tries,
+        *trials,
         *((slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES),
     ]:
         values = refit_nearby(fit, data.frequency[part], data.target[:, part], data.weight[:, part], terms)

@@ -65,7 +65,7 @@ MIN_RIVAL_DISTANCE_RATIO = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class FollowedMode:
+class ModeMatch:
     """Mode that continues an earlier one."""
 
     mode: Mode | None
@@ -74,7 +74,7 @@ class FollowedMode:
     """Reasons why it may be another mode, or why there is none."""
 
 
-def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
+def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     """Find the mode that continues the last followed one.
 
     The distance of two modes is the root of the sum of squares of the changes of frequency, damping ratio and
@@ -91,7 +91,7 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
 
     Returns
     -------
-    FollowedMode
+    ModeMatch
         Most similar mode, with a remark if it is doubtful.
 
     Examples
@@ -107,15 +107,15 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
     if not near or not _is_same_mode(last, near[0]):
         nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
         text = f"no mode to follow, none is like this one{nearest}"
-        return FollowedMode(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
+        return ModeMatch(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
     first, about = _match_distance(last, near[0]), f"{near[0].frequency:.0f} Hz"
     if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
         text = f"followed mode in doubt: {near[1].frequency:.1f} Hz is nearly as like {_values_text(last)}"
-        return FollowedMode(near[0], (Remark("rival-mode", about, text),))
+        return ModeMatch(near[0], (Remark("rival-mode", about, text),))
     if first > DOUBTFUL_MATCH_DISTANCE:
         text = f"followed mode in doubt: it was {_values_text(last)}, now {_values_text(near[0])}"
-        return FollowedMode(near[0], (Remark("large-change", about, text),))
-    return FollowedMode(near[0], ())
+        return ModeMatch(near[0], (Remark("large-change", about, text),))
+    return ModeMatch(near[0], ())
 
 
 def _is_same_mode(last: Mode, mode: Mode) -> bool:

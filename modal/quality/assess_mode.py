@@ -83,14 +83,14 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
         remaining_decay=_remaining_decay(state.record_length, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
-    judged = with_truncation_error(figures)
+    assessed = with_truncation_error(figures)
     remarks = chain(
-        _edit_remarks(band, i, judged),
-        _position_remarks(state, band, i, judged),
-        _value_remarks(band, i, judged, share),
-        _error_remarks(judged),
+        _edit_remarks(band, i, assessed),
+        _position_remarks(state, band, i, assessed),
+        _value_remarks(band, i, assessed, share),
+        _error_remarks(assessed),
     )
-    return replace(judged, remarks=tuple(remarks))
+    return replace(assessed, remarks=tuple(remarks))
 
 
 def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:

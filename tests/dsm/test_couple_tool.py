@@ -13,6 +13,8 @@ from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory,
 from dsm.response import couple_tool, spindle_side
 from dsm.spindle.spindle import change_tool
 
+pytestmark = pytest.mark.quick
+
 F = np.array([0.0, 0.01, *np.linspace(5.0, 6000.0, 100)])
 THEORIES: tuple[Theory, ...] = ("euler-bernoulli", "timoshenko")
 

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from dsm.elements.element_series import element_series
 from dsm.response import linearized_stiffness
 
+pytestmark = pytest.mark.quick
+
 FIRST = 3.5160152685002
 
 

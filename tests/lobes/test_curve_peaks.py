@@ -1,6 +1,7 @@
 """Peaks with prominence, beside scipy's on curves with flats and ties."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -8,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from lobes.pockets import find_curve_peaks
+
+pytestmark = pytest.mark.quick
 
 STEPS = arrays(np.float64, st.integers(1, 60), elements=st.integers(0, 9).map(float))
 SMOOTH = arrays(np.float64, st.integers(1, 200), elements=st.floats(-1e3, 1e3, width=32))

@@ -20,6 +20,8 @@ from lobes import (
 )
 from lobes.materials import read_table
 
+pytestmark = pytest.mark.quick
+
 PAGE = Path(__file__).parents[2] / "docs" / "tools.md"
 GROUPS = {
     "P": "42CrMo4",

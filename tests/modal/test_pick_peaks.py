@@ -13,6 +13,8 @@ import pytest
 from acquisition import Frf
 from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
+pytestmark = pytest.mark.quick
+
 PAPER = Mode(1722.0, 0.029136, 3.2289e7)
 
 

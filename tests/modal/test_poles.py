@@ -53,6 +53,7 @@ def test_noise_alone_has_no_physical_poles() -> None:
     assert found <= 2
 
 
+@pytest.mark.quick
 def test_poles_of_several_frfs_are_common() -> None:
     shapes = np.array([[1.0, 1.0, 1.0], [0.5, -0.8, 0.0]])
     curves = np.array([mode.receptance(LINES) for mode in MODES])
@@ -62,6 +63,7 @@ def test_poles_of_several_frfs_are_common() -> None:
     assert ratio == pytest.approx(shapes[1], abs=0.01)
 
 
+@pytest.mark.quick
 def test_few_lines_give_few_orders_and_none_at_all_an_empty_chart() -> None:
     chart = fit_lscf_poles(LINES[:7], synthesize_frf(MODES, LINES[:7]).receptance[None], EQUAL[:, :7], 10)
     assert np.max(chart.order, initial=0) <= 2

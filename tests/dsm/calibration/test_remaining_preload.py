@@ -10,6 +10,8 @@ import pytest
 
 from dsm import Bearing, Joint, Segment, Spindle, calibrate, natural_frequencies
 
+pytestmark = pytest.mark.quick
+
 SPINDLE = Spindle([Segment(0.1, 0.05), Segment(0.3, 0.07, 0.02)], [Bearing(0.12, 2e8), Bearing(0.35, 2e8)])
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from dsm import format_rounded, format_with_error
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize(
     ("value", "std", "scale", "text"),

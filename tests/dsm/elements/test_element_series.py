@@ -17,6 +17,8 @@ from dsm import Segment, Spindle
 from dsm.matrix.assemble import assemble
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 
+pytestmark = pytest.mark.quick
+
 LENGTH, RIGIDITY, MASS = 0.7, 3.0, 0.2
 
 

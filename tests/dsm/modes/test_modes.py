@@ -7,6 +7,8 @@ import pytest
 from dsm import Bearing, Segment, Spindle, mode_shapes, modes_at
 from dsm.modes.find_modes import find_modes
 
+pytestmark = pytest.mark.quick
+
 SHAFT = Spindle(
     (Segment(0.12, 0.05), Segment(0.2, 0.08, 0.03), Segment(0.1, 0.06)), (Bearing(0.15, 3e8), Bearing(0.38, 2e8))
 )

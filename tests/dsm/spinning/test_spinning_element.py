@@ -116,6 +116,7 @@ def test_symmetric_and_each_frequency_by_itself() -> None:
     assert np.array_equal(together, np.concatenate([spinning_element(*BEAM, [f], 20.0) for f in frequency]))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("name", "change"),
     [

@@ -43,6 +43,7 @@ def test_growth_near_zero_is_within_the_tolerance(tolerance: float) -> None:
     assert near > 300
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("seed", [25, 111, 145, 150, 221, 229, 295])
 def test_rough_pieces_are_enough_for_growth_within_1e_4(seed: int) -> None:
     """Programs in some of which pieces of 1.25 cycles are not."""

@@ -7,6 +7,8 @@ import pytest
 
 from lobes.floquet.piece_response import invert_matrices
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("size", [1, 8, 16])
 @pytest.mark.parametrize("shape", [(), (1,), (40, 3)])

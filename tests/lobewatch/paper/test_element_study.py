@@ -10,6 +10,8 @@ import pytest
 from dsm import SpinningSegment, spinning_element
 from lobewatch.paper.element_study import fourth_powers, printed_element
 
+pytestmark = pytest.mark.quick
+
 BEAM = SpinningSegment(length=0.9, rigidity_xx=1.3, rigidity_yy=4.1, mass_per_length=0.7)
 
 

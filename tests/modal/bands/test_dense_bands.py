@@ -90,6 +90,7 @@ def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_said() -> None
     assert "several-modes" not in codes_between(noisy(modes, 1e-3, 0))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("turn", [1.0, 1j])
 def test_the_gain_of_a_pair_is_what_a_mode_leaves_of_two_near_each_other(turn: complex) -> None:
     line, weight = np.arange(1300.0, 2200.0, 5.0), np.ones((1, 180))

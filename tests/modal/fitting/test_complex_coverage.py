@@ -74,6 +74,7 @@ def test_without_noise_it_is_exact() -> None:
     assert synthesize_frf(found, LINES).receptance == pytest.approx(synthesize_frf(truth, LINES).receptance, rel=1e-4)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("phase", [90.0, -90.0])
 def test_a_quarter_turn_is_a_mode_of_either_sign(phase: float) -> None:
     truth = Mode(1500.0, 0.03, 3e7, phase_deg=phase)

@@ -7,6 +7,8 @@ import pytest
 
 from modal import Mode, common_decay_rate
 
+pytestmark = pytest.mark.quick
+
 FREQUENCIES = (120.0, 310.0, 590.0, 970.0, 1500.0)
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from modal import Mode
 
+pytestmark = pytest.mark.quick
+
 LINES = np.linspace(5.0, 4000.0, 800)
 
 

@@ -8,6 +8,8 @@ import pytest
 from acquisition import Frf
 from modal import Mode, fit_modes, remove_window, synthesize_frf, widen_for_window
 
+pytestmark = pytest.mark.quick
+
 MODE = Mode(1722.0, 0.03, 3.5e7)
 LINES = np.arange(1000.0, 2600.0, 2.0)
 

@@ -11,6 +11,8 @@ import pytest
 from acquisition import Remark
 from modal import Mode, Trust, assess_trust, fit_modes, match_modes, synthesize_frf, trust_rules
 
+pytestmark = pytest.mark.quick
+
 GOOD = Mode(
     1722.0,
     0.03,

@@ -119,12 +119,12 @@ class PieceResponse:
         A and
         (theta/K) theta A D A.
         """
-        stages = gauss_nodes()
+        nodes = gauss_nodes()
         theta, twice = rows.frequency * time[:, np.newaxis], 2 * rows.damping_ratio
-        t = theta[..., np.newaxis] * stages.root
+        t = theta[..., np.newaxis] * nodes.root
         x = 1 / (1 + twice[..., np.newaxis] * t + t**2)
         tx, both = t * x, t * x + twice[..., np.newaxis] * x
-        begin, ones, weights = stages.share @ stages.node, stages.share.sum(axis=-1), stages.weight @ stages.share
+        begin, ones, weights = nodes.share @ nodes.node, nodes.share.sum(axis=-1), nodes.weight @ nodes.share
         per_theta, give = theta[..., np.newaxis], theta / rows.stiffness
         place = np.stack((1 - per_theta * _weighted_sums(tx, begin), _weighted_sums(tx, ones)), axis=-1)
         forced = t * tx
@@ -134,7 +134,7 @@ class PieceResponse:
             place = of_place[..., np.newaxis] * place + of_velocity[..., np.newaxis] * velocity
             forced = of_place * forced + of_velocity * tx
         pushes = (give[..., np.newaxis] * _weighted_sums(of, weights) for of in (tx, x))
-        at_begin, at_ones = begin @ stages.weight, ones @ stages.weight
+        at_begin, at_ones = begin @ nodes.weight, ones @ nodes.weight
         return cls(
             end_state=_block_matrix(
                 1 - theta**2 * _weighted_sums(x, at_begin),
@@ -145,7 +145,7 @@ class PieceResponse:
             node_displacement=_tip_displacements(rows, place),
             node_flexibility=_weighted_sums(
                 np.einsum("rnk,rnp,rnq->rpqk", forced / rows.stiffness[..., np.newaxis], rows.vector, rows.vector),
-                stages.share,
+                nodes.share,
             ),
             end_state_per_force=np.concatenate(
                 [np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1

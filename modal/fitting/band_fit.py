@@ -82,14 +82,14 @@ class FixedPoleFit:
         return np.asarray(every if self.free.all() else every[:, self.free])
 
     @cached_property
-    def _follow(self) -> Floats:
+    def _constant_slopes(self) -> Floats:
         """Part of the slopes that the constants take up, in their bases, (p, k, c)."""
         return np.asarray(self.slope @ self.q)
 
     @cached_property
     def by_frf(self) -> Floats:
         """Slope of the residual by the scaled poles with optimal constants (Kaufman), by FRF, (p, k, 2 n)."""
-        taken = self._follow @ self.q.mT
+        taken = self._constant_slopes @ self.q.mT
         return np.asarray(np.subtract(taken, self.slope, out=taken))
 
     @cached_property
@@ -141,21 +141,21 @@ class FixedPoleFit:
         return float(fall @ np.linalg.lstsq(size, fall, rcond=None)[0])
 
     @cached_property
-    def _turned(self) -> Floats:
+    def _rotated_constants(self) -> Floats:
         """Size and phase direction of the constants in the bases, (p, 2, m, c); c = 2 m."""
         constant, m = self.constant[..., np.newaxis], self.poles.shape[1]
         off = constant.conj() / np.abs(constant) * (self.inverse[:, :m] + 1j * self.inverse[:, m:])
         return np.stack([off.real, off.imag], axis=1)
 
     @cached_property
-    def _by_poles(self) -> Floats:
+    def _pole_errors(self) -> Floats:
         """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
-        by_poles = -(self._turned @ self._follow.mT[:, np.newaxis]).swapaxes(0, 1)
-        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._own
+        by_poles = -(self._rotated_constants @ self._constant_slopes.mT[:, np.newaxis]).swapaxes(0, 1)
+        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._residue_slopes
         return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
 
     @property
-    def _own(self) -> Floats:
+    def _residue_slopes(self) -> Floats:
         """Relative change of each residue with its own pole at a fixed constant, (m, k)."""
         zeta = self.poles[1]
         return np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
@@ -167,23 +167,23 @@ class FixedPoleFit:
         Raises LinAlgError if an unknown cannot be separated from the others.
         """
         norm, inverse = self._solution
-        moved = self._by_poles @ (inverse / norm[:, np.newaxis])
-        covariance, (p, _, m, _) = moved @ moved.T, self._turned.shape
+        moved = self._pole_errors @ (inverse / norm[:, np.newaxis])
+        covariance, (p, _, m, _) = moved @ moved.T, self._rotated_constants.shape
         at_once = covariance[2 * m :, 2 * m :].reshape(2, p, m, 2, p, m)
         each = np.arange(p)
-        at_once[:, each, :, :, each] += np.einsum("pamc,pbnc->pambn", self._turned, self._turned)
+        at_once[:, each, :, :, each] += np.einsum("pamc,pbnc->pambn", self._rotated_constants, self._rotated_constants)
         return covariance
 
     @cached_property
     def influence(self) -> Floats:
         """Influence of the weighted FRFs on the errors of a complex fit, a Gauss-Newton step, (2 m + 2 p m, 2 p n)."""
         norm, inverse = self._solution
-        p, _, m, _ = self._turned.shape
+        p, _, m, _ = self._rotated_constants.shape
         steps = (inverse / norm[:, np.newaxis]) @ inverse.T @ (self.jacobian / norm[:, np.newaxis])
-        influence = -self._by_poles @ steps
+        influence = -self._pole_errors @ steps
         at_once = influence[2 * m :].reshape(2, p, m, p, -1)
         each = np.arange(p)
-        at_once[:, each, :, each] += self._turned @ self.q.mT[:, np.newaxis]
+        at_once[:, each, :, each] += self._rotated_constants @ self.q.mT[:, np.newaxis]
         return influence
 
 

@@ -23,16 +23,36 @@ def receptance(
     loss_factor: float = 0.0,
     force_position: float | None = None,
 ) -> Complexes:
-    """Driving-point or transfer receptance, deflection over force (m/N), shape (n,), of the shaft at rest: all modes.
+    """Compute the driving-point or transfer receptance of the shaft at rest, with all modes.
 
-    frequency: (n,) Hz. position: where the deflection is, distance from the tool tip (m). loss_factor eta: all
-    stiffness k becomes k (1 + i eta), so that every mode has the damping ratio eta/2; the dampers of the bearings come
-    on top. force_position: where the force is (m); None: at the same place, the driving point.
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle with dampers.
+    frequency : array_like, shape (n,)
+        Frequencies (Hz).
+    position : float
+        Position of the deflection, from the tool tip (m).
+    loss_factor : float
+        Loss factor eta (-): all stiffness k becomes k (1 + i eta), so that every mode has the damping ratio eta/2;
+        the bearing dampers are added.
+    force_position : float, optional
+        Position of the force (m). Default: the same place, the driving point.
 
-    Raises ValueError for frequencies that are negative or not finite, a loss factor below 0, a position off the
-    shaft, and 0 Hz for a shaft that is not held.
+    Returns
+    -------
+    ndarray of complex, shape (n,)
+        Deflection over force (m/N).
 
-    At resonance it is 1 / (eta K), for eta = 2 zeta; the other modes are hardly seen there:
+    Raises
+    ------
+    ValueError
+        For frequencies that are negative or not finite, a loss factor below 0, a position off the
+        shaft, and 0 Hz for an unsupported shaft.
+
+    Examples
+    --------
+    At resonance it is 1 / (eta K), for eta = 2 zeta; the other modes hardly matter there:
 
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> peak = receptance(shaft, natural_frequencies(shaft, 1), position=0.25, loss_factor=0.04)
@@ -54,21 +74,37 @@ def receptance(
 
 
 def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, Floats]:
-    """K_stat and M of the straight line K_stat - w^2 M that touches K(w) at w = wbar, over w^2.
+    """Return K_stat and M of the tangent K_stat - w^2 M to K(w) at w = wbar, over w^2.
 
-    coefficients: those of K in powers of w^2, on the last axis, e.g. (n, n, n_terms); wbar: angular frequency
-    (rad/s), >= 0. Both results have the shape of one coefficient, e.g. (n, n), and its units: N/m and kg where dofs
-    are deflections.
-
-    M = -dK/d(w^2) and K_stat = K + wbar^2 M, both at wbar: eqs. (32)-(34) of Gaber & Hashemi, Shock and Vibration,
-    2015, the linearisation from which their eqs. (30)-(36) take the static stiffness at the tip. With
+    M = -dK/d(w^2) and K_stat = K + wbar^2 M, both at wbar: eqs. (32)-(34) of Gaber & Hashemi, the linearization from
+    which their eqs. (30)-(36) take the static stiffness at the tip. With
     K = sum c_n w^2n it is K_stat = sum (1 - n) c_n wbar^2n: the true static stiffness c_0 but for -c_2 wbar^4 and
     smaller terms, and c_0 itself at wbar = 0, where the paper's form of K has no value. So static_stiffness needs no
-    linearisation; this one is there to show what it costs.
+    linearization; this function shows its error.
 
-    Raises ValueError for coefficients that are not finite or have no last axis, and for a wbar that is negative or
-    not finite.
+    Parameters
+    ----------
+    coefficients : array_like, shape (..., n_terms)
+        Coefficients of K in powers of w^2, on the last axis.
+    wbar : float
+        Angular frequency (rad/s), >= 0.
 
+    Returns
+    -------
+    tuple of ndarray
+        K_stat and M in the shape and units of one coefficient: N/m and kg if dofs are deflections.
+
+    Raises
+    ------
+    ValueError
+        For coefficients that are not finite or have no last axis, and for a wbar that is negative or not finite.
+
+    References
+    ----------
+    Gaber & Hashemi, Shock and Vibration, 2015.
+
+    Examples
+    --------
     >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 0.0)  # c_0 in N/m, c_1 in kg, c_2 in kg s^2
     >>> float(k), float(m)  # N/m, kg: at rest c_0 and -c_1
     (30000000.0, 2.0)
@@ -89,13 +125,32 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
 
 
 def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: float = 0.0) -> float:
-    """Steady radial force over deflection at `position` from the tool tip (m), in N/m.
+    """Compute the static radial stiffness of a spindle at one place.
 
-    Term 0 of the dynamic stiffness, exact: at rest every element is a link, and nothing is lost however soft the
-    bearings are. linearized_at: a frequency (Hz) at which K(w) is replaced by K_stat - w^2 M
-    instead, as eqs. (30)-(36) of Gaber & Hashemi, Shock and Vibration, 2015, do; what they miss grows with its fourth
-    power. Raises ValueError for a position off the shaft, a shaft that is not held, and a frequency below 0.
+    Term 0 of the dynamic stiffness, exact: at rest every element is a link, and nothing is lost even for soft bearings.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    position : float
+        Distance from the tool tip (m).
+    linearized_at : float
+        Frequency (Hz) at which K(w) is replaced by K_stat - w^2 M, as eqs. (30)-(36) of Gaber & Hashemi, Shock and
+        Vibration, 2015, do; their error grows with its fourth power.
+
+    Returns
+    -------
+    float
+        Force over deflection (N/m).
+
+    Raises
+    ------
+    ValueError
+        For a position off the shaft, an unsupported shaft, and a frequency below 0.
+
+    Examples
+    --------
     In the middle between two knife edges it is 48 E I / L^3:
 
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
@@ -123,29 +178,50 @@ def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: flo
 
 @dataclass(frozen=True, eq=False)
 class SpindleSide:
-    """Dynamic stiffness of a spindle where its tool was cut off, for deflection and slope there; see couple_tool."""
+    """Dynamic stiffness of a spindle at the tool interface, for deflection and slope there."""
 
     frequency: Floats
     """Frequencies (Hz), shape (n,)."""
     force_over_deflection: Complexes
     """Force over deflection (N/m), shape (n,)."""
     force_over_slope: Complexes
-    """Force over slope (N), shape (n,); the same as moment over deflection."""
+    """Force over slope (N), shape (n,); equal to moment over deflection."""
     moment_over_slope: Complexes
     """Moment over slope (N m), shape (n,)."""
     loss_factor: float
-    """Loss factor of all stiffness (-); the tool gets the same."""
+    """Loss factor of all stiffness (-), used for the tool, too."""
     theory: Theory
-    """Beam theory, which that of the tool must be."""
+    """Beam theory, also of the tool."""
 
 
 def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_factor: float = 0.0) -> SpindleSide:
-    """All of a spindle beyond `position` from its tool tip (m), by dynamic condensation to the place of the cut.
+    """Condense a spindle without its tool to the tool interface.
 
-    frequency: (n,) Hz. loss_factor: as for receptance. A bearing, a mass or a joint where the spindle is cut counts as
-    part of it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft,
-    and where a rigid bearing holds the shaft at the cut.
+    A bearing, a mass or a joint at the cut is part of the spindle; everything nearer to the tip is removed.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle with any tool.
+    frequency : array_like, shape (n,)
+        Frequencies (Hz).
+    position : float
+        Distance of the cut from the tool tip (m).
+    loss_factor : float
+        Loss factor (-), as for receptance.
+
+    Returns
+    -------
+    SpindleSide
+        Stiffness at the interface.
+
+    Raises
+    ------
+    ValueError
+        As receptance, for a cut off the shaft, and for a rigid bearing at the cut.
+
+    Examples
+    --------
     >>> whole = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
     >>> side = spindle_side(whole, np.array([100.0, 500.0]), position=0.1)  # where the tool is cut off
     >>> (side.force_over_deflection.real / 1e6).round(1).tolist()  # N/um
@@ -168,7 +244,7 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
 def _add_joint(
     joint: Joint, loss_factor: float, uu: Complexes, ut: Complexes, tt: Complexes
 ) -> tuple[Complexes, Complexes, Complexes]:
-    """The stiffness K with the joint in series: J (K + J)^-1 K with J = diag(k, tilt)."""
+    """Return the stiffness K with the joint in series: J (K + J)^-1 K with J = diag(k, tilt)."""
     k, tilt = (1 + 1j * loss_factor) * np.array([joint.stiffness, joint.rotational_stiffness])
     both = uu * tt - ut * ut
     determinant = (uu + k) * (tt + tilt) - ut * ut
@@ -176,17 +252,34 @@ def _add_joint(
 
 
 def couple_tool(side: SpindleSide, tool: Spindle) -> Complexes:
-    """Deflection over force at the tool tip (m/N), at the frequencies of the spindle side, shape (n,).
+    """Compute the receptance at the tip of a tool in a spindle given by its interface stiffness.
 
-    tool: a free shaft, its first segment the tip, its last one fast to the spindle. Equal to receptance of the whole
-    shaft, change_tool.
-    Source: T. L. Schmitz and R. R. Donaldson, Predicting high-speed machining dynamics by substructure analysis, CIRP
+    Equal to receptance of the whole shaft, change_tool.
+
+    Parameters
+    ----------
+    side : SpindleSide
+        Spindle without tool.
+    tool : Spindle
+        Tool as a free shaft: its first segment is the tip, its last one is fixed to the spindle.
+
+    Returns
+    -------
+    ndarray of complex, shape (n,)
+        Deflection over force at the tool tip (m/N), at the frequencies of `side`.
+
+    Raises
+    ------
+    ValueError
+        For a tool with bearings or of another beam theory.
+
+    References
+    ----------
+    T. L. Schmitz and R. R. Donaldson, Predicting high-speed machining dynamics by substructure analysis, CIRP
     Annals 49 (2000), here in stiffnesses, so that nothing is lost at low frequencies.
 
-    Raises ValueError for a tool with bearings or of another beam theory.
-
-    A tool on a spindle whose side was worked out once is the whole shaft:
-
+    Examples
+    --------
     >>> whole = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
     >>> frequency = np.array([100.0, 500.0, 1000.0])
     >>> side = spindle_side(whole, frequency, position=0.1)

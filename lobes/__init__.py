@@ -1,4 +1,4 @@
-"""From modes or FRFs to stability lobes, advice for cutting programs, and the history of the lobes of one machine."""
+"""Milling stability: lobes from modes or FRFs, stable pockets, published cutting data, and a history of lobes."""
 
 import lazy_loader
 

@@ -12,10 +12,14 @@ KIENZLE_THICKNESS = 1e-3
 
 @dataclass(frozen=True)
 class SpecificForce:
-    """Specific cutting force as a publication gives it, kc = kc1.1 h^-mc with the chip thickness h in mm.
+    """Published specific cutting force by Kienzle, kc = kc1.1 h^-mc with the chip thickness h in mm.
 
-    Source: Kienzle (1952), VDI-Z 94, 299.
+    References
+    ----------
+    Kienzle (1952), VDI-Z 94, 299.
 
+    Examples
+    --------
     Kienzle's force per width kc1.1 h^(1 - mc) is Ktc h + Kte around one chip thickness:
 
     >>> steel = SpecificForce(at_1_mm=1500e6, exponent=0.25, source="")
@@ -27,18 +31,40 @@ class SpecificForce:
     """
 
     at_1_mm: float
-    """kc1.1, the force per area of a chip 1 mm thick and 1 mm wide (Pa)."""
+    """Force kc1.1 per area of a chip 1 mm thick and 1 mm wide (Pa)."""
     exponent: float
-    """mc, by which it falls with the thickness of the chip (-)."""
+    """Exponent mc of the decrease with chip thickness (-)."""
     source: str
-    """Publication that both stand in."""
+    """Publication of both."""
 
     def tangential(self, thickness: float) -> float:
-        """Ktc (Pa): by how much the force per width grows with the chip thickness (m) around it, (1 - mc) kc."""
+        """Return Ktc, the slope of the force per width over chip thickness: (1 - mc) kc.
+
+        Parameters
+        ----------
+        thickness : float
+            Chip thickness (m).
+
+        Returns
+        -------
+        float
+            Ktc (Pa).
+        """
         return (1 - self.exponent) * self._at(thickness)
 
     def tangential_edge(self, thickness: float) -> float:
-        """Kte (N/m): what the force per width has beside Ktc h at this chip thickness (m), mc kc h."""
+        """Return Kte, the part of the force per width beyond Ktc h: mc kc h.
+
+        Parameters
+        ----------
+        thickness : float
+            Chip thickness (m).
+
+        Returns
+        -------
+        float
+            Kte (N/m).
+        """
         return self.exponent * self._at(thickness) * thickness
 
     def _at(self, thickness: float) -> float:
@@ -47,8 +73,15 @@ class SpecificForce:
 
 @dataclass(frozen=True)
 class CuttingCoefficients:
-    """Cutting coefficients of one material: cutting force per chip area, edge force per length of edge.
+    """Cutting-force coefficients of one material: cutting force per chip area, edge force per edge length.
 
+    Raises
+    ------
+    ValueError
+        For coefficients that are not finite or not positive.
+
+    Examples
+    --------
     >>> material = find_materials("7075-T6")[0]
     >>> f"Ktc {material.tangential / 1e6:.0f} N/mm2, Krc {material.radial / 1e6:.0f} N/mm2"
     'Ktc 767 N/mm2, Krc 169 N/mm2'
@@ -63,34 +96,31 @@ class CuttingCoefficients:
     radial: float
     """Radial coefficient Krc (Pa)."""
     tangential_edge: float = float("nan")
-    """Tangential edge coefficient Kte (N/m): no part in stability, but in torque; nan where not published."""
+    """Tangential edge coefficient Kte (N/m), which affects torque but not stability; nan if not published."""
     radial_edge: float = float("nan")
-    """Radial edge coefficient Kre (N/m); nan where not published."""
+    """Radial edge coefficient Kre (N/m); nan if not published."""
     note: str = ""
-    """Note on what to know before use."""
+    """Note on the use of the coefficients."""
     source: str = ""
-    """Publication that they stand in."""
+    """Publication."""
     alloy: str = ""
-    """The material without temper, tool and coolant, e.g. "Al 7075"; empty where it is not known."""
+    """Material without temper, tool and coolant, e.g. "Al 7075"; empty if unknown."""
     iso_group: str = ""
-    """Group of ISO 513: P, M, K, N, S or H; empty where it is not known."""
+    """Group of ISO 513: P, M, K, N, S or H; empty if unknown."""
     vdi_3323_group: str = ""
-    """Group of VDI 3323: 1 to 41; empty where it is not known."""
+    """Group of VDI 3323: 1 to 41; empty if unknown."""
     equivalents: tuple[str, ...] = ()
     """Other names of the material: EN number, AISI, UNS ..."""
     tangential_range: tuple[float, float] | None = None
-    """Lowest and highest published Ktc (Pa); None where no spread is published."""
+    """Lowest and highest published Ktc (Pa); None if no spread is published."""
     ratio_range: tuple[float, float] | None = None
-    """Lowest and highest published Krc/Ktc (-); None where no spread is published."""
+    """Lowest and highest published Krc/Ktc (-); None if no spread is published."""
     specific_forces: tuple[SpecificForce, ...] = ()
-    """Published specific cutting forces that the coefficients follow from; empty where they were measured as such."""
+    """Published specific cutting forces behind the coefficients; empty if they were measured directly."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no coefficient."""
-        if not (np.isfinite(self.tangential) and self.tangential > 0):
-            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-        if not (np.isfinite(self.radial) and self.radial >= 0):
-            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        """Check the coefficients."""
+        check_coefficients(self.tangential, self.radial)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,11 +128,38 @@ class CuttingCoefficients:
         return (self.material, *self.equivalents)
 
 
+def check_coefficients(tangential: float, radial: float) -> None:
+    """Raise ValueError unless Ktc is > 0 and Krc >= 0, both finite (Pa)."""
+    if not (np.isfinite(tangential) and tangential > 0):
+        raise ValueError(f"tangential={tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    if not (np.isfinite(radial) and radial >= 0):
+        raise ValueError(f"radial={radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+
+
 def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[float, float]:
-    """Ktc and Krc (Pa) from Ks (Pa) and the angle beta (rad): Ktc = Ks sin(beta), Krc = Ks cos(beta).
+    """Split a specific cutting force: Ktc = Ks sin(beta), Krc = Ks cos(beta).
 
-    The way back is `Cut.specific_force` and `Cut.force_angle`. Raises ValueError for Ks <= 0 or beta outside (0, pi/2].
+    `Cut.specific_force` and `Cut.force_angle` are the way back.
 
+    Parameters
+    ----------
+    specific_force : float
+        Specific cutting force Ks (Pa).
+    force_angle : float
+        Angle beta between cutting force and surface normal (rad), in (0, pi/2].
+
+    Returns
+    -------
+    tuple of float
+        Ktc and Krc (Pa).
+
+    Raises
+    ------
+    ValueError
+        For Ks <= 0 or beta outside (0, pi/2].
+
+    Examples
+    --------
     >>> ktc, krc = tangential_and_radial(750e6, np.radians(68.0))
     >>> round(float(ktc) / 1e6, 1), round(float(krc) / 1e6, 1)  # N/mm2
     (695.4, 281.0)

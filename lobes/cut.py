@@ -10,20 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lobes.arrays import Floats
+from lobes.coefficients import check_coefficients
 from modal import Mode
 
 Direction = Literal["up", "down"]
-"""Which way the tool turns against the feed: up (conventional) or down (climb) milling."""
+"""Direction of milling: up (conventional) or down (climb)."""
 
 
 PITCH_SUM_TOLERANCE = np.radians(1e-3)
-"""Pitches sum to a turn within this (rad): angles may be written with three decimals of a degree."""
+"""Largest deviation of the pitch sum from a turn (rad): angles may have three decimals of a degree."""
 PITCH_TOLERANCE = 1e-9
-"""Angles that differ by less (rad) are one."""
+"""Largest difference of equal angles (rad)."""
 
 
 def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
-    """Pitches (rad) of so many teeth, those that are alike made equal; () where all are.
+    """Make equal pitches (rad) exactly equal, and scale them to a turn; () if all are equal.
 
     Raises ValueError unless there is one > 0 for each tooth and they sum to a turn.
     """
@@ -44,13 +45,20 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Cut:
-    """A milling cut. Conventions, kept everywhere in this package:
+    """Milling cut, with the conventions of this package.
 
     x is the feed, y the normal to it; the tooth angle phi runs clockwise from +y (rad). A tooth at phi in a cut
     of depth b answers the displacement q = (x, y) with the force F = -b H(phi) (q(t) - q(t - tau)),
     H = [[(Kt c + Kr s) s, (Kt c + Kr s) c], [(-Kt s + Kr c) s, (-Kt s + Kr c) c]], s = sin phi, c = cos phi,
-    tau the time since the tooth before it passed. Raises ValueError for a value that is no cut.
+    tau the time since the previous tooth passed.
 
+    Raises
+    ------
+    ValueError
+        For a value that no cut has.
+
+    Examples
+    --------
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> round(float(np.degrees(slot.exit_angle - slot.entry_angle))), slot.teeth_in_cut  # degrees, -
     (180, 1.0)
@@ -62,7 +70,7 @@ class Cut:
     teeth: int
     """Number of teeth N."""
     immersion: float
-    """Radial depth of cut over cutter diameter, above 0 up to 1 (a slot)."""
+    """Radial depth of cut ae over cutter diameter, above 0 up to 1 (a slot)."""
     direction: Direction
     """Direction of milling, "up" (conventional) or "down" (climb); no difference in a slot."""
     tangential: float
@@ -72,12 +80,12 @@ class Cut:
     helix_lag: float = 0.0
     """Lag of a helical tooth along the axis, 2 tan(helix angle) / diameter (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0
-    """Angle from x to the feed (rad): 0 feeds along x, pi/2 along y; angles half a turn apart are alike."""
+    """Angle from x to the feed (rad): 0 feeds along x, pi/2 along y; angles half a turn apart are equivalent."""
     pitch: tuple[float, ...] = ()
-    """Angle by which each tooth follows the tooth before it (rad), in order of entry; () for evenly spaced teeth."""
+    """Angle from each tooth to the previous one (rad), in order of entry; () for evenly spaced teeth."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no cut."""
+        """Check the values."""
         if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1; give the number of cutting edges")
         if not 0 < self.immersion <= 1:
@@ -86,10 +94,7 @@ class Cut:
             )
         if self.direction not in get_args(Direction):
             raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
-        if not (np.isfinite(self.tangential) and self.tangential > 0):
-            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-        if not (np.isfinite(self.radial) and self.radial >= 0):
-            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        check_coefficients(self.tangential, self.radial)
         if not (np.isfinite(self.helix_lag) and self.helix_lag >= 0):
             raise ValueError(
                 f"helix_lag={self.helix_lag} rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
@@ -115,25 +120,25 @@ class Cut:
 
     @property
     def pitch_pattern(self) -> tuple[float, ...]:
-        """Pitches after which those of the cutter repeat (rad): one of even teeth, two of 85/95/85/95 degrees."""
+        """Repeating part of the pitches (rad): one of even teeth, two of 85/95/85/95 degrees."""
         pitch = self.pitch or (2 * np.pi / self.teeth,)
         return next(pitch[:k] for k in range(1, len(pitch) + 1) if pitch[:k] * (len(pitch) // k) == pitch)
 
     @property
     def repeats_per_turn(self) -> int:
-        """Times that the cutter looks the same in a turn: its teeth where they are evenly spaced."""
+        """Number of pitch patterns per turn; the number of teeth if they are evenly spaced."""
         return self.teeth // len(self.pitch_pattern)
 
     @property
     def lead_angles(self) -> Floats:
-        """Angle by which each tooth is ahead of the first (rad), shape (teeth,): not above 0 of uneven teeth."""
+        """Angle of each tooth ahead of the first (rad), shape (teeth,); not above 0 for uneven teeth."""
         if not self.pitch:
             return np.asarray(np.arange(self.teeth) * 2 * np.pi / self.teeth)
         return np.asarray(-np.cumsum((0.0, *self.pitch[1:])))
 
     @property
     def delays(self) -> tuple[float, ...]:
-        """The different pitches (rad), rising: how long before a tooth the one before it passed."""
+        """Distinct pitches (rad), rising."""
         return tuple(sorted(set(self.pitch_pattern)))
 
     @property
@@ -165,16 +170,23 @@ class Cut:
 
 
 DirectionModes = Sequence[Mode] | None
-"""Modes of one direction; None where it is rigid or not known."""
+"""Modes of one direction; None if it is rigid or unknown."""
 
 CHECKED_DEPTH_SHARES = (0.25, 0.5, 0.75, 1.0)
-"""A program is stable where it is so at all these shares of its depth: an island above a limit is none to work in."""
+"""Shares of its depth at which a stable program must be stable: a stable island above a limit is not usable."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """A cut at a speed and an axial depth. Raises ValueError where one is not > 0.
+    """Cut at a spindle speed and an axial depth.
 
+    Raises
+    ------
+    ValueError
+        For a speed or depth that is not > 0.
+
+    Examples
+    --------
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> Program(slot, speed_rpm=12000.0, depth=-0.002)
     Traceback (most recent call last):
@@ -187,10 +199,10 @@ class Program:
     speed_rpm: float
     """Spindle speed (rpm)."""
     depth: float
-    """Axial depth of cut (m)."""
+    """Axial depth of cut ap (m)."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no speed or depth."""
+        """Check speed and depth."""
         if not (np.isfinite(self.speed_rpm) and self.speed_rpm > 0):
             raise ValueError(f"speed_rpm={self.speed_rpm} is not a finite speed > 0 rpm; give that of the program")
         if not (np.isfinite(self.depth) and self.depth > 0):
@@ -198,16 +210,43 @@ class Program:
 
 
 def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0) -> Floats:
-    """Torque averaged over a turn (N m) at axial depths b (m), shape of depth.
+    """Return the torque averaged over a turn.
 
-    M = N D / (4 pi) b (Kt f (cos phi_st - cos phi_ex) + Kte (phi_ex - phi_st)): diameter D (m), feed per tooth f (m),
-    edge coefficient Kte (N/m). Power is 2 pi n M. Raises ValueError for values that are not > 0.
-    Source: Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 2.
+    M = N D / (4 pi) b (Kt f (cos phi_st - cos phi_ex) + Kte (phi_ex - phi_st)); the power is 2 pi n M.
 
-    Power by torque is the specific force times the chips removed, where edges cost nothing:
+    Parameters
+    ----------
+    cut : Cut
+        Cutter, immersion and material.
+    depth : array_like
+        Axial depths of cut b (m), any shape.
+    diameter : float
+        Cutter diameter D (m).
+    feed_per_tooth : float
+        Feed per tooth f (m).
+    edge : float
+        Edge coefficient Kte (N/m).
+
+    Returns
+    -------
+    ndarray
+        Torque (N m), shape of depth.
+
+    Raises
+    ------
+    ValueError
+        For values that are not > 0.
+
+    References
+    ----------
+    Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 2.
+
+    Examples
+    --------
+    Without edge forces the power is the specific force times the chip volume per time:
 
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> torque = mean_torque(slot, 2e-3, diameter=12e-3, published_feed_per_tooth=0.1e-3)
+    >>> torque = mean_torque(slot, 2e-3, diameter=12e-3, feed_per_tooth=0.1e-3)
     >>> round(float(torque) * 2 * np.pi * 12000 / 60)  # W at 12000 rpm
     672
     >>> round(700e6 * 12e-3 * 2e-3 * 0.1e-3 * 2 * 12000 / 60)  # Kt times m^3/s
@@ -232,11 +271,37 @@ def max_depth_for_drive(
     power: float = float("inf"),
     torque: float = float("inf"),
 ) -> Floats:
-    """Deepest axial depth (m) that a power (W) and a torque (N m) of the spindle allow at each speed (rpm), shape (n,).
+    """Return the largest axial depth that power and torque of the spindle allow at each speed.
 
-    diameter, feed_per_tooth (m) and edge (N/m) as for `mean_torque`; power = 2 pi n M. Raises ValueError as that, and
-    for a power or a torque that is not > 0.
+    Parameters
+    ----------
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : array_like, shape (n,)
+        Spindle speeds (rpm).
+    diameter : float
+        Cutter diameter (m).
+    feed_per_tooth : float
+        Feed per tooth (m).
+    edge : float
+        Edge coefficient Kte (N/m).
+    power : float
+        Largest power of the spindle (W).
+    torque : float
+        Largest torque of the spindle (N m).
 
+    Returns
+    -------
+    ndarray, shape (n,)
+        Axial depths (m).
+
+    Raises
+    ------
+    ValueError
+        As `mean_torque`, and for a power or a torque that is not > 0.
+
+    Examples
+    --------
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> depth = max_depth_for_drive(slot, [6000.0, 12000.0], 12e-3, 0.1e-3, power=1000.0, torque=1.0)
     >>> (depth * 1e3).round(2).tolist()  # mm: the torque sets the first, the power the second

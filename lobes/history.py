@@ -1,4 +1,4 @@
-"""The stability-lobe diagrams (SLD) of one machine, measurement after measurement."""
+"""History of the stability-lobe diagrams (SLD) of one machine."""
 
 from __future__ import annotations
 
@@ -19,11 +19,18 @@ ColumnT = TypeVar("ColumnT", Floats, Column)
 
 @dataclass(frozen=True, eq=False)
 class SldHistory:
-    """Limiting depths of n measurements over one speed grid, for each cut, with what was measured beside them.
+    """Limiting depths of n measurements over one speed grid, for each cut, with further measured values.
 
-    A history begins with arrays of no rows (n = 0): they fix the names and the row shapes. Raises ValueError for
-    names that cannot be stored, arrays of different n, values that are neither numbers nor text, and depths <= 0.
+    A history begins with arrays of no rows (n = 0), which fix the names and the row shapes.
 
+    Raises
+    ------
+    ValueError
+        For names that cannot be stored, arrays of different n, values that are neither numbers nor text,
+        and depths <= 0.
+
+    Examples
+    --------
     >>> speeds = np.linspace(4000.0, 18000.0, 8)  # rpm
     >>> columns, depth = {"frequency": np.empty(0)}, {"slot": np.empty((0, 8))}
     >>> empty = SldHistory("", "lobewatch", speeds, columns, depth, {"frequency": "Hz"})
@@ -33,17 +40,17 @@ class SldHistory:
     """
 
     settings_hash: str
-    """Hash of the settings that the depths were computed with."""
+    """Hash of the settings used for the depths."""
     software: str
     """Name and version of the program that computed them."""
     speed_rpm: Floats
     """Common speed grid (rpm), rising, shape (m,)."""
     columns: Mapping[str, Column]
-    """Values by name (letters, digits, underscore), one row a measurement: numbers (n,) or (n, k), or text (n,)."""
+    """Values by name (letters, digits, underscore), one row per measurement: numbers (n,) or (n, k), or text (n,)."""
     depth: Mapping[str, Floats]
-    """Limiting depth by name of the cut (m), shape (n, m); inf where stable at any depth, nan where not computed."""
+    """Limiting depth by cut (m), shape (n, m); inf if stable at any depth, nan if not computed."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Unit by name of column; a column without one is a plain number or text."""
+    """Unit by column; a column without one is a plain number or text."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check names, shapes and values."""
@@ -76,13 +83,28 @@ class SldHistory:
             )
 
     def __len__(self) -> int:
-        """Number of measurements n."""
+        """Return the number of measurements n."""
         return len(next(iter((*self.columns.values(), *self.depth.values())), ()))
 
     def append(self, row_columns: Mapping[str, ArrayLike], row_depth: Mapping[str, ArrayLike]) -> SldHistory:
-        """A new history with one more measurement: a value (or (k,) values) for each column, (m,) depths for each cut.
+        """Return a history with one more measurement.
 
-        Raises ValueError where names or shapes are not those of this history.
+        Parameters
+        ----------
+        row_columns : mapping of str to array_like
+            One value, or (k,) values, for each column.
+        row_depth : mapping of str to array_like
+            Depths (m), shape (m,), for each cut.
+
+        Returns
+        -------
+        SldHistory
+            Longer history.
+
+        Raises
+        ------
+        ValueError
+            If names or shapes differ from those of this history.
         """
         return replace(self, columns=_append_row(self.columns, row_columns), depth=_append_row(self.depth, row_depth))
 
@@ -118,6 +140,6 @@ def _check_column(name: str, values: ArrayLike) -> Column:
 
 
 def _check_text(text: str) -> None:
-    """Refuse what UTF-8 text in HDF5 cannot hold: a zero character or half a surrogate pair."""
+    """Reject characters that UTF-8 text in HDF5 cannot hold: a zero character or half a surrogate pair."""
     if re.search("[\0\ud800-\udfff]", text):
         raise ValueError(f"text {text!r} holds a character that cannot be stored; leave it out")

@@ -1,4 +1,4 @@
-"""The SLD history as an HDF5 file.
+"""SLD history as an HDF5 file.
 
 bytes 0..511           (HDF5 user block) "lobewatch-history 1 sha256 ..." of all that follows
 /                      format "lobewatch-history", version, settings_hash, software
@@ -28,8 +28,22 @@ HISTORY_HEAD_SIZE = 512
 
 
 def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
-    """Write the whole file anew: complete under its name, or the old one as it was. OSError where that fails.
+    """Write a history to a file: completely, or not at all.
 
+    Parameters
+    ----------
+    path : str or path-like
+        File to be replaced.
+    history : SldHistory
+        History.
+
+    Raises
+    ------
+    OSError
+        If writing fails; the old file stays.
+
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> speeds = np.linspace(4000.0, 18000.0, 8)  # rpm
     >>> columns, depth = {"frequency": np.array([696.2])}, {"slot": np.full((1, 8), 1.2e-3)}
@@ -66,9 +80,26 @@ def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
 
 
 def read_history(path: str | os.PathLike[str]) -> SldHistory:
-    """The history of a file. FileNotFoundError where there is none, ValueError where it is no sound history.
+    """Read a history from a file.
 
-    The checksum is verified before HDF5 sees the file: one flipped bit can make it hang, or pass unnoticed.
+    The checksum is verified before HDF5 sees the file: one flipped bit can make HDF5 hang, or pass unnoticed.
+
+    Parameters
+    ----------
+    path : str or path-like
+        File.
+
+    Returns
+    -------
+    SldHistory
+        History.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the file does not exist.
+    ValueError
+        If the file is damaged or no history.
     """
     content = Path(path).read_bytes()
     if content[:HISTORY_HEAD_SIZE] != _file_head(content[HISTORY_HEAD_SIZE:]):

@@ -15,19 +15,20 @@ from lobes.tip_response import TipResponse
 from lobes.tooth_force import mean_regeneration
 
 MIN_UNEVEN_RESPONSE = 0.02
-"""Share of its largest value below which a response is not looked at."""
+"""Least response that is searched, over its largest value."""
 MIN_STEPS_PER_WAVE = 24
-"""Frequencies in which the regeneration of the longest delay turns once, at least."""
+"""Fewest grid frequencies per turn of the regeneration of the longest delay."""
 UNEVEN_REFINEMENT_STEPS = 6
-"""Of the false position that refines a crossing."""
+"""Steps of the false position that refines a crossing."""
 MAX_UNEVEN_GRID_VALUES = 2_000_000
-"""Speeds times frequencies that are worked on at once."""
+"""Most speeds times frequencies processed at once."""
 
 
 def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tuple[Floats, Floats]:
-    """Lowest limit (m) and its frequency (Hz) at each mean tooth frequency (Hz), shape (n,); inf and nan if none.
+    """Return the lowest limit (m) and its frequency (Hz) at each mean tooth frequency (Hz), shape (n,).
 
-    b L s = -1 with s = 1 - exp(-i w tau) in the mean over the teeth: b = -1 / Re(L s) where Im(L s) = 0, Re(L s) < 0.
+    Inf and nan if there is none. b L s = -1 with s = 1 - exp(-i w tau) averaged over the teeth: b = -1 / Re(L s) for
+    Im(L s) = 0, Re(L s) < 0.
     Source: Budak, An analytical design method for milling cutters with nonconstant pitch to increase stability,
     J. Manuf. Sci. Eng. 125 (2003) 29-34.
     """
@@ -46,7 +47,7 @@ def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tup
 
 
 def _frequency_blocks(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> Iterator[tuple[Indices, Floats]]:
-    """Speeds and the frequencies to look at for them (Hz)."""
+    """Yield indices of speeds and the frequencies to be searched for them (Hz)."""
     size = np.abs(branch.on_grid)
     loud = branch.grid[size > MIN_UNEVEN_RESPONSE * np.max(size)]
     longest = max(cut.delays) / (2 * np.pi) * cut.teeth
@@ -66,7 +67,7 @@ def _loop_response(branch: TipResponse, cut: Cut, tooth_frequency: Floats, frequ
 def _refine_uneven_crossing(
     branch: TipResponse, cut: Cut, tooth_frequency: Floats, low: Floats, high: Floats
 ) -> Floats:
-    """Frequencies between `low` and `high` (Hz) at which the loop is real."""
+    """Return the frequencies between `low` and `high` (Hz) at which the loop is real."""
     at_low = _loop_response(branch, cut, tooth_frequency, low).imag
     at_high = _loop_response(branch, cut, tooth_frequency, high).imag
     for _ in range(UNEVEN_REFINEMENT_STEPS):
@@ -79,29 +80,29 @@ def _refine_uneven_crossing(
 
 
 FIRST_BLOCK_STEPS = 64
-"""Grid steps searched first; every further block is twice as long ..."""
+"""Grid steps searched first; every further block is twice as long."""
 MAX_BLOCK_VALUES = 2_000_000
-"""... up to this many grid values (speeds times steps): it bounds the memory."""
+"""Most grid values (speeds times steps) of a block: it bounds the memory."""
 MAX_LOOP_REFINEMENT_STEPS = 60
-"""Of the search for a crossing inside one grid step; a handful do."""
+"""Most steps of the search for a crossing inside one grid step; a handful is usual."""
 TURN_TOLERANCE = 1e-11
 """Turns that no longer count."""
 MIN_MEAN_FORCE_IMMERSION = 0.25
-"""Radial depth over diameter below which a mean force is no picture of a cut ..."""
+"""Least immersion for which a mean force describes a cut."""
 MAX_FLIP_IMMERSION = 0.95
-"""... and below which it is none at fast teeth: flip lobes lie around tooth frequency = 2 f_n / (2 k + 1)."""
+"""Largest immersion with flip lobes at fast teeth, around tooth frequency = 2 f_n / (2 k + 1)."""
 MIN_FAST_TOOTH_RATIO = 0.5
-"""Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
+"""Tooth frequency over chatter frequency from which the wide flip lobes, k = 0 and 1, occur."""
 MEAN_FORCE_REMEDY = "use semi-discretisation"
-"""What to do where a mean force is no picture of a cut."""
+"""Remedy if a mean force does not describe the cut."""
 
 
 def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, method: MethodName) -> StabilityLobes:
-    """Limiting depth b at each speed (rpm) of loops b L (1 - exp(-2 pi i f_c / f_t)) = -1.
+    """Return the limiting depth b at each speed (rpm) of loops b L (1 - exp(-2 pi i f_c / f_t)) = -1.
 
-    The branches give L over frequency (1/m); the lowest limit of all branches counts: b = -1 / (2 Re L) where Re L < 0,
-    and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ..., eps / 2 = atan2(-Re L, Im L). With teeth unevenly spaced see
-    `lobes.uneven_limits`; they have limits and no lobes.
+    The branches give L over frequency (1/m); the lowest limit of all branches counts: b = -1 / (2 Re L) for Re L < 0,
+    and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ..., eps / 2 = atan2(-Re L, Im L). For uneven teeth see
+    `uneven_limits`; they have limits and no lobes.
     """
     tooth_frequency = cut.teeth * speed_rpm / 60
     depth, chatter = np.full(speed_rpm.shape, np.inf), np.full(speed_rpm.shape, np.nan)
@@ -136,13 +137,13 @@ def _weakest_branch(branches: Sequence[TipResponse], responses: Sequence[Complex
 
 
 def _weakest_frequency(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> float:
-    """Frequency at which the lowest limit of all speeds chatters (Hz)."""
+    """Return the chatter frequency of the lowest limit of all speeds (Hz)."""
     branch, response = _weakest_branch(branches, responses)
     return float(branch.grid[np.argmin(response.real)])
 
 
 def _band_remarks(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[Remark, ...]:
-    """Whether measured lines end before the loop is at its weakest."""
+    """Return a remark if the measured lines end before the weakest point of the loop."""
     branch, response = _weakest_branch(branches, responses)
     weakest = int(np.argmin(response.real))
     if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
@@ -155,7 +156,7 @@ def _band_remarks(branches: Sequence[TipResponse], responses: Sequence[Complexes
 
 
 def _mean_force_remarks(method: MethodName, cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
-    """Whether the cut is too slender, or the teeth too fast, for a mean force."""
+    """Return a remark if the immersion is too low, or the teeth are too fast, for a mean force."""
     if cut.immersion < MIN_MEAN_FORCE_IMMERSION:
         text = f"at immersion {cut.immersion:g} (below {MIN_MEAN_FORCE_IMMERSION}) the true limit can be lower"
         return (Remark("low-immersion", "", f"{method} knows no flip lobes: {text}", MEAN_FORCE_REMEDY),)
@@ -170,7 +171,7 @@ def _mean_force_remarks(method: MethodName, cut: Cut, chatter: float, speed_rpm:
 
 
 def _branch_limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
-    """Depth of the lowest crossing at each tooth frequency (Hz) in m and its frequency (Hz); inf and nan where none."""
+    """Return depth (m) and frequency (Hz) of the lowest crossing at each tooth frequency (Hz); inf and nan if none."""
     chatter = _lowest_crossing_frequency(branch, response, tooth_frequency)
     limited = np.flatnonzero(np.isfinite(chatter))
     real = branch.receptance(chatter[limited]).real
@@ -181,9 +182,9 @@ def _branch_limits(branch: TipResponse, response: Complexes, tooth_frequency: Fl
 
 
 def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> Floats:
-    """Frequency of the lowest crossing at each tooth frequency (Hz), shape (n,); nan where there is none.
+    """Return the frequency of the lowest crossing at each tooth frequency (Hz), shape (n,); nan if there is none.
 
-    f/f_t - arg(L)/pi + 1/2 is a whole number at every crossing, with arg(L) followed continuously along f. The steps
+    f/f_t - arg(L)/pi + 1/2 is a whole number at every crossing, with arg(L) continuous along f. The steps
     of the grid are searched in the order of their limits, until each tooth frequency has one below all that is left.
     """
     turn = 0.5 - np.unwrap(np.angle(response)) / np.pi
@@ -211,10 +212,10 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
 def _lowest_step(
     grid: Floats, turn: Floats, real: Floats, block: Indices, tooth_frequency: Floats
 ) -> tuple[Floats, Indices, Floats]:
-    """For each tooth frequency the real part, the grid step and the whole number of the lowest crossing in a block.
+    """Return real part, grid step and whole number of the lowest crossing in a block for each tooth frequency.
 
-    Where several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
-    real part is 0 where there is no crossing.
+    If several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
+    real part is 0 if there is no crossing.
     """
     lower = block + (real[block + 1] < real[block])
     upper = 2 * block + 1 - lower
@@ -237,9 +238,9 @@ def _lowest_step(
 
 
 def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_frequency: Floats) -> Floats:
-    """Frequency (Hz) inside each grid step at which `missing` turns, counted from its lower end, have been made.
+    """Return the frequency (Hz) inside each grid step at which `missing` turns from its lower end are complete.
 
-    By the false position, with the weight of an end that stays put twice halved (Illinois).
+    By the false position; the weight of an end that stays twice is halved (Illinois).
     """
     start, low, high = branch.grid[step], branch.grid[step], branch.grid[step + 1]
     origin = branch.receptance(start)
@@ -264,7 +265,7 @@ def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_
 
 
 def _lobes_of_loops(loops: Sequence[tuple[Floats, Complexes, Integers]], cut: Cut, speed_rpm: Floats) -> Iterator[Lobe]:
-    """Lobes of loops, each known by its frequencies (Hz), its response there, and waves between teeth at the limits."""
+    """Yield the lobes of loops, each given by frequencies (Hz), response, and waves between teeth at the limits."""
     for grid, response, waves in loops:
         yield from _lobes_of_loop(grid, response, cut, np.unique(waves), speed_rpm)
 

@@ -1,7 +1,7 @@
 """Published cutting-force coefficients, and their lookup by material name.
 
-A material of materials.csv has the specific forces of its group of VDI 3323, of its CMC code and of its own name in
-specific_cutting_forces.csv, and the ratio Kr/Kt of force_ratios.csv of its group of VDI 3323, else of ISO 513.
+A material of materials.csv has the specific forces of its VDI 3323 group, of its CMC code and of its own name in
+specific_cutting_forces.csv, and the ratio Kr/Kt of force_ratios.csv of its VDI 3323 group, else of its ISO 513 group.
 """
 
 from __future__ import annotations
@@ -19,14 +19,19 @@ import numpy as np
 from lobes.coefficients import CuttingCoefficients, SpecificForce
 
 MIN_TESTS_FOR_RANGE = 2
-"""Number of tests of an alloy from which on their range counts."""
+"""Fewest tests of an alloy that define a range."""
+
+
+@cache
+def read_table(name: str) -> tuple[dict[str, str], ...]:
+    """Return the rows of a .csv file of this package."""
+    return tuple(csv.DictReader((files("lobes") / name).read_text(encoding="utf-8").splitlines()))
 
 
 @cache
 def milling_tests() -> tuple[CuttingCoefficients, ...]:
-    """All that come with this package, with the range over the tests of the same alloy; the spread is large."""
-    text = (files("lobes") / "cutting_coefficients.csv").read_text(encoding="utf-8")
-    tests = [_read_test(row) for row in csv.DictReader(text.splitlines())]
+    """Return the coefficients measured by milling, with the range over the tests of the same alloy."""
+    tests = [_read_test(row) for row in read_table("cutting_coefficients.csv")]
     return tuple(_with_range(test, [other for other in tests if other.alloy == test.alloy]) for test in tests)
 
 
@@ -53,28 +58,23 @@ def _with_range(test: CuttingCoefficients, alike: Sequence[CuttingCoefficients])
 
 
 REFERENCE_CHIP_THICKNESS = 1e-4
-"""Chip thickness that Kt and Kte are said at (m) ..."""
+"""Chip thickness of the stated Kt and Kte (m)."""
 CHIP_THICKNESS_RANGE = (0.5e-4, 2e-4)
-"""... and those that their range reaches over: of mills with 0.05 to 0.3 mm a tooth."""
+"""Chip thicknesses of the range of Kt (m): mills with 0.05 to 0.3 mm per tooth."""
 MIN_COEFFICIENT_RANGE = 0.25
-"""Least half-width of the range of Kt: what one source is taken to be off by."""
+"""Least relative half-width of the range of Kt, the error of a single source."""
 
 
 @cache
 def listed_materials() -> tuple[CuttingCoefficients, ...]:
-    """All that come with this package, in the order of ISO 513."""
-    return tuple(_material_coefficients(row) for row in _csv_rows("materials.csv"))
-
-
-def _csv_rows(name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader((files("lobes") / name).read_text(encoding="utf-8").splitlines()))
+    """Return the materials listed by name, in the order of ISO 513."""
+    return tuple(_material_coefficients(row) for row in read_table("materials.csv"))
 
 
 @cache
 def _specific_forces_by_group() -> dict[str, list[SpecificForce]]:
-    """By what they are of."""
     by_name: dict[str, list[SpecificForce]] = {}
-    for row in _csv_rows("specific_cutting_forces.csv"):
+    for row in read_table("specific_cutting_forces.csv"):
         force = SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"])
         by_name.setdefault(row["of"], []).append(force)
     return by_name
@@ -82,7 +82,7 @@ def _specific_forces_by_group() -> dict[str, list[SpecificForce]]:
 
 @cache
 def _force_ratios() -> dict[str, dict[str, str]]:
-    return {row["of"]: row for row in _csv_rows("force_ratios.csv")}
+    return {row["of"]: row for row in read_table("force_ratios.csv")}
 
 
 def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
@@ -115,7 +115,7 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
 def _coefficient_range(
     middle: float, forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients]
 ) -> tuple[float, float]:
-    """Over all publications and chip thicknesses."""
+    """Return the range over all publications and chip thicknesses."""
     published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + [
         test.tangential for test in tests
     ]
@@ -123,22 +123,39 @@ def _coefficient_range(
 
 
 def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:
-    """One a number: kc1.1 with mc, tests, Kr/Kt."""
+    """Return one source per number: kc1.1 with mc, tests, Kr/Kt."""
     of_forces = [f"kc1.1 {force.at_1_mm / 1e6:.0f}, mc {force.exponent:.2f}: {force.source}" for force in forces]
     return [*of_forces, *(f"Kt {test.tangential / 1e6:.0f}: {test.source}" for test in tests), f"Kr/Kt: {ratio}"]
 
 
 def all_cutting_coefficients() -> tuple[CuttingCoefficients, ...]:
-    """All coefficients that are known: those measured by milling, then the materials listed by name.
+    """Return all published coefficients: those measured by milling, then the materials listed by name.
 
-    These have theirs from published specific cutting forces. Each names its source.
+    The listed ones follow from published specific cutting forces. Each names its source.
+
+    Returns
+    -------
+    tuple of CuttingCoefficients
+        All coefficients of this package.
     """
     return (*milling_tests(), *listed_materials())
 
 
 def fold_material_name(name: str) -> str:
-    """A name of a material without what is forgiven: case and blanks.
+    """Fold a material name: case and blanks do not count.
 
+    Parameters
+    ----------
+    name : str
+        Name as written.
+
+    Returns
+    -------
+    str
+        Folded name.
+
+    Examples
+    --------
     >>> fold_material_name("Al 7075-T6") == fold_material_name("AL7075-t6")
     True
     """
@@ -147,18 +164,39 @@ def fold_material_name(name: str) -> str:
 
 @cache
 def materials_by_name() -> Mapping[str, CuttingCoefficients]:
-    """The coefficients by each of their names, as `fold_material_name` writes them.
+    """Return the coefficients by each of their folded names.
 
+    Returns
+    -------
+    mapping of str to CuttingCoefficients
+        Coefficients by the result of `fold_material_name`.
+
+    Examples
+    --------
     >>> materials_by_name()[fold_material_name("AA 7075")].names
     ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')
     """
-    known = ((name, one) for one in all_cutting_coefficients() for name in one.names)
-    return MappingProxyType({fold_material_name(name): one for name, one in known})
+    known = ((name, material) for material in all_cutting_coefficients() for name in material.names)
+    return MappingProxyType({fold_material_name(name): material for name, material in known})
 
 
 def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
-    """The known name, as it is written, that is most like one that is not; by_name: materials by folded names.
+    """Return the published name that is most similar to an unknown one.
 
+    Parameters
+    ----------
+    name : str
+        Unknown name.
+    by_name : mapping of str to CuttingCoefficients
+        Coefficients by folded names.
+
+    Returns
+    -------
+    str
+        Name as published.
+
+    Examples
+    --------
     >>> nearest_material_name("AA 7057", materials_by_name())
     'AA 7075'
     """
@@ -167,18 +205,33 @@ def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients])
 
 
 def find_materials(word: str) -> list[CuttingCoefficients]:
-    """Those of a group of ISO 513 (one letter), else those that have the word in one of their names; "": all.
+    """Find materials by ISO 513 group (one letter) or by a part of a name. Case and blanks do not count.
 
-    Case and blanks do not count. Raises ValueError where there are none.
+    Parameters
+    ----------
+    word : str
+        Group or part of a name; "" finds all.
 
+    Returns
+    -------
+    list of CuttingCoefficients
+        Matching materials.
+
+    Raises
+    ------
+    ValueError
+        If none matches.
+
+    Examples
+    --------
     >>> sorted({material.alloy for material in find_materials("7075")})
     ['Al 7075']
-    >>> len(find_materials("N")) >= 10  # group N of ISO 513: all that is not ferrous
+    >>> len(find_materials("N")) >= 10  # group N of ISO 513: non-ferrous
     True
     """
     folded, known = fold_material_name(word), all_cutting_coefficients()
-    of_group = [one for one in known if folded and one.iso_group.casefold() == folded]
-    matching = of_group or [one for one in known if any(folded in fold_material_name(name) for name in one.names)]
+    in_group = [material for material in known if folded and material.iso_group.casefold() == folded]
+    matching = in_group or [m for m in known if any(folded in fold_material_name(name) for name in m.names)]
     if not matching:
         near = nearest_material_name(word, materials_by_name())
         raise ValueError(f"no material has {word!r} in a name; is {near!r} meant? Without a word all are listed")

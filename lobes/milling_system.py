@@ -15,14 +15,16 @@ from lobes.tip_response import check_modes
 from modal import Mode
 
 MAX_UNDERDAMPED_RATIO = 0.99
-"""A complex constant with a larger damping ratio, as a draw may have it, is taken as if with this one."""
+"""Largest damping ratio of a complex mode; a larger one, as of a sample, is replaced by it."""
 
 
 @dataclass(frozen=True, eq=False)
 class MillingSystem:
-    """n modes in the p directions that give way: q'' + 2 zeta w q' + w^2 q = shape vector . F.
+    """System of n modes in p compliant directions: q'' + 2 zeta w q' + w^2 q = shape vector . F.
 
-    The tip shows d = sum shape vector (place q + velocity q' / w): see `tip_participation`. Real modes show shape vector q.
+    The tip displacement is d = sum shape vector (place q + velocity q' / w), see `tip_participation`; shape vector q
+    for
+    real modes.
     """
 
     frequency: Floats
@@ -30,18 +32,18 @@ class MillingSystem:
     damping_ratio: Floats
     """Damping ratios zeta, shape (n,)."""
     shape: Floats
-    """Mass-normalised mode shapes at the tool tip, w / sqrt(K) (kg^-1/2), shape (n,)."""
+    """Mass-normalized mode shapes at the tool tip, w / sqrt(K) (kg^-1/2), shape (n,)."""
     phase: Floats
     """Phases of the modal constants (rad), shape (n,); 0 for real modes."""
     direction: Integers
-    """Row of `axes` in which each mode was tapped, shape (n,)."""
+    """Row of `axes` in which each mode was measured, shape (n,)."""
     vector: Floats
-    """Directions of the modes in `axes`, shape (n, p): what each takes of a force, and shows. 1 and 0 along an axis."""
+    """Directions of the modes in `axes`, shape (n, p): share of force and response. 1 and 0 along an axis."""
     axes: Integers
-    """Directions that give way, 0 for x (feed) and 1 for y (normal), shape (p,)."""
+    """Compliant directions, 0 for x (feed) and 1 for y (normal), shape (p,)."""
 
     def receptance(self, frequency: Floats) -> Complexes:
-        """Receptance (m/N) at frequencies (Hz) of any shape, shape (..., p, p)."""
+        """Return the receptance (m/N) at frequencies (Hz) of any shape, shape (..., p, p)."""
         omega = 2 * np.pi * frequency
         total = np.zeros((*omega.shape, self.axes.size, self.axes.size), dtype=np.complex128)
         shares = tip_participation(self.damping_ratio, self.phase)
@@ -54,7 +56,9 @@ class MillingSystem:
 
 
 def tip_participation(damping_ratio: Floats, phase: Floats) -> tuple[Floats, Floats]:
-    """What the tip shows of a mode's coordinate q and of its velocity q' / w, for phases (rad); 1 and 0 for phase 0.
+    """Return the shares of a mode's coordinate q and of its velocity q' / w in the tip displacement.
+
+    1 and 0 for phase 0; phases in rad.
 
     y = (cos + sin zeta / sqrt(1 - zeta^2)) q + sin / sqrt(1 - zeta^2) q' / w has the receptance of `modal.Mode`.
     """
@@ -65,12 +69,29 @@ def tip_participation(damping_ratio: Floats, phase: Floats) -> tuple[Floats, Flo
 def build_milling_system(
     x: Sequence[Mode] | None, y: Sequence[Mode] | None, vectors: ArrayLike | None = None
 ) -> MillingSystem:
-    """The system of the modes in the feed (x) and normal (y) direction; None for one that is rigid or not known.
+    """Build the system of the modes in the feed (x) and normal (y) direction.
 
-    vectors: parts in x and y of what each mode of x, then of y, takes of a force and shows, shape (n, 2); a unit vector
-    where its stiffness is that along its own axis. None: each lies in its direction. Raises ValueError for FRFs, for
-    two rigid directions, an empty list, modes of negative stiffness, and vectors that do not fit the modes.
+    Parameters
+    ----------
+    x, y : sequence of Mode, or None
+        Modes of each direction; None for a rigid or unknown direction.
+    vectors : array_like, shape (n, 2), optional
+        Parts in x and y of the direction of each mode of x, then of y; a unit vector if the stiffness is that along its
+        own axis. Default: each mode lies in its direction.
 
+    Returns
+    -------
+    MillingSystem
+        Joint system.
+
+    Raises
+    ------
+    ValueError
+        For FRFs, two rigid directions, an empty list, modes of negative stiffness, and vectors that do not fit the
+        modes.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> system = build_milling_system([mode], [mode])
     >>> at_resonance = system.receptance(np.array(500.0))  # m/N, (2, 2): 1 / (2 i zeta K) on the diagonal
@@ -101,7 +122,7 @@ def build_milling_system(
 
 
 def check_directions(vectors: ArrayLike, number: int) -> Floats:
-    """Directions of so many modes, shape (n, 2); ValueError where they are none."""
+    """Return the directions of the modes, shape (n, 2); ValueError if shape or values are wrong."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):
         raise ValueError(
@@ -113,22 +134,39 @@ def check_directions(vectors: ArrayLike, number: int) -> Floats:
 
 
 class ProjectedModes(NamedTuple):
-    """Modes as each FRF of the tool tip shows them; a direction that no mode moves in is empty."""
+    """Modes as each FRF of the tool tip shows them; empty for a direction that no mode moves in."""
 
     x: list[Mode]
-    """Modes hit and seen in x."""
+    """Modes hit and measured in x."""
     y: list[Mode]
-    """Modes hit and seen in y."""
+    """Modes hit and measured in y."""
     cross: list[Mode]
-    """Modes hit in x and seen in y; the stiffness is negative where y moves against x."""
+    """Modes hit in x and measured in y; negative stiffness if y moves against x."""
 
 
 def project_modes(modes: Sequence[Mode], vectors: ArrayLike) -> ProjectedModes:
-    """Modes with directions (n, 2) at the tip as zero order takes them: a residue u_a u_b / K from a to b.
+    """Project modes with rotated principal directions on the axes: a residue u_a u_b / K from a to b.
 
-    Raises ValueError for vectors that do not fit the modes.
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes along their own directions.
+    vectors : array_like, shape (n, 2)
+        Directions at the tool tip.
 
-    A mode of 20 N/um along its own axis, 30 degrees from x, is 26.7 N/um stiff in x and 80 N/um in y:
+    Returns
+    -------
+    ProjectedModes
+        Modes of the FRFs in x, in y, and from x to y.
+
+    Raises
+    ------
+    ValueError
+        For vectors that do not fit the modes.
+
+    Examples
+    --------
+    A mode of 20 N/um along its own axis, 30 degrees from x, has 26.7 N/um in x and 80 N/um in y:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> angle = np.radians(30.0)
@@ -144,16 +182,38 @@ def project_modes(modes: Sequence[Mode], vectors: ArrayLike) -> ProjectedModes:
 
 
 StiffnessRule = Literal["measured", "model", "paper"]
+"""Rule for the stiffness of a mode whose frequency has dropped."""
 
 
 def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio: float | None = None) -> Mode:
-    """The mode at `ratio` times its frequency, with the damping of the baseline and the stiffness that a rule gives it.
+    """Return a mode after a frequency drop, with the damping of the baseline and K by a rule.
 
-    "measured": K times `stiffness_ratio`, that of a new tap test to the baseline's (needed). "model": K times
-    `stiffness_ratio`, the ratio of modal stiffness of a recalibrated model; without one K stays, and `method` says so.
-    "paper": K times `ratio`, as Gaber & Hashemi (2015) assume (K x 0.9 for f x 0.9); no stiffness_ratio. The covariance
-    is scaled along. Raises ValueError for ratios <= 0 and a stiffness_ratio that does not go with the rule.
+    The covariance is scaled along.
 
+    Parameters
+    ----------
+    baseline : Mode
+        Mode before the drop.
+    ratio : float
+        New frequency over old (-).
+    rule : {"measured", "model", "paper"}
+        "measured": K times `stiffness_ratio` of a new tap test. "model": K times `stiffness_ratio` of a recalibrated
+        model; without one K stays, and `method` says so. "paper": K times `ratio`, as Gaber & Hashemi (2015) assume.
+    stiffness_ratio : float, optional
+        New stiffness over old (-).
+
+    Returns
+    -------
+    Mode
+        Mode after the drop.
+
+    Raises
+    ------
+    ValueError
+        For ratios <= 0 and a stiffness_ratio that does not go with the rule.
+
+    Examples
+    --------
     >>> new = Mode(frequency=1000.0, damping_ratio=0.03, stiffness=2e7)
     >>> old = age_mode(new, 0.9, "paper")
     >>> round(old.frequency), round(old.stiffness / 1e6, 1)  # Hz, N/um

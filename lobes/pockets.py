@@ -13,10 +13,12 @@ from lobes.stability_lobes import StabilityLobes
 
 
 def find_curve_peaks(values: Floats, prominence: float) -> Indices:
-    """Places of the peaks of a curve (n,), n > 0, of at least this prominence; of a flat top the middle, rounded down.
+    """Return the indices of the peaks of a curve (n,), n > 0, with at least this prominence.
 
-    The prominence of a peak is its height above the higher of the two lowest points between it and whatever is higher
-    on either side, or the end. The ends of the curve are no peaks.
+    As `scipy.signal.find_peaks`, which takes longer to import than this package. The prominence is the height above the
+    higher of the two lowest points between a peak and higher values on either side, or the end. A flat top counts at
+    its
+    middle, rounded down. The ends of the curve are no peaks.
     """
     starts = np.concatenate(([0], np.flatnonzero(np.diff(values)) + 1))
     ends = np.concatenate((starts[1:], [values.size])) - 1
@@ -29,55 +31,73 @@ def find_curve_peaks(values: Floats, prominence: float) -> Indices:
 
 
 def _peak_base(height: Floats, top: int, step: int) -> float:
-    """The lowest point on one side of a peak before something higher, or the end."""
+    """Return the lowest point on one side of a peak before something higher, or before the end."""
     side = height[top::step]
     higher = np.flatnonzero(side > height[top])
     return float(np.min(side[: higher[0]] if higher.size else side))
 
 
 POCKET_DEPTH_SHARE = 0.8
-"""Between the ends of a pocket the limit is at least this share of its depth."""
+"""Limit at the ends of a pocket over its depth."""
 
 
 class Pocket(NamedTuple):
-    """One pocket of a diagram."""
+    """Stable pocket of a diagram."""
 
     speed_rpm: float
-    """Speed of its deepest point (rpm), the middle of a flat one."""
+    """Speed of the deepest point (rpm), the middle of a flat one."""
     depth: float
-    """Limit at that speed (m), or the deepest cut of interest where that is less."""
+    """Limit at that speed (m), at most the deepest cut of interest."""
     from_rpm: float
-    """Slowest speed around it from which on the limit is SHARE of its depth or more (rpm)."""
+    """Lowest speed with 80 % of the depth or more (rpm)."""
     to_rpm: float
-    """Fastest speed around it up to which it is (rpm); an end of the range of speeds where it is so up to there."""
+    """Highest speed with 80 % of the depth or more (rpm); at most the end of the speed range."""
 
 
 class PocketShift(NamedTuple):
-    """A pocket then and now."""
+    """Pocket before and after a change."""
 
     before: Pocket
-    """Pocket as it was."""
+    """Pocket before."""
     after: Pocket
-    """Pocket as it is."""
+    """Pocket after."""
 
     @property
     def speed_change(self) -> float:
-        """Relative change of its speed."""
+        """Relative change of the speed (-)."""
         return self.after.speed_rpm / self.before.speed_rpm - 1
 
     @property
     def depth_change(self) -> float:
-        """Relative change of its depth."""
+        """Relative change of the depth (-)."""
         return self.after.depth / self.before.depth - 1
 
 
 def find_pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
-    """All pockets of a diagram in the order of speed, cut off at the deepest cut of interest (m), a number or (n,).
+    """Find all stable pockets of a diagram in the order of speed.
 
-    `deepest` is what the flutes or the drive (`lobes.max_depth_for_drive`) allow. A pocket that the range of speeds cuts
-    through counts with what is inside. Raises ValueError for a `deepest` that is not > 0.
+    A pocket at an end of the speed range counts with the part inside.
 
-    The fastest pocket is where the teeth come as often as the mode swings, at 60 f / N = 15000 rpm:
+    Parameters
+    ----------
+    lobes : StabilityLobes
+        Diagram.
+    deepest : array_like
+        Deepest cut of interest (m), a number or shape (n,), as flutes or drive (`max_depth_for_drive`) allow.
+
+    Returns
+    -------
+    list of Pocket
+        Pockets, cut off at `deepest`.
+
+    Raises
+    ------
+    ValueError
+        For a `deepest` that is not > 0.
+
+    Examples
+    --------
+    The fastest pocket has the tooth frequency equal to the natural frequency, at 60 f / N = 15000 rpm:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
@@ -99,7 +119,7 @@ def find_pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
 
 
 def _pocket_ends(speed: Floats, depth: Floats, peak: int) -> tuple[float, float]:
-    """The speeds on each side of a peak where the depth falls to SHARE of it, linear between the speeds given."""
+    """Return the speeds on each side of a peak where the depth falls to 80 % of it, by linear interpolation."""
     level = POCKET_DEPTH_SHARE * depth[peak]
     low = np.flatnonzero(depth < level)
     before, after = low[low < peak], low[low > peak]
@@ -114,29 +134,58 @@ def _pocket_ends(speed: Floats, depth: Floats, peak: int) -> tuple[float, float]
 
 
 def rank_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
-    """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth).
+    """Return the best pockets first.
 
-    Raises ValueError for any other `by`.
+    Parameters
+    ----------
+    found : sequence of Pocket
+        Pockets of a diagram.
+    count : int
+        Largest number of pockets returned.
+    by : {"depth", "removal"}
+        Depth, or depth times speed (chip volume at one feed per tooth).
 
+    Returns
+    -------
+    list of Pocket
+        Best pockets.
+
+    Raises
+    ------
+    ValueError
+        For any other `by`.
+
+    Examples
+    --------
     >>> few = [Pocket(5000.0, 3e-3, 4900.0, 5100.0), Pocket(15000.0, 2e-3, 14500.0, 15500.0)]
     >>> rank_pockets(few, 1)[0].speed_rpm, rank_pockets(few, 1, by="removal")[0].speed_rpm  # rpm
     (5000.0, 15000.0)
     """
     if by not in ("depth", "removal"):
         raise ValueError(f'by={by!r} is neither "depth" nor "removal"; choose what is best')
-
-    def worth(pocket: Pocket) -> float:
-        return pocket.depth * (pocket.speed_rpm if by == "removal" else 1.0)
-
-    return sorted(found, key=worth, reverse=True)[:count]
+    return sorted(found, key=lambda p: p.depth * (p.speed_rpm if by == "removal" else 1.0), reverse=True)[:count]
 
 
 def match_pockets(then: StabilityLobes, now: StabilityLobes, deepest: float) -> list[PocketShift]:
-    """The pockets of two diagrams of one cut that belong together: a pair is nearest to each other.
+    """Match the pockets of two diagrams of one cut: a pair is nearest to each other.
 
-    Pocket k stands at about 60 f / (N k): all move by one ratio, which the median of the chatter frequencies tells.
-    Those at an end of the range of speeds are left out: their tops lie outside.
+    Pocket k stands at about 60 f / (N k): all move by one ratio, that of the median chatter frequencies.
+    Pockets at an end of the speed range are left out, as their deepest points lie outside.
 
+    Parameters
+    ----------
+    then, now : StabilityLobes
+        Diagrams before and after.
+    deepest : float
+        Deepest cut of interest (m).
+
+    Returns
+    -------
+    list of PocketShift
+        Pairs of pockets.
+
+    Examples
+    --------
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> new, old = ([Mode(f, damping_ratio=0.02, stiffness=2e7)] for f in (500.0, 450.0))  # 10 % lower
     >>> then, now = (zero_order_lobes(m, m, slot, np.linspace(4000.0, 18000.0, 701)) for m in (new, old))

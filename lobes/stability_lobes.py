@@ -16,7 +16,7 @@ from lobes.cut import Cut
 
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:
-    """Spindle speeds (rpm) as a 1-D array; ValueError unless there is one at least and all are finite and > 0."""
+    """Return spindle speeds (rpm) as a 1-D array; ValueError unless there is one and all are finite and > 0."""
     speed = np.atleast_1d(np.asarray(speed_rpm, dtype=np.float64))
     if speed.ndim != 1 or speed.size == 0:
         raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
@@ -27,17 +27,17 @@ def check_speeds(speed_rpm: ArrayLike) -> Floats:
 
 
 MethodName = Literal["average angle", "zero order", "semi-discretisation"]
-"""How stability limits are found."""
+"""Name of a stability method."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lobe:
-    """One unbroken piece of one lobe, in the order of rising chatter frequency, for drawing."""
+    """Unbroken piece of one lobe for drawing, in the order of rising chatter frequency."""
 
     number: int
-    """Whole waves left on the surface between two teeth, j = 0, 1, 2 ..."""
+    """Number of whole waves between two teeth, j = 0, 1, 2 ..."""
     speed_rpm: Floats
-    """Spindle speed (rpm), shape (p,); it need not rise."""
+    """Spindle speed (rpm), shape (p,); not always rising."""
     depth: Floats
     """Limiting depth (m), shape (p,)."""
     chatter_frequency: Floats
@@ -45,22 +45,27 @@ class Lobe:
 
 
 class LobeMinimum(NamedTuple):
-    """The lowest point of a stability chart."""
+    """Lowest point of a stability chart."""
 
     depth: float
-    """Limiting depth (m); inf where no speed of the chart has a limit."""
+    """Limiting depth (m); inf if no speed has a limit."""
     speed_rpm: float
     """Speed (rpm)."""
     chatter_frequency: float
-    """Chatter frequency (Hz); nan where the depth is inf."""
+    """Chatter frequency (Hz); nan if the depth is inf."""
 
 
 @dataclass(frozen=True, eq=False)
 class StabilityLobes:
     """Limiting axial depth of cut over spindle speed.
 
-    Raises ValueError where shapes differ, a speed or a depth is not > 0, or a depth is NaN.
+    Raises
+    ------
+    ValueError
+        If shapes differ, a speed or a depth is not > 0, or a depth is NaN.
 
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> lobes = zero_order_lobes([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
@@ -71,23 +76,23 @@ class StabilityLobes:
     """
 
     speed_rpm: Floats
-    """Spindle speeds (rpm), as they were asked for, shape (n,)."""
+    """Spindle speeds (rpm) in the given order, shape (n,)."""
     depth: Floats
-    """Limiting depth at each speed, the lowest crossing (m), shape (n,); inf where stable at any depth."""
+    """Limiting depth at each speed, the lowest crossing (m), shape (n,); inf if stable at any depth."""
     chatter_frequency: Floats
-    """Chatter frequency at the limit (Hz), shape (n,); nan where the depth is inf."""
+    """Chatter frequency at the limit (Hz), shape (n,); nan if the depth is inf."""
     kind: NDArray[np.str_]
     """"hopf" (quasi-periodic chatter), "flip" (period two) or "" (no limit), shape (n,)."""
     crossings: Floats
-    """Depths where stability changes, rising in each row and filled up with inf (m), shape (n, k)."""
+    """Depths where stability changes, rising in each row and padded with inf (m), shape (n, k)."""
     method: MethodName
-    """Method that the limits were found by."""
+    """Method of the limits."""
     curves: Callable[[], Iterable[Lobe]] = tuple
-    """Function that works out `lobes`."""
+    """Function that computes `lobes`."""
     remarks: tuple[Remark, ...] = ()
-    """Reasons why the method or the FRF is out of its range for this cut, and what to do."""
+    """Reasons why the method or the FRF is out of its range for this cut, and remedies."""
     detail: str = ""
-    """Detail of the method: into how many pieces the tooth period was divided."""
+    """Detail of the method: number of pieces of the tooth period."""
 
     def __post_init__(self) -> None:
         """Check shapes and values."""
@@ -108,27 +113,42 @@ class StabilityLobes:
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
-        """Lobes that set the limit at one speed at least, as far as the speeds reach; empty where a method has none.
+        """Lobes that set the limit at one speed at least, within the speeds; empty for methods without lobes.
 
-        Worked out each time they are asked for."""
+        Computed at each access.
+        """
         return tuple(self.curves())
 
     @property
     def method_text(self) -> str:
-        """The method with its detail, for people."""
+        """Method with its detail."""
         return ", ".join(filter(None, (self.method, self.detail)))
 
     @property
     def minimum(self) -> LobeMinimum:
-        """The lowest limit among the speeds of this chart; the first of them where none has a limit."""
+        """Lowest limit of this chart; the first speed if there is no limit."""
         i = int(np.argmin(self.depth))
         return LobeMinimum(float(self.depth[i]), float(self.speed_rpm[i]), float(self.chatter_frequency[i]))
 
     def depth_at(self, speed_rpm: ArrayLike) -> Floats:
-        """Limiting depth at one or several speeds inside the range (m), shape of speed_rpm.
+        """Return the limiting depth at speeds inside the range, linear between the speeds of the chart.
 
-        Linear between the speeds of the chart; beside a speed without limit the finite neighbour counts.
-        Raises ValueError outside the range.
+        Next to a speed without limit the finite neighbour counts.
+
+        Parameters
+        ----------
+        speed_rpm : array_like
+            Spindle speeds (rpm), any shape.
+
+        Returns
+        -------
+        ndarray
+            Limiting depths (m), same shape.
+
+        Raises
+        ------
+        ValueError
+            For a speed outside the chart.
         """
         wanted = np.asarray(speed_rpm, dtype=np.float64)
         low, high = float(np.min(self.speed_rpm)), float(np.max(self.speed_rpm))
@@ -148,7 +168,25 @@ class StabilityLobes:
         return np.where(np.isfinite(between), between, np.minimum(below, above))
 
     def is_stable(self, speed_rpm: ArrayLike, depth: ArrayLike) -> Flags:
-        """Whether cuts of this depth (m) at this speed (rpm) lie below the limit; shapes broadcast."""
+        """Return whether cuts lie below the limit; shapes broadcast.
+
+        Parameters
+        ----------
+        speed_rpm : array_like
+            Spindle speeds (rpm).
+        depth : array_like
+            Axial depths of cut (m).
+
+        Returns
+        -------
+        ndarray of bool
+            True below the limit.
+
+        Raises
+        ------
+        ValueError
+            For a speed outside the chart or a negative depth.
+        """
         wanted = np.asarray(depth, dtype=np.float64)
         if not np.all(wanted >= 0):
             raise ValueError(f"depth={wanted} m is not >= 0; give the axial depth of cut in metres")
@@ -156,10 +194,22 @@ class StabilityLobes:
 
 
 def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
-    """At each speed the limit, frequency and kind of the lowest, such as of the directions of feed of one cut.
+    """Join several diagrams by one method at the same speeds: at each speed the lowest limit counts.
 
-    All by one method at the same speeds. The lobes and remarks of all are kept, each remark once.
+    For example the feed directions of one cut. All lobes and remarks are kept, each remark once.
 
+    Parameters
+    ----------
+    diagrams : sequence of StabilityLobes
+        Diagrams of one cut.
+
+    Returns
+    -------
+    StabilityLobes
+        Limits that hold for all of them.
+
+    Examples
+    --------
     >>> x, y = Mode(500.0, 0.02, 2e7), Mode(700.0, 0.02, 2e7)
     >>> along_x = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)
     >>> speeds = [9000.0, 12000.0, 15000.0]
@@ -174,11 +224,10 @@ def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
         np.pad(diagram.crossings, ((0, 0), (0, width - diagram.crossings.shape[1])), constant_values=np.inf)
         for diagram in diagrams
     ]
+    columns = ("depth", "chatter_frequency", "kind")
     return replace(
         first,
-        depth=np.stack([diagram.depth for diagram in diagrams])[lowest, speed],
-        chatter_frequency=np.stack([diagram.chatter_frequency for diagram in diagrams])[lowest, speed],
-        kind=np.stack([diagram.kind for diagram in diagrams])[lowest, speed],
+        **{name: np.stack([getattr(diagram, name) for diagram in diagrams])[lowest, speed] for name in columns},
         crossings=np.stack(crossings)[lowest, speed],
         curves=partial(_envelope_lobes, diagrams),
         remarks=tuple(dict.fromkeys(remark for diagram in diagrams for remark in diagram.remarks)),
@@ -198,24 +247,43 @@ class RadialLobes:
     immersion: Floats
     """Radial depths over cutter diameter, shape (r,)."""
     depth: Floats
-    """Limiting depths (m), shape (r, n); inf where there is no limit."""
+    """Limiting depths (m), shape (r, n); inf if there is no limit."""
     method: MethodName
-    """Method that the limits were found by."""
+    """Method of the limits."""
     remarks: tuple[Remark, ...]
-    """Remarks on what is wrong with the method at the smallest immersion."""
+    """Remarks on the method at the smallest immersion."""
 
 
 def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:
-    """The limits of a cut at other immersions (r,), each in (0, 1], by any method with its other arguments set:
+    """Compute the limits of a cut at several immersions, by any method.
 
         radial_lobes(lambda cut: stability_boundary(x, y, cut, speeds, 0.02), cut, np.linspace(0.05, 1, 20))
 
-    Raises ValueError for immersions that are none.
+    Parameters
+    ----------
+    limits : callable
+        Function from a cut to its StabilityLobes.
+    cut : Cut
+        Cut whose immersion is varied.
+    immersion : array_like, shape (r,)
+        Radial depths over cutter diameter (-), in (0, 1].
 
+    Returns
+    -------
+    RadialLobes
+        Limits at all immersions.
+
+    Raises
+    ------
+    ValueError
+        For immersions outside (0, 1].
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
-    >>> compute_lobe_chart = radial_lobes(lambda cut: zero_order_lobes([mode], [mode], cut, [9000.0]), slot, [0.25, 0.5, 1.0])
-    >>> (compute_lobe_chart.depth * 1e3).round(2).tolist()  # mm, by radial depth
+    >>> chart = radial_lobes(lambda cut: zero_order_lobes([mode], [mode], cut, [9000.0]), slot, [0.25, 0.5, 1.0])
+    >>> (chart.depth * 1e3).round(2).tolist()  # mm, by radial depth
     [[6.76], [3.29], [1.28]]
     """
     shares = np.atleast_1d(np.asarray(immersion, dtype=np.float64))

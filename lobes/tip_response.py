@@ -1,4 +1,4 @@
-"""The receptance at the tool tip as a function of frequency, from modes or from a measured FRF."""
+"""Receptance at the tool tip over frequency, from modes or from a measured FRF."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from lobes.arrays import Complexes, Floats
 from modal import Mode
 
 TipData = Frf | Sequence[Mode]
-"""What is known of the tool tip in one direction: its measured FRF, or its modes."""
+"""Data of the tool tip in one direction: its measured FRF, or its modes."""
 
 GRID_STEP_HALF_WIDTHS = 0.02
-"""Spacing of the grid: in half-power half-widths near a mode, relative to the distance from it further away."""
+"""Grid spacing near a mode (half-power half-widths); relative to the distance from it further away."""
 MAX_MODE_FREQUENCY_RATIO = 100
-"""Modes are followed up to this many times the highest natural frequency of both directions ..."""
+"""Highest frequency of modes over the highest natural frequency of both directions."""
 MAX_TOOTH_FREQUENCY_RATIO = 2
-"""... and this many tooth frequencies: with in-phase modes, the deciding crossing comes within the first two."""
+"""Number of tooth frequencies added to it: with in-phase modes, the deciding crossing is within the first two."""
 GRID_STEPS_PER_LINE = 4
-"""Grid points from one line of an FRF to the next."""
+"""Grid steps per line spacing of an FRF."""
 
 
 @dataclass(frozen=True, eq=False)
 class TipResponse:
-    """Receptance of one direction, or a weighted sum of two."""
+    """Receptance of one direction, or a weighted sum of several."""
 
     grid: Floats
-    """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
+    """Frequencies that resolve the receptance, rising (Hz), shape (p,); it is unknown outside."""
     receptance: Callable[[Floats], Complexes]
     """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
     measured: Complexes | None = None
-    """Receptance on the grid (m/N), shape (p,), where it has been computed already."""
+    """Receptance on the grid (m/N), shape (p,), if it was computed before."""
 
     @property
     def on_grid(self) -> Complexes:
@@ -43,7 +43,7 @@ class TipResponse:
 
 
 def check_modes(modes: Sequence[Mode], direction: str) -> None:
-    """Refuse an empty list of modes, and modes that are not of a driving point."""
+    """Reject an empty list of modes, and modes of no driving point."""
     if not modes:
         raise ValueError(f"{direction} has no modes; give at least one mode, or None where it is rigid")
     for mode in modes:
@@ -55,12 +55,13 @@ def check_modes(modes: Sequence[Mode], direction: str) -> None:
 
 
 def tip_responses(x: TipData | None, y: TipData | None, tooth_frequency: float) -> list[tuple[int, TipResponse]]:
-    """Axis (0 for x, 1 for y) and receptance of each direction that is not None, for tooth frequencies (Hz) up to one.
+    """Return axis (0 for x, 1 for y) and receptance of each known direction, for tooth frequencies (Hz) up to one.
 
     Modes are known up to one frequency in both directions, an FRF inside its usable band, between its lines by a cubic
     spline. With two lines in zeta f_n straight lines would cut up to 3 % off the extreme real part, the spline changes
-    it by up to 0.4 %; with one line in zeta f_n neither will do (11 % and 8 %): record longer. Raises ValueError where
-    both are None, for no modes and for a mode that is not of a driving point.
+    it by up to 0.4 %. With one line in zeta f_n neither is good enough (11 % and 8 %): record longer. Raises ValueError
+    if
+    both are None, for no modes and for a mode of no driving point.
     """
     given = [(axis, name, tip) for axis, name, tip in ((0, "x", x), (1, "y", y)) if tip is not None]
     if not given:
@@ -76,9 +77,11 @@ def tip_responses(x: TipData | None, y: TipData | None, tooth_frequency: float) 
 
 
 def cross_response(cross: TipData, highest: float) -> TipResponse:
-    """Receptance from a force in x to a displacement in y: modes are known up to a frequency (Hz), an FRF in its band.
+    """Return the receptance from a force in x to a displacement in y.
 
-    Modes have the sign of what they show; ValueError for an empty list.
+    Modes are known up to the frequency `highest` (Hz), an FRF in its usable band. Modes have signed stiffness;
+    ValueError
+    for an empty list.
     """
     if isinstance(cross, Frf):
         return _from_frf(cross.in_band(cross.usable_band))
@@ -88,7 +91,7 @@ def cross_response(cross: TipData, highest: float) -> TipResponse:
 
 
 def common_grid(tips: Sequence[TipResponse]) -> Floats:
-    """Frequencies (Hz) that show every turn of all, where all are known; ValueError where bands do not overlap."""
+    """Return frequencies (Hz) that resolve all receptances within their common band; ValueError if there is none."""
     low = max(tip.grid[0] for tip in tips)
     high = min(tip.grid[-1] for tip in tips)
     if not low < high:
@@ -103,7 +106,7 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
 
 
 def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
-    """Sum of weight times receptance, known where all parts are; ValueError where their bands do not overlap."""
+    """Sum weight times receptance, known where all parts are; ValueError for bands without overlap."""
 
     def receptance(frequency: Floats) -> Complexes:
         total = np.zeros(np.shape(frequency), dtype=np.complex128)
@@ -115,7 +118,6 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
 
 
 def _from_frf(frf: Frf) -> TipResponse:
-
     lines = np.arange(frf.frequency.size)
     steps = np.arange(lines[-1] * GRID_STEPS_PER_LINE + 1) / GRID_STEPS_PER_LINE
     return TipResponse(
@@ -124,7 +126,7 @@ def _from_frf(frf: Frf) -> TipResponse:
 
 
 def _highest_frequency(tip: TipData) -> float:
-    """Frequency (Hz) above which a direction has nothing to say."""
+    """Return the highest frequency (Hz) that the data of a direction covers."""
     return (
         float(tip.frequency[-1])
         if isinstance(tip, Frf)
@@ -145,7 +147,7 @@ def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
 
 
 def _grid_near_mode(mode: Mode, highest: float) -> Floats:
-    """Frequencies up to `highest` (Hz), dense at the mode."""
+    """Return frequencies up to `highest` (Hz), dense at the mode."""
     width = mode.damping_ratio * mode.frequency
     distance = width * np.sinh(np.arange(0.0, np.arcsinh(highest / width), GRID_STEP_HALF_WIDTHS))
     around = mode.frequency + np.concatenate((-distance[::-1], distance))

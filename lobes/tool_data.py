@@ -1,52 +1,62 @@
-"""Cutting speeds and feeds per tooth that are published for kinds of tool (the .csv beside this module).
+"""Published cutting speeds and feeds per tooth for kinds of tool (the .csv files of this package).
 
 A row of cutting_speeds.csv or feeds_per_tooth.csv is one source: for a group of VDI 3323 or of ISO 513, a tool
-material, and slots or cuts at the side. The finest group that has rows counts; the range is taken over all of its rows,
-and at least a quarter to both sides of its middle.
+material, and slots or side cuts. The finest group with rows counts. The range covers all its rows,
+and at least a quarter on both sides of its middle.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from typing import Literal, get_args
 
 import numpy as np
 
 from lobes.coefficients import CuttingCoefficients
+from lobes.materials import read_table
 
 ToolMaterial = Literal["HSS", "carbide", "coated carbide", "PCD", "CBN"]
-"""Material of the edges of a tool."""
+"""Material of the cutting edges."""
 CutKind = Literal["slot", "side"]
-"""Slot, or cut at the side of what is there."""
+"""Slot or side cut."""
 TOOL_MATERIALS: tuple[ToolMaterial, ...] = get_args(ToolMaterial)
-"""All materials of edges."""
+"""All materials of cutting edges."""
 MIN_SLOT_IMMERSION = 0.4
-"""Radial depth over diameter from which on a cut counts as a slot, as in the tables of Tungaloy."""
+"""Least immersion of a slot, as in the tables of Tungaloy."""
 MIN_PUBLISHED_RANGE = 0.25
-"""Least half-width of a range, of its middle: what one source is taken to be off by."""
+"""Least relative half-width of a range, the error of a single source."""
 ANY_MATERIAL_GROUP = "any"
 """Group of rows that hold for every material."""
 
 
 @dataclass(frozen=True)
 class PublishedRange:
-    """Range that is published of a number."""
+    """Published range of a number."""
 
     low: float
-    """Least value (m/s or m)."""
+    """Smallest value (m/s or m)."""
     high: float
-    """Greatest value (m/s or m)."""
+    """Largest value (m/s or m)."""
     sources: tuple[str, ...]
-    """Sources that it lies over."""
+    """Sources of the range."""
 
 
 def classify_cut(immersion: float) -> CutKind:
-    """Kind of a cut by its radial depth over diameter (-): a slot from 0.4 on, as in the tables of Tungaloy.
+    """Classify a cut by its immersion: a slot from 0.4 on, as in the tables of Tungaloy.
 
+    Parameters
+    ----------
+    immersion : float
+        Radial depth of cut over cutter diameter (-).
+
+    Returns
+    -------
+    {"slot", "side"}
+        Kind of the cut.
+
+    Examples
+    --------
     >>> classify_cut(1.0), classify_cut(0.1)
     ('slot', 'side')
     """
@@ -54,10 +64,24 @@ def classify_cut(immersion: float) -> CutKind:
 
 
 def published_cutting_speed(material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind) -> PublishedRange | None:
-    """Speeds of the edge (m/s) that are published for a group of materials and a tool; None where none are.
+    """Return the published cutting speeds for a material and a tool.
 
-    Source: those that the range names, in the .csv beside this module.
+    Parameters
+    ----------
+    material : CuttingCoefficients
+        Material with its groups.
+    tool : ToolMaterial
+        Material of the cutting edges.
+    cut : {"slot", "side"}
+        Kind of the cut.
 
+    Returns
+    -------
+    PublishedRange or None
+        Cutting speeds (m/s) with sources; None if none are published.
+
+    Examples
+    --------
     >>> aluminium = materials_by_name()[fold_material_name("AA 7075")]
     >>> speed = published_cutting_speed(aluminium, "carbide", "side")
     >>> f"{speed.low * 60:.0f} to {speed.high * 60:.0f} m/min"
@@ -71,13 +95,31 @@ def published_cutting_speed(material: CuttingCoefficients, tool: ToolMaterial, c
 def published_feed_per_tooth(
     material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind, diameter: float
 ) -> PublishedRange | None:
-    """Feeds per tooth (m) that are published for tools of a diameter (m); None where none are.
+    """Return the published feeds per tooth for a material and a tool.
 
-    Between the diameters of a source on a line, below them in proportion to the diameter, above them as at the last.
+    Linear between the diameters of a source, proportional to the diameter below them, constant above.
 
+    Parameters
+    ----------
+    material : CuttingCoefficients
+        Material with its groups.
+    tool : ToolMaterial
+        Material of the cutting edges.
+    cut : {"slot", "side"}
+        Kind of the cut.
+    diameter : float
+        Cutter diameter (m).
+
+    Returns
+    -------
+    PublishedRange or None
+        Feeds per tooth (m) with sources; None if none are published.
+
+    Examples
+    --------
     >>> aluminium = materials_by_name()[fold_material_name("AA 7075")]
-    >>> stream_states = published_feed_per_tooth(aluminium, "carbide", "side", diameter=12e-3)
-    >>> f"{stream_states.low * 1e3:.3f} to {stream_states.high * 1e3:.3f} mm"
+    >>> feed = published_feed_per_tooth(aluminium, "carbide", "side", diameter=12e-3)
+    >>> f"{feed.low * 1e3:.3f} to {feed.high * 1e3:.3f} mm"
     '0.075 to 0.150 mm'
     """
     rows = _finest_group_rows("feeds_per_tooth.csv", material, tool, cut)
@@ -88,8 +130,22 @@ def published_feed_per_tooth(
 
 
 def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> PublishedRange | None:
-    """Speeds of the edge (m/s) up to the highest that is published of any tool material; None where none are.
+    """Return the range up to the highest published cutting speed of any tool material.
 
+    Parameters
+    ----------
+    material : CuttingCoefficients
+        Material with its groups.
+    cut : {"slot", "side"}
+        Kind of the cut.
+
+    Returns
+    -------
+    PublishedRange or None
+        Cutting speeds (m/s) from 0; None if none are published.
+
+    Examples
+    --------
     >>> aluminium = materials_by_name()[fold_material_name("AA 7075")]
     >>> round(published_speed_of_any_tool(aluminium, "side").high * 60)  # m/min
     1250
@@ -101,16 +157,10 @@ def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> 
     return PublishedRange(0.0, fastest.high, fastest.sources)
 
 
-@cache
-def published_rows(name: str) -> tuple[dict[str, str], ...]:
-    """Rows of cutting_speeds.csv or feeds_per_tooth.csv."""
-    return tuple(csv.DictReader((files("lobes") / name).read_text(encoding="utf-8").splitlines()))
-
-
 def _finest_group_rows(
     name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind
 ) -> list[dict[str, str]]:
-    """Rows of the finest group that has any."""
+    """Return the rows of the finest group that has any."""
     for group in (
         f"VDI {material.vdi_3323_group}",
         material.iso_group,
@@ -118,7 +168,7 @@ def _finest_group_rows(
     ):
         rows = [
             row
-            for row in published_rows(name)
+            for row in read_table(name)
             if group in row["of"].split(";") and tool in row["tool_material"].split(";") and cut == row["cut"]
         ]
         if rows:
@@ -127,7 +177,7 @@ def _finest_group_rows(
 
 
 def _feed_at_diameter(rows: Sequence[dict[str, str]], diameter: float) -> tuple[float, float]:
-    """Feeds (m) of one source at a diameter (m)."""
+    """Return the feeds (m) of one source at a diameter (m)."""
     if rows[0]["unit"] == "D":
         return float(rows[0]["low"]) * diameter, float(rows[0]["high"]) * diameter
     points = sorted(point for row in rows for point in _diameter_points(row))
@@ -137,13 +187,13 @@ def _feed_at_diameter(rows: Sequence[dict[str, str]], diameter: float) -> tuple[
 
 
 def _diameter_points(row: dict[str, str]) -> Iterator[tuple[float, float, float]]:
-    """Diameters of a row (mm), each with least and greatest feed (mm)."""
+    """Yield the diameters of a row (mm), each with smallest and largest feed (mm)."""
     for diameter in row["diameter_mm"].split(".."):
         yield float(diameter), float(row["low"]), float(row["high"])
 
 
 def _join_ranges(ranges: Sequence[tuple[float, float]], rows: Sequence[dict[str, str]]) -> PublishedRange | None:
-    """Over all of them, and at least as wide as one source is taken to be off."""
+    """Return the range over all sources, at least as wide as the error of a single one."""
     if not ranges:
         return None
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)

@@ -1,4 +1,4 @@
-"""The force matrix H over the turning cutter, and its integrals; H and the conventions stand in `Cut`."""
+"""Force matrix H over the turning cutter, and its integrals. `Cut` holds H and the conventions."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from lobes.cut import Cut
 
 
 def mean_force(cut: Cut) -> Floats:
-    """Force matrix of all teeth averaged over a turn, H0 = N / (2 pi) times the integral of H (Pa), shape (2, 2).
+    """Return the force matrix of all teeth averaged over a turn (Pa), shape (2, 2).
 
-    A helix does not change it.
+    H0 = N / (2 pi) times the integral of H. A helix does not change it.
     """
     return cut.teeth / (2 * np.pi) * _to_machine_axes(cut, _tooth_integral(cut, np.array(cut.exit_angle)))
 
 
 @lru_cache(maxsize=64)
 def interval_forces(cut: Cut, intervals: int) -> Floats:
-    """Force matrix per depth, straight as teeth may not be, averaged over each interval of the pattern of teeth.
+    """Return the force matrix per depth of straight teeth, averaged over each interval of the pitch pattern.
 
-    Of the teeth of each delay of the cut apart; the pattern is one tooth period of even teeth. Returns Pa, shape
+    Separately for the teeth of each delay; the pattern is one tooth period of even teeth. Pa, shape
     (delays, intervals, 2, 2).
     """
     step = sum(cut.pitch_pattern) / intervals
@@ -33,18 +33,18 @@ def interval_forces(cut: Cut, intervals: int) -> Floats:
 
 
 def mean_regeneration(cut: Cut, waves: Floats) -> Complexes:
-    """1 - exp(-i w tau) in the mean of all teeth, for waves in the mean tooth period (...)."""
+    """Return 1 - exp(-i w tau) averaged over all teeth, for waves in the mean tooth period (...)."""
     delays = np.array(cut.pitch_pattern) / (2 * np.pi / cut.teeth)
     return np.asarray(np.mean([1 - np.exp(-2j * np.pi * waves * delay) for delay in delays], axis=0))
 
 
 def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
-    """Force matrix per depth, for Kt alone and for Kr alone, each 1, in the frame of the feed.
+    """Return the force matrix per depth in the frame of the feed, for Kt = 1 alone and for Kr = 1 alone.
 
-    Of the teeth of each delay of the cut apart. angle: of the first tooth since its entry at the tip (rad), shape
-    (..., s); depth (...) in m counts for helical teeth, whose force is the mean along the axis. Returns shape
-    (delays, ..., s, 2, 2, 2), the coefficient before the matrix. Not to be asked for at an angle where a tooth enters
-    or leaves.
+    Separately for the teeth of each delay. angle: of the first tooth since its entry at the tip (rad), shape
+    (..., s); depth (...) in m matters for helical teeth, whose force is the mean along the axis. Returns shape
+    (delays, ..., s, 2, 2, 2), the coefficient before the matrix. Not defined at an angle where a tooth enters or
+    leaves.
     """
     tooth = cut.entry_angle + angle + cut.lead_angles.reshape(-1, *np.ones(angle.ndim, dtype=int))
     if cut.helix_lag == 0:
@@ -59,33 +59,33 @@ def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
 
 
 def rotate_to_machine(matrix: Floats, feed_angle: Floats) -> Floats:
-    """Matrices in the frame of the feed (..., 2, 2) as machine axes x and y see them; feed_angle (rad) broadcasts."""
+    """Rotate matrices from the frame of the feed (..., 2, 2) to machine axes; feed_angle (rad) broadcasts."""
     turn = feed_rotation(feed_angle)
     return np.asarray(np.swapaxes(turn, -1, -2) @ matrix @ turn)
 
 
 def feed_rotation(feed_angle: Floats) -> Floats:
-    """From displacements along machine axes x and y to those in the frame of the feed, shape (..., 2, 2)."""
+    """Return the rotation of displacements from machine axes to the frame of the feed, shape (..., 2, 2)."""
     c, s = np.cos(feed_angle), np.sin(feed_angle)
     return np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=-2)
 
 
 def _to_machine_axes(cut: Cut, shares: Floats) -> Floats:
-    """The matrix of a cut (Pa) from the shares of its two coefficients."""
+    """Return the matrix of a cut (Pa) from the shares of its two coefficients."""
     return rotate_to_machine(
         cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle)
     )
 
 
 def _sum_by_delay(cut: Cut, shares: Floats) -> Floats:
-    """What each tooth does (teeth, ...) summed over those of one delay, shape (delays, ...)."""
+    """Sum values of each tooth (teeth, ...) over those of one delay, shape (delays, ...)."""
     if not cut.pitch:
         return np.asarray(shares.sum(axis=0, keepdims=True))
     return np.stack([shares[np.array(cut.pitch) == delay].sum(axis=0) for delay in cut.delays])
 
 
 def _tooth_integral(cut: Cut, angle: Floats) -> Floats:
-    """Integral of H of one tooth from angle 0 for both coefficients, shape (..., 2, 2, 2)."""
+    """Integrate H of one tooth from angle 0 for both coefficients, shape (..., 2, 2, 2)."""
     turns, remainder = np.divmod(angle, 2 * np.pi)
     inside = np.clip(remainder, cut.entry_angle, cut.exit_angle)
     start, end = _full_turn_integral(np.array(cut.entry_angle)), _full_turn_integral(np.array(cut.exit_angle))
@@ -93,12 +93,12 @@ def _tooth_integral(cut: Cut, angle: Floats) -> Floats:
 
 
 def _full_turn_integral(angle: Floats) -> Floats:
-    """Integral of H from 0 at any angle, as if it were always in the cut."""
+    """Integrate H from 0 to any angle, as if the tooth were always in the cut."""
     return _force_terms(angle, -np.cos(2 * angle) / 2, np.sin(2 * angle) / 2)
 
 
 def _force_terms(one: Floats, sine: Floats, cosine: Floats) -> Floats:
-    """H from what stands for 1, sin 2 phi and cos 2 phi: s^2 = (1 - cos 2 phi) / 2, c^2 = (1 + cos 2 phi) / 2."""
+    """Return H from its terms 1, sin 2 phi and cos 2 phi: s^2 = (1 - cos 2 phi) / 2, c^2 = (1 + cos 2 phi) / 2."""
     tangential = [[sine, one + cosine], [-(one - cosine), -sine]]
     radial = [[one - cosine, sine], [sine, one + cosine]]
     return np.moveaxis(np.array([tangential, radial]), (0, 1, 2), (-3, -2, -1)) / 2

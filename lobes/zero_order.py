@@ -16,33 +16,55 @@ from lobes.tip_response import TipData, TipResponse, common_grid, cross_response
 from lobes.tooth_force import interval_forces, mean_force
 
 MIN_NET_FORCE_RATIO = 0.7
-"""Mean force of one direction over the mean of its magnitude, below which zero order is no picture of it."""
+"""Least mean force of one direction over the mean of its magnitude for which zero order is valid."""
 CANCELLATION_SAMPLES = 400
-"""Intervals of a tooth period that they are taken over."""
+"""Intervals of a tooth period for that mean."""
 
 
 def zero_order_lobes(
     x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: ArrayLike, cross: TipData | None = None
 ) -> StabilityLobes:
-    """Limiting depth at each speed (rpm) for the force matrix averaged over a turn of the cutter.
+    """Compute stability lobes by the zero-order approximation (ZOA): the force matrix averaged over a turn.
 
-    x is the feed, y the normal to it; None stands for a direction that is rigid or not known. With H0 the mean of the
-    force matrix (`lobes.tooth_force`; H0 = -N Kt alpha / (4 pi) of the source) and G = [[Gx, Gxy], [Gxy, Gy]] the cut
-    is at its limit where chatter at frequency f_c > 0 sustains itself,
+    With H0 the mean of the force matrix (`lobes.tooth_force`; H0 = -N Kt alpha / (4 pi) of the source) and
+    G = [[Gx, Gxy], [Gxy, Gy]] the cut is at its limit if chatter at frequency f_c > 0 sustains itself,
 
         det(I + b (1 - exp(-2 pi i f_c / f_t)) H0 G(f_c)) = 0,     tooth frequency f_t = N speed / 60:
 
     b = -1 / (2 Re L) for the eigenvalues L of H0 G with Re L < 0; the lowest b over both and over all lobes counts.
-    A mean force knows no flip lobes: at low immersion (below 0.25) the true limit can be lower, at half immersion it
+    A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower, at half immersion it
     can be 15 % off at a given speed.
 
-    cross is what is hit in x and seen in y: its FRF, or modes whose stiffness has the sign of theirs (`cross_modes`).
-    None: x and y do not move each other. From FRFs only chatter inside their common usable band is seen; each may have
-    its own lines. A depth of inf means no chatter there. Raises ValueError as `average_angle_lobes` does, and for a cross FRF
-    without both directions.
-    Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+    Parameters
+    ----------
+    x, y : Frf, sequence of Mode, or None
+        Tool tip in the feed direction and normal to it; None for a rigid or unknown direction. FRFs show chatter inside
+        their common usable band only; each may have its own lines.
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : array_like, shape (n,)
+        Spindle speeds (rpm).
+    cross : Frf or sequence of Mode, optional
+        Cross response, hit in x and measured in y; the stiffness of modes has their sign. Default: x and y are
+        uncoupled.
 
-    In a slot the eigenvalues of H0 are N (Kr +- i Kt) / 4, and with them L in closed form where x and y are alike:
+    Returns
+    -------
+    StabilityLobes
+        Limiting depths (m); inf for no chatter.
+
+    Raises
+    ------
+    ValueError
+        As `average_angle_lobes`, and for a cross FRF without both directions.
+
+    References
+    ----------
+    Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+
+    Examples
+    --------
+    In a slot the eigenvalues of H0 are N (Kr +- i Kt) / 4. If x and y are alike, L follows in closed form:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
@@ -70,7 +92,7 @@ def zero_order_lobes(
 
 
 def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
-    """Whether most of the force in the one direction that is known cancels over a turn."""
+    """Return a remark if most of the force in the single known direction cancels over a turn."""
     forces = interval_forces(cut, CANCELLATION_SAMPLES).sum(axis=0)[:, axis, axis]
     share = abs(np.mean(forces)) / np.mean(np.abs(forces))
     if share >= MIN_NET_FORCE_RATIO:
@@ -85,7 +107,7 @@ def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
 def _loop_eigenvalues(
     force: Floats, x: TipResponse, y: TipResponse, cross: TipResponse | None = None
 ) -> list[TipResponse]:
-    """Both eigenvalues L = t +- sqrt(t^2 - det) of H0 G, t = trace / 2, each followed continuously over frequency."""
+    """Return both eigenvalues L = t +- sqrt(t^2 - det) of H0 G, t = trace / 2, each continuous over frequency."""
     grid = common_grid([tip for tip in (x, y, cross) if tip is not None])
 
     def half_trace_and_root(frequency: Floats) -> tuple[Complexes, Complexes]:
@@ -115,26 +137,45 @@ def _loop_eigenvalues(
 
 
 def average_angle_lobes(x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: ArrayLike) -> StabilityLobes:
-    """Limiting depth at each speed (rpm) for the tooth frozen at its average angle.
+    """Compute stability lobes by the average tooth angle (Tlusty).
 
-    x is the feed, y the normal to it; None stands for a direction that is rigid or not known. With
-    G_or = mu_x Gx + mu_y Gy (`Cut.orientation_factors`) the cut is at its limit where chatter at frequency f_c > 0
+    With G_or = mu_x Gx + mu_y Gy (`Cut.orientation_factors`) the cut is at its limit if chatter at frequency f_c > 0
     sustains itself,
 
         Ks Nt* b G_or (1 - exp(-2 pi i f_c / f_t)) = -1,     tooth frequency f_t = N speed / 60:
 
-    b = -1 / (2 Ks Nt* Re G_or) where Re G_or < 0, and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ...,
+    b = -1 / (2 Ks Nt* Re G_or) for Re G_or < 0, and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ...,
     eps / 2 = atan2(-Re G_or, Im G_or). The limit is the lowest b over all lobes j; `crossings` holds it alone.
-    A mean force knows no flip lobes: at low immersion (below 0.25) the true limit can be lower.
+    A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower.
 
-    From FRFs only chatter inside their common usable band is seen: cut them with `Frf.in_band` to what is to be
-    trusted; x and y may have different lines (see `lobes.tip_response`). A depth of inf means no chatter there.
+    Parameters
+    ----------
+    x, y : Frf, sequence of Mode, or None
+        Tool tip in the feed direction and normal to it; None for a rigid or unknown direction. FRFs show chatter inside
+        their common usable band only (cut them with `Frf.in_band`); each may have its own lines.
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : array_like, shape (n,)
+        Spindle speeds (rpm).
 
-    Raises ValueError for speeds not > 0, two rigid directions, an empty list of modes, modes of negative stiffness,
-    and FRFs without a common band.
-    Source: Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
+    Returns
+    -------
+    StabilityLobes
+        Limiting depths (m); inf for no chatter.
 
-    Of one mode in the feed the limit at the worst speed is 2 K zeta (1 + zeta) / (Ks mu_x Nt*):
+    Raises
+    ------
+    ValueError
+        For speeds not > 0, two rigid directions, an empty list of modes, modes of negative stiffness,
+        and FRFs without a common band.
+
+    References
+    ----------
+    Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
+
+    Examples
+    --------
+    For one mode in the feed the limit at the worst speed is 2 K zeta (1 + zeta) / (Ks mu_x Nt*):
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> half = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)

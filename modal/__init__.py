@@ -1,4 +1,4 @@
-"""From an FRF to natural frequencies, damping ratios and stiffnesses."""
+"""Modal analysis: natural frequencies, damping ratios and stiffnesses from an FRF."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""From an FRF to natural frequencies, damping ratios and stiffnesses."""
+"""Modal analysis: natural frequencies, damping ratios and stiffnesses from an FRF."""
 
 from .bands.extract_modes import extract_modes
 from .bands.extraction import Extraction, FittedBand, candidate_frequencies, stabilisation_charts
@@ -6,7 +6,7 @@ from .bands.find_resonances import ConjugateError
 from .edit_modes import edit_modes
 from .fit_modes import decay_spectra, fit_common_modes, fit_decays, fit_modes, modes_from_decays, modes_from_extraction
 from .frf_peaks import find_peaks_above_band, find_truncated_peaks, mode_indicator, pick_peaks
-from .modes.match_modes import FollowedMode, follow_mode, mac, match_modes, predominant_mode
+from .modes.match_modes import ModeMatch, follow_mode, mac, match_modes, predominant_mode
 from .modes.measurement_effects import (
     CommonDelay,
     MassLoading,
@@ -28,10 +28,10 @@ __all__ = [
     "CredibleModes",
     "Extraction",
     "FittedBand",
-    "FollowedMode",
     "MassLoading",
     "Mode",
     "ModeEdits",
+    "ModeMatch",
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",

@@ -1,4 +1,4 @@
-"""Modes of an extraction as a person says: one left out, one added, one held at a frequency and a damping ratio."""
+"""Edit the modes of an extraction by hand: drop one, add one, or fix its frequency and damping ratio."""
 
 from __future__ import annotations
 
@@ -16,35 +16,55 @@ from modal.bands.fit_peaks import (
     group_into_bands,
     iterate_bands,
     refit_with_real_constants,
+    replace_band,
 )
-from modal.fitting import MIN_RESIDUAL_TERMS, fit_band
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
+from modal.fitting.fit_band import fit_band
 from modal.modes.mode_edits import ModeEdits
 from modal.poles import select_physical_poles
 
 EDITED_MODE_DISTANCE = 0.01
-"""Relative distance up to which a mode is the one that is meant; chosen."""
+"""Relative distance up to which a frequency names a mode; chosen."""
 SAME_MODE_HALF_WIDTHS = 0.25
-"""Half-power half-widths up to which a mode is there already; chosen."""
+"""Distance up to which a mode to be added exists already (half-power half-widths); chosen."""
 TRIAL_DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03)
-"""Damping ratios that an added mode is begun with, beside that of an LSCF pole near it."""
+"""Damping ratios that the fit of an added mode starts from, beside those of LSCF poles near it."""
 MAX_ADDED_MODE_SHIFT = 0.05
-"""Relative distance from where it was looked for that an added mode has at most, within its half-width; chosen."""
+"""Largest relative shift of an added mode from the given frequency, within its half-width; chosen."""
 LONE_MODE_DAMPING = 0.02
-"""Damping ratio that the band of a mode that stands alone is laid for."""
+"""Damping ratio that the band of a single added mode is laid for."""
 ADDED_MODE = "added"
-"""Word for a mode that a person added."""
+"""Mark of a mode that a person added."""
 
 
 def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
-    """The extraction with some modes left out, then some added, then some held; the same where nothing is asked.
+    """Drop, add and fix modes of an extraction, in this order.
 
-    All modes of a band are fitted anew together then, and the others with their tails. Raises ValueError for a
-    frequency outside the lines, one without a mode within 1 % to leave out, one near which no further mode fits, and
-    one where nothing of a held damping is to be seen.
+    All modes of an edited band are fitted together again, and the others with their new tails.
 
+    Parameters
+    ----------
+    state : Extraction
+        Modes to be edited.
+    edits : ModeEdits
+        Frequencies of modes to drop, add and fix.
+
+    Returns
+    -------
+    Extraction
+        Edited modes; the same object for empty edits.
+
+    Raises
+    ------
+    ValueError
+        For a frequency outside the lines, a mode to drop that is not within 1 %, a place where no further mode
+        fits, and a fixed mode that the FRF does not show.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
     >>> edited = edit_modes(extract_modes([frf]), ModeEdits(drop=(900.0,)))
-    >>> [round(mode.frequency, 1) for mode in modes_of(edited)]  # Hz
+    >>> [round(mode.frequency, 1) for mode in modes_from_extraction(edited)]  # Hz
     [500.0]
     """
     if not edits:
@@ -65,15 +85,15 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
 
 @dataclass(frozen=True, eq=False)
 class _EditPlan:
-    """Modes that are to be fitted together."""
+    """Modes to be fitted together."""
 
     band: FittedBand | None
-    """Band that they take the place of."""
+    """Band to be replaced."""
     lines: slice
     poles: Floats
-    """Where the fit begins, (2, m)."""
+    """Start values, shape (2, m)."""
     words: tuple[str, ...]
-    """What a person said of each."""
+    """Mark of what a person did to each mode."""
 
     def without(self, i: int) -> _EditPlan:
         words = tuple(np.delete(np.array(self.words, dtype=object), i))
@@ -83,7 +103,7 @@ class _EditPlan:
         return replace(self, poles=np.column_stack([self.poles, [frequency, zeta]]), words=(*self.words, word))
 
     def fitted(self, state: Extraction) -> FittedBand | None:
-        """The band of these modes; None where nothing fits."""
+        """Fit these modes; None if nothing fits."""
         data = state.data(self.lines, without=self.band)
         terms = MIN_RESIDUAL_TERMS if self.band is None else self.band.terms
         held = np.array([word == FIXED_MODE for word in self.words])
@@ -95,55 +115,59 @@ class _EditPlan:
 
 
 def _drop_mode(state: Extraction, frequency: float) -> Extraction:
-    said = f"drop {frequency:g} Hz"
+    request = f"drop {frequency:g} Hz"
     place = _find_mode(state, frequency)
     if place is None:
         modes = ", ".join(f"{mode:.0f}" for band in state.bands for mode in band.fit.frequency) or "none"
-        raise ValueError(f"{said}: no mode within 1 % of it; there are modes at: {modes} Hz")
+        raise ValueError(f"{request}: no mode within 1 % of it; there are modes at: {modes} Hz")
     band, i = place
     plan = _plan_for_band(band).without(i)
     if not plan.words:
-        return replace(state, bands=tuple(other for other in state.bands if other is not band))
+        return replace_band(state, band, None)
     fitted = plan.fitted(state)
     if fitted is None:
-        raise ValueError(f"{said}: the modes beside it cannot be fitted without it; drop them, too")
-    return _replace_band(state, band, fitted)
+        raise ValueError(f"{request}: the modes beside it cannot be fitted without it; drop them, too")
+    return replace_band(state, band, fitted)
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    said = f"add {frequency:g} Hz"
-    plan = _plan_at_frequency(state, frequency, said)
+    request = f"add {frequency:g} Hz"
+    plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
             raise ValueError(
-                f"{said}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
+                f"{request}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
             )
     tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
     fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
-        raise ValueError(f"{said}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix")
+        raise ValueError(
+            f"{request}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix"
+        )
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
         raise ValueError(
-            f"{said}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain by "
-            f"{100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
+            f"{request}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain "
+            f"by {100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
         )
-    return _replace_band(state, plan.band, best)
+    return replace_band(state, plan.band, best)
 
 
 def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
-    said = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
+    request = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
     place = _find_mode(state, frequency)
-    plan = _plan_at_frequency(state, frequency, said) if place is None else _plan_for_band(place[0]).without(place[1])
+    plan = (
+        _plan_at_frequency(state, frequency, request) if place is None else _plan_for_band(place[0]).without(place[1])
+    )
     fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
     if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
-        raise ValueError(f"{said}: nothing of it is to be seen there; look at the picture")
-    return _replace_band(state, plan.band, fitted)
+        raise ValueError(f"{request}: nothing of it is to be seen there; look at the picture")
+    return replace_band(state, plan.band, fitted)
 
 
 def _find_mode(state: Extraction, frequency: float) -> tuple[FittedBand, int] | None:
-    """The band of the mode that is meant, and which of its modes; None where there is none."""
+    """Return the band of a mode and its index there; None if no mode is near."""
     modes = [(band, i) for band in state.bands for i in range(band.fit.frequency.size)]
     distances = [abs(band.fit.frequency[i] / frequency - 1) for band, i in modes]
     nearest = int(np.argmin(distances)) if modes else 0
@@ -154,11 +178,11 @@ def _plan_for_band(band: FittedBand) -> _EditPlan:
     return _EditPlan(band, band.lines, band.fit.poles, band.edits or ("",) * band.fit.frequency.size)
 
 
-def _plan_at_frequency(state: Extraction, frequency: float, said: str) -> _EditPlan:
-    """The band that a frequency lies in, or a new one about it."""
+def _plan_at_frequency(state: Extraction, frequency: float, request: str) -> _EditPlan:
+    """Return the plan of the band that holds a frequency, or of a new one around it."""
     f = state.frf.frequency
     if not f[0] < frequency < f[-1]:
-        raise ValueError(f"{said}: lies outside the lines, {f[0]:g} to {f[-1]:g} Hz")
+        raise ValueError(f"{request}: lies outside the lines, {f[0]:g} to {f[-1]:g} Hz")
     for band in state.bands:
         if band.data.frequency[0] <= frequency <= band.data.frequency[-1]:
             return _plan_for_band(band)
@@ -167,7 +191,6 @@ def _plan_at_frequency(state: Extraction, frequency: float, said: str) -> _EditP
 
 
 def _start_values(state: Extraction, plan: _EditPlan, frequency: float) -> list[tuple[float, float]]:
-    """Where an added mode may begin."""
     poles = select_physical_poles(state.data(plan.lines, without=plan.band).chart)
     near = np.abs(poles.frequency / frequency - 1) < EDITED_MODE_DISTANCE
     from_poles = [*zip(poles.frequency[near].tolist(), poles.damping_ratio[near].tolist(), strict=True)]
@@ -175,11 +198,6 @@ def _start_values(state: Extraction, plan: _EditPlan, frequency: float) -> list[
 
 
 def _is_added_mode_near(band: FittedBand, frequency: float) -> bool:
-    """Whether the mode added last stands where it was looked for."""
+    """Return whether the mode added last is near the given frequency."""
     mode, zeta = band.fit.poles[:, -1]
     return bool(abs(mode / frequency - 1) <= max(EDITED_MODE_DISTANCE, min(zeta, MAX_ADDED_MODE_SHIFT)))
-
-
-def _replace_band(state: Extraction, old: FittedBand | None, new: FittedBand) -> Extraction:
-    bands = [*(band for band in state.bands if band is not old), new]
-    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))

@@ -13,7 +13,7 @@ from modal.arrays import Complexes, Floats
 from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
-from modal.fitting import BandFit
+from modal.fitting.band_fit import BandFit
 from modal.hit_scatter import (
     MIN_HITS_FOR_JACKKNIFE,
     add_linearity_remarks,
@@ -26,27 +26,46 @@ from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, 
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
-    """Modes from the lines between band[0] and band[1] (Hz), by rising frequency, each with its covariance; maybe none.
+    """Fit the modes of an FRF by weighted least squares.
 
-    Every resonance is fitted in a local band of some half-power widths, close ones together, with complex modal
-    constants, which are real where Akaike's criterion allows; modes without a peak of their own are taken where the
-    sum of squares asks for them, from LSCF poles that stay where they are as the order grows. Complex residual terms
-    stand for what lies outside, and the tails of all other fitted modes are taken off. A line counts by its random
-    error (from a smoothed coherence), or equally in the measured quantity where none is known; the covariance is scaled
-    by the reduced chi-square. A peak is left out where least squares does not converge to a mode inside its local band,
-    or leaves its damping ratio or stiffness uncertain by more than a third; `pick_peaks` may still list it. What else
-    speaks against a mode stands in its `remarks`.
+    Each resonance is fitted in a local band of some half-power widths, close ones together, with complex modal
+    constants, which are real if Akaike's criterion allows. Modes without a peak of their own are added if the
+    sum of squares asks for them, from LSCF poles that stay in place as the order grows. Complex residual terms
+    represent modes outside the band, and the tails of all other fitted modes are subtracted. Lines are weighted by
+    their
+    random error (from a smoothed coherence), or equally in the measured quantity if it is unknown. The covariance is
+    scaled by the reduced chi-square. A peak is left out if least squares does not converge to a mode inside its band
+    or leaves its damping ratio or stiffness uncertain by more than a third; `pick_peaks` may still list it.
 
-    hits: those that the FRF was averaged from (H1). Noise of the hammer is alike at neighbouring lines, so the fit does
-    not see it: the covariance then has it from the baselines of the hits. With three or more the modes also have a
-    jackknife over hits, which holds for any error that differs from hit to hit.
+    Parameters
+    ----------
+    frf : Frf
+        Measured FRF.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz). Default: all usable lines.
+    hits : sequence of Hit, optional
+        Hits that the FRF was averaged from (H1). With them the covariance includes the noise of the hammer, which is
+        alike on neighbouring lines and so invisible to the fit. With three or more the modes also have a jackknife
+        covariance over the hits, valid for any error that differs from hit to hit.
 
-    Source: Peeters et al. (2004), Shock and Vibration 11, 395 (LSCF); Ewins, Modal Testing, ch. 4 (curve fitting
+    Returns
+    -------
+    list of Mode
+        Modes by rising frequency with covariance and remarks; may be empty.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase, and hits
+        with other lines than the FRF or without a pulse.
+
+    References
+    ----------
+    Peeters et al. (2004), Shock and Vibration 11, 395 (LSCF); Ewins, Modal Testing, ch. 4 (curve fitting
     with residual terms); Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413.
 
-    Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
-    phase, and hits that have other lines than the FRF or no pulse.
-
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(520.0, 0.02, 4e7)], np.arange(1.0, 1501.0))
     >>> for mode in fit_modes(frf, band=(100.0, 1000.0)):
     ...     print(f"{mode.frequency:.2f} Hz, {mode.damping_ratio:.4f}, {mode.stiffness / 1e6:.2f} N/um")
@@ -57,12 +76,29 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
 
 
 def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode]:
-    """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from.
+    """Return the modes of an extraction by rising frequency.
 
-    Raises ValueError for another number of lists of hits than FRFs, and for hits that have other lines or no pulse.
+    Parameters
+    ----------
+    state : Extraction
+        Result of `extract_modes` or `edit_modes`.
+    hits : sequence of sequences of Hit, optional
+        For each FRF the hits that it was averaged from.
 
+    Returns
+    -------
+    list of Mode
+        Modes with covariance, quality figures and remarks.
+
+    Raises
+    ------
+    ValueError
+        If the number of lists of hits differs from that of the FRFs, or hits have other lines or no pulse.
+
+    Examples
+    --------
     >>> state = extract_modes([synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(1.0, 1501.0))])
-    >>> [f"{mode.frequency:.1f} Hz" for mode in modes_of(state)]
+    >>> [f"{mode.frequency:.1f} Hz" for mode in modes_from_extraction(state)]
     ['500.0 Hz']
     """
     if hits and len(hits) != len(state.frfs):
@@ -81,15 +117,14 @@ def _modes_with_scatter(
     over_hits = (
         np.sum([jackknife_covariance(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
     )
-    judged = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
+    assessed = modes_from_band(state, band, by_hammer, over_hits, n_hits)
+    return add_linearity_remarks(state, band, assessed, hits[0], without[0]) if n_hits else assessed
 
 
 def modes_from_band(
     state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: Floats | None, n_hits: int
 ) -> list[Mode]:
-    """Modes of one band with their figures of quality; the covariances, of the hammer's noise and over this many hits,
-    are in the order of `BandFit`."""
+    """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
@@ -105,7 +140,7 @@ def modes_from_band(
 def _mode_from_fit(
     fit: BandFit, i: int, covariance: Floats, freedom: float, scatter: Floats | None, n_hits: int
 ) -> Mode:
-    """Mode i of a band, as the driving point shows it."""
+    """Return mode i of a band as seen at the driving point."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
     of_fit = _mode_covariance(covariance, fit, i)
@@ -135,7 +170,7 @@ def _method_text(state: Extraction, band: FittedBand) -> str:
 
 
 def _mode_shape(constants: Complexes) -> Floats | None:
-    """Part of each in phase with the driving point or against it, the largest 1 or -1; None of one FRF."""
+    """Return the part of each constant in phase with the driving point, scaled to 1 or -1; None for one FRF."""
     if constants.size == 1:
         return None
     along = np.real(constants * np.exp(-1j * np.angle(constants[0])))
@@ -143,7 +178,7 @@ def _mode_shape(constants: Complexes) -> Floats | None:
 
 
 def _mode_covariance(covariance: Floats, fit: BandFit, i: int) -> Floats:
-    """Covariance of frequency, damping ratio, stiffness and phase (degrees) of mode i from that of its band, (4, 4)."""
+    """Return the covariance of frequency, damping ratio, stiffness and phase (degrees) of mode i, shape (4, 4)."""
     p, m = fit.constant.shape
     block = np.ix_(*2 * [[i, m + i, 2 * m + i, (2 + p) * m + i]])
     constant = fit.constant[0, i]
@@ -155,20 +190,35 @@ def _mode_covariance(covariance: Floats, fit: BandFit, i: int) -> Floats:
 def fit_common_modes(
     frfs: Sequence[Frf], band: tuple[float, float] | None = None, hits: Sequence[Sequence[Hit]] = ()
 ) -> list[Mode]:
-    """Modes that all these FRFs share, by rising frequency, each with its shape; maybe none.
+    """Fit modes with common poles to several FRFs: directions, or points of a structure.
 
-    The extraction of `fit_modes` with common frequencies and damping ratios, and a modal constant and residual terms
-    for each FRF: a mode counts where one of the FRFs shows it. They have one frequency axis; the first is the driving
-    point, which stiffness and covariance belong to, and shape holds the modal constants of all, relative to the
-    largest.
+    As `fit_modes` with common frequencies and damping ratios, and a modal constant and residual terms
+    for each FRF. A mode counts if one of the FRFs shows it.
 
-    hits: for each FRF those that it was averaged from (H1), maybe none; noise of the hammer counts where they are
-    given. Where all have three or more, the modes have a jackknife that leaves out one hit of one FRF at a time,
-    which takes the FRFs for measured independently. Its n_hits is that of the FRF with the fewest.
+    Parameters
+    ----------
+    frfs : sequence of Frf
+        FRFs with one frequency axis. The first is the driving point, which stiffness and covariance belong to.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz). Default: all usable lines.
+    hits : sequence of sequences of Hit, optional
+        For each FRF the hits that it was averaged from (H1), maybe none. If all have three or more, the modes have a
+        jackknife that leaves out one hit of one FRF at a time, which takes the FRFs as measured independently.
 
-    Raises ValueError as `fit_modes`, for no FRF, for FRFs with different lines, and for another number of lists of
-    hits than FRFs.
+    Returns
+    -------
+    list of Mode
+        Modes by rising frequency, each with its shape over the FRFs; may be empty. `n_hits` is that of the
+        FRF with the fewest hits.
 
+    Raises
+    ------
+    ValueError
+        As `fit_modes`, for no FRF, for FRFs with different lines, and if the number of lists of hits differs from
+        that of the FRFs.
+
+    Examples
+    --------
     >>> line = np.arange(1.0, 1001.0)
     >>> tip, nose = synthesize_frf([Mode(500.0, 0.02, 2e7)], line), synthesize_frf([Mode(500.0, 0.02, -4e7)], line)
     >>> (mode,) = fit_common_modes([tip, nose])
@@ -179,17 +229,35 @@ def fit_common_modes(
 
 
 STIFFNESS_REMARK_CODES = ("not-driving-point", "near-node")
-"""Remarks on sign and size of K, which decays do not show."""
+"""Codes of remarks on sign and size of K, which free decays do not show."""
 
 
 def fit_decays(decays: ArrayLike, sample_rate: float, band: tuple[float, float] | None = None) -> list[Mode]:
-    """Modes of free decays (m/s^2), shape (p, n), between band[0] and band[1] (Hz), by rising frequency; maybe none.
+    """Fit the modes of free decays, whose force was not measured.
 
-    Natural frequency and damping ratio with their errors; K is NaN, for it needs the force. `decay_spectra`, `extract_modes`
-    and `modes_from_decays` one after the other. sample_rate in Hz.
+    Calls `decay_spectra`, `extract_modes` and `modes_from_decays` one after the other.
 
-    Raises ValueError as `fit_modes`, and for decays of zeros, values that are not finite, or fewer than 32 samples.
+    Parameters
+    ----------
+    decays : array_like, shape (p, n)
+        Accelerations of p free decays (m/s^2).
+    sample_rate : float
+        Sample rate (Hz).
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz).
 
+    Returns
+    -------
+    list of Mode
+        Modes by rising frequency; may be empty. K is NaN, for it needs the force.
+
+    Raises
+    ------
+    ValueError
+        As `fit_modes`, and for decays of zeros, values that are not finite, or fewer than 32 samples.
+
+    Examples
+    --------
     >>> time = np.arange(2048) / 10240.0  # s
     >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.cos(2 * np.pi * 500.0 * np.sqrt(1 - 0.02**2) * time)
     >>> (mode,) = fit_decays([300.0 * decay, 200.0 * decay, 250.0 * decay], 10240.0)  # m/s^2, Hz
@@ -200,17 +268,36 @@ def fit_decays(decays: ArrayLike, sample_rate: float, band: tuple[float, float] 
 
 
 def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
-    """Spectra of free decays (m/s^2), shape (p, n), each as the FRF of a force of 1 N s at its first sample.
+    """Return the spectra of free decays, each as the FRF of a force of 1 N s at its first sample.
 
     The spectrum of a decay that begins at once and has ended with the record is the sum of r / (i w - lambda): the
-    poles are those of the structure; what the hit was, and when, is in r alone, another one for each decay. So they
-    are fitted together with common poles and never averaged. What is left of the force after the first sample is
-    smooth over the lines of a mode, and does not move its pole either.
+    poles are those of the structure. Hammer and hit time affect r alone, which differs from decay to decay. So the
+    spectra are fitted together with common poles and never averaged. A force that lasts beyond the first sample is
+    smooth over the lines of a mode and does not move its pole either.
 
-    sample_rate in Hz. Raises ValueError for fewer than 32 samples, values that are not finite, and decays of one value.
+    Parameters
+    ----------
+    decays : array_like, shape (p, n)
+        Accelerations of p free decays (m/s^2).
+    sample_rate : float
+        Sample rate (Hz).
 
-    Source: Ewins, Modal Testing, ch. 2 and 4; Brown, Allemang, Zimmerman & Mergeay (1979), SAE paper 790221.
+    Returns
+    -------
+    list of Frf
+        One spectrum per decay.
 
+    Raises
+    ------
+    ValueError
+        For fewer than 32 samples, values that are not finite, and decays of one value.
+
+    References
+    ----------
+    Ewins, Modal Testing, ch. 2 and 4; Brown, Allemang, Zimmerman & Mergeay (1979), SAE paper 790221.
+
+    Examples
+    --------
     >>> time = np.arange(2048) / 10240.0  # s
     >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.sin(2 * np.pi * 500.0 * time)
     >>> (spectrum,) = decay_spectra([300.0 * decay], 10240.0)
@@ -227,11 +314,24 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
 
 
 def modes_from_decays(state: Extraction) -> list[Mode]:
-    """Modes of an extraction from `decay_spectra`, by rising frequency.
+    """Return the modes of an extraction from `decay_spectra` by rising frequency.
 
-    From three decays on with errors over the decays: each one moves the common values by its part of a Gauss-Newton
-    step, and these parts scatter as whatever differs from decay to decay does (a sandwich with the decays as clusters).
-    Source: Liang & Zeger (1986), Biometrika 73, 13.
+    With three decays or more the errors come from the scatter of the decays: each one moves the common values by its
+    part of a Gauss-Newton step (a sandwich estimate with the decays as clusters).
+
+    Parameters
+    ----------
+    state : Extraction
+        Extraction of decay spectra.
+
+    Returns
+    -------
+    list of Mode
+        Modes without stiffness.
+
+    References
+    ----------
+    Liang & Zeger (1986), Biometrika 73, 13.
     """
     pairs = [pair for band in state.bands for pair in _decay_modes(state, band)]
     highest = max((height for _, height in pairs), default=1.0)
@@ -240,7 +340,7 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 
 
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
-    """Modes of a band with the heights of their peaks, rms over the decays."""
+    """Return the modes of a band with their peak heights, rms over the decays."""
     enough = len(state.frfs) >= MIN_HITS_FOR_JACKKNIFE
     modes = modes_from_band(
         state, band, 0, _decay_covariance(band) if enough else None, len(state.frfs) if enough else 0
@@ -250,7 +350,7 @@ def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, fl
 
 
 def _decay_covariance(band: FittedBand) -> Floats:
-    """Covariance of the values of a band by how its decays pull at them; shape as `BandFit.covariance`."""
+    """Return the covariance of the values of a band from the scatter of its decays; shape as `BandFit.covariance`."""
     fit, count = band.fit, len(band.fit.constant)
     parts = fit.residual.reshape(count, -1)
     pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
@@ -259,7 +359,7 @@ def _decay_covariance(band: FittedBand) -> Floats:
 
 
 def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
-    """What decays tell of a mode."""
+    """Remove the values of a mode that need the force."""
     return replace(
         mode,
         stiffness=np.nan,
@@ -275,7 +375,7 @@ def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
 
 
 def _pole_covariance(covariance: Floats | None) -> Floats | None:
-    """That of frequency and damping ratio; NaN for the stiffness."""
+    """Return the covariance with NaN for the stiffness."""
     if covariance is None:
         return None
     known = np.full((3, 3), np.nan)

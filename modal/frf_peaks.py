@@ -13,20 +13,40 @@ from modal.bands.frf_lines import usable_lines
 from modal.modes.mode import Mode
 
 PEAK_SEARCH_HALF_WIDTHS = 2.5
-"""The extremes are looked for within this many half-widths of the peak; a single mode has them at one."""
+"""Half-widths around a peak in which its extremes are searched; a single mode has them at one."""
 
 
 def pick_peaks(frf: Frf, band: tuple[float, float] | None = None) -> list[Mode]:
-    """Modes between band[0] and band[1] (Hz) from three points of the receptance G each; maybe none.
+    """Estimate modes by peak picking, from three points of the receptance G each.
 
     f_n is at the extreme of Im G, f_a < f_b at the extremes of Re G on its two sides, each between lines by a
     parabola: zeta = (f_b - f_a)/(2 f_n) (eq. 28) and K = -1/(2 zeta Im G(f_n)) (eq. 29). Exact as zeta goes to 0:
-    for one mode alone zeta comes out too large by zeta^2 of itself, and neighbours and noise are not allowed for.
+    for a single mode zeta is too large by zeta^2 of itself. Neighbours and noise are not allowed for.
     A peak without both extremes of Re G near it is left out.
-    Source: Gaber & Hashemi (2015), eqs. (28)-(29).
 
-    Raises ValueError as `fit_modes`.
+    Parameters
+    ----------
+    frf : Frf
+        Measured FRF.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz).
 
+    Returns
+    -------
+    list of Mode
+        Modes by rising frequency; may be empty.
+
+    Raises
+    ------
+    ValueError
+        As `fit_modes`.
+
+    References
+    ----------
+    Gaber & Hashemi (2015), eqs. (28)-(29).
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(300.0, 700.0, 0.1))
     >>> (picked,) = pick_peaks(frf)
     >>> f"{picked.frequency:.1f} Hz, {picked.damping_ratio:.4f}, {picked.stiffness / 1e6:.2f} N/um"
@@ -55,7 +75,7 @@ def _pick_mode(frf: Frf, resonance: Resonance) -> Mode | None:
 
 
 def _parabola_peak(f: Floats, values: Floats, near: slice) -> tuple[float, float] | None:
-    """Top of a parabola through the largest value and its neighbours, place and height; None where it has none."""
+    """Return place and height of the parabola through the largest value and its neighbours; None at the ends."""
     i = int(np.argmax(values[near])) + near.start
     if i in (near.start, min(near.stop, f.size) - 1):
         return None
@@ -67,12 +87,33 @@ def _parabola_peak(f: Floats, values: Floats, near: slice) -> tuple[float, float
 
 
 def mode_indicator(frfs: Sequence[Frf]) -> Floats:
-    """Mode indicator 1 - sum |Re G| |G| / sum |G|^2 over the receptances G, on every line, shape (n,).
+    """Return the mode indicator 1 - sum |Re G| |G| / sum |G|^2 over the receptances G of several points.
 
-    It comes near 1 where all points move a quarter period behind the force, at the natural frequency of a real mode
-    that stands alone, and near 0 elsewhere. Zero where nothing moves. Raises ValueError for no FRF and for FRFs with
-    different lines. Source: Hunt, Vold, Peterson & Williams (1984), SAE 841581.
+    It comes near 1 if all points move a quarter period behind the force, at the natural frequency of a single real
+    mode,
+    and near 0 elsewhere. It is zero where nothing moves.
 
+    Parameters
+    ----------
+    frfs : sequence of Frf
+        FRFs with one frequency axis.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Indicator on every line (-).
+
+    Raises
+    ------
+    ValueError
+        For no FRF and for FRFs with different lines.
+
+    References
+    ----------
+    Hunt, Vold, Peterson & Williams (1984), SAE 841581.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7)], [250.0, 500.0])
     >>> mode_indicator([frf]).round(3).tolist()  # 1 at the natural frequency
     [0.0, 1.0]
@@ -90,19 +131,43 @@ def mode_indicator(frfs: Sequence[Frf]) -> Floats:
 
 
 MIN_INNER_PEAK_RATIO = 10 ** (1 / 20)
-"""A line inside that is this many times as high as the edge is a peak of its own."""
+"""Height of a line inside over that of the edge line from which it is a peak of its own."""
 MIN_REAL_PART_DROP = 0.7
-"""Where |mobility| of a mode has fallen to 1/sqrt(2) its real part, as |mobility|^2, is halved; before an antiresonance
-it stays."""
+"""Largest real part at the half-power point over that at the edge.
+
+|mobility| of a mode has fallen to 1/sqrt(2) there and its real part, as |mobility|^2, to 1/2; before an antiresonance
+the real part stays.
+"""
 
 
 def find_truncated_peaks(frf: Frf, modes: Sequence[Mode], band: tuple[float, float] | None = None) -> list[float]:
-    """First and last line (Hz) between band[0] and band[1] where a peak may be cut that none of the modes accounts for.
+    """Return the first or last line if the band cuts a peak there that no mode accounts for.
 
-    There |mobility| falls from the edge inwards below 1/sqrt(2) of its value and is more real than imaginary, as it
-    is between the half-power points of a mode; on the line of a mass or a spring it is imaginary. Its real part
-    falls with it, which it does not between a peak and an antiresonance. Raises ValueError as `usable_lines`.
+    There |mobility| falls from the edge inwards below 1/sqrt(2) of its value and is more real than imaginary, as
+    between the half-power points of a mode; on the line of a mass or a spring it is imaginary. Its real part
+    falls with it, which it does not between a peak and an antiresonance.
 
+    Parameters
+    ----------
+    frf : Frf
+        Measured FRF.
+    modes : sequence of Mode
+        Fitted modes.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz).
+
+    Returns
+    -------
+    list of float
+        Frequencies of the edge lines (Hz).
+
+    Raises
+    ------
+    ValueError
+        If fewer than two lines lie in the band.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(505.0, 1001.0))  # begins on the flank of a peak
     >>> find_truncated_peaks(frf, [])
     [505.0]
@@ -123,7 +188,7 @@ def find_truncated_peaks(frf: Frf, modes: Sequence[Mode], band: tuple[float, flo
 
 
 def _falls_like_peak(mobility: Complexes, least: float) -> bool:
-    """Whether it falls from its first line like a peak, and is higher there than the least."""
+    """Return whether the mobility falls from its first line like a peak and is higher there than the least."""
     size = np.abs(mobility)
     low = np.flatnonzero(size < size[0] / np.sqrt(2))
     if not low.size or low[0] < 2 or size[0] < least or np.max(size[: low[0]]) > MIN_INNER_PEAK_RATIO * size[0]:
@@ -133,11 +198,23 @@ def _falls_like_peak(mobility: Complexes, least: float) -> bool:
 
 
 def find_peaks_above_band(frf: Frf) -> list[float]:
-    """Frequencies of the resonances above the usable band (Hz); none where it is not known, or no line lies there.
+    """Return the frequencies of resonances above the usable band, where the hammer hardly reached.
 
+    Parameters
+    ----------
+    frf : Frf
+        FRF with a usable band.
+
+    Returns
+    -------
+    list of float
+        Frequencies (Hz); empty if the band is unknown or no line lies above it.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(1800.0, 0.02, 2e7)], np.arange(1.0, 2001.0))
     >>> from dataclasses import replace
-    >>> [round(f) for f in find_peaks_above_band(replace(frf, find_usable_band=(1.0, 1500.0)))]  # Hz: the hammer did not reach it
+    >>> [round(f) for f in find_peaks_above_band(replace(frf, usable_band=(1.0, 1500.0)))]  # Hz
     [1800]
     """
     if frf.usable_band is None:

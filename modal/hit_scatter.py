@@ -17,11 +17,12 @@ from modal.quality.trust import Trust, assess_trust
 
 
 def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> Floats:
-    """Covariance of the values of one band by the noise of the hammer inside the force windows of the hits of FRF i.
+    """Return the covariance of a band by the hammer noise inside the force windows of the hits of FRF i.
 
-    Each sample of that noise shifts all lines of the FRF together (`propagate_force_noise`), and the modes by one Gauss-Newton
-    step; shape as `BandFit.covariance`, 0 without hits. Where a mass was taken off (`remove_sensor_mass`), an FRF without it
-    shifts by 1 - mass w^2 H of what the measured one does.
+    Each sample of that noise shifts all lines of the FRF together (`propagate_force_noise`), and the modes by one
+    Gauss-Newton step. Shape as `BandFit.covariance`, 0 without hits. If a mass was subtracted (`remove_sensor_mass`),
+    the
+    FRF without it shifts by 1 - mass w^2 H times the measured one.
     """
     part, frf = band.lines, state.frfs[i]
     real, imaginary = np.hsplit(band.fit.influence_of(i), 2)
@@ -34,15 +35,13 @@ def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequenc
 
 
 MIN_HITS_FOR_JACKKNIFE = 3
-"""With two the interval would be 6 times wider than the error is likely to be."""
+"""Fewest hits of a jackknife; with two the interval would be 6 times wider than the likely error."""
 
 
 def leave_one_out_frfs(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
-    """FRFs (H1) of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
+    """Return the FRFs (H1) of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
 
-    The spectra of each hit are worked out once, and taken from their sum.
-
-    Raises ValueError where a hit has other lines than the FRF.
+    Raises ValueError if a hit has other lines than the FRF.
     """
     parts = [_matching_lines(hit, frf) for hit in hits]
     if len(hits) < MIN_HITS_FOR_JACKKNIFE:
@@ -56,7 +55,7 @@ def leave_one_out_frfs(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
 
 
 def _matching_lines(hit: Hit, frf: Frf) -> slice:
-    """Those of frf among the lines above 0 Hz that an FRF of this hit has."""
+    """Return the slice of the lines above 0 Hz of a hit that are those of the FRF."""
     frequency = np.fft.rfftfreq(hit.force.size, 1 / hit.sample_rate)[1:]
     first = int(np.searchsorted(frequency, frf.frequency[0]))
     part = slice(first, first + frf.frequency.size)
@@ -66,7 +65,7 @@ def _matching_lines(hit: Hit, frf: Frf) -> slice:
 
 
 def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf]) -> Floats:
-    """Covariance of the values of one band, (n - 1)/n times the sum of squares over FRF i without one hit each.
+    """Return the jackknife covariance of a band, (n - 1)/n times the sum of squares over FRF i without one hit each.
 
     Each is refitted by one Gauss-Newton step from the fit to all hits, which is exact to first order in the change;
     shape as `BandFit.covariance`. Source: Efron & Stein (1981), The jackknife estimate of variance, Annals of
@@ -78,9 +77,9 @@ def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: S
 
 
 def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:
-    """What the values of a band change by when FRF i is one of these instead of the reference (m/N, on its lines).
+    """Return the first-order changes of a band if FRF i is replaced by each of `without`.
 
-    A row each, to first order; columns as `BandFit.covariance`.
+    One row each, against the reference (m/N, on the lines of the band); columns as `BandFit.covariance`.
     """
     part = band.lines
     change = (np.array([frf.receptance[part] for frf in without]) - reference) * state.weight[i, part]
@@ -88,19 +87,19 @@ def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[
 
 
 MIN_HITS_FOR_LINEARITY = 6
-"""Hits that a slope is told from, at least."""
+"""Fewest hits of a linearity check."""
 MIN_LINEARITY_FORCE_RATIO = 1.3
-"""Force of the hardest hit over that of the softest, at least."""
+"""Least force of the hardest hit over that of the softest."""
 MIN_LINEARITY_CHANGE = 1e-3
-"""Relative change of the frequency from the softest hit to the hardest that is worth saying; chosen."""
+"""Least relative change of frequency from the softest hit to the hardest that is reported; chosen."""
 LINEARITY_CONFIDENCE = 0.9995
-"""Probability that chance gives no such slope to one side."""
+"""One-sided confidence of the slope."""
 
 
 def add_linearity_remarks(
     state: Extraction, band: FittedBand, modes: Sequence[Mode], hits: Sequence[Hit], without: Sequence[Frf]
 ) -> list[Mode]:
-    """Modes of a band, the trusted ones whose frequency surely changes with the force of single hits with a remark.
+    """Add a remark to trusted modes whose frequency changes with the force of the hit.
 
     hits: those of the driving point; without: its FRF without each of them. H1 weighs a hit by its power p: with all of
     them it is the mean by p, so that one hit alone is as far from it as the FRF without it, times -(sum p - p)/p. A
@@ -114,7 +113,7 @@ def add_linearity_remarks(
 
 
 def _change_per_hit(change: Floats, power: Floats) -> Floats:
-    """Change of the frequency (Hz) of single hits against all, from that without each."""
+    """Return the frequency changes (Hz) of single hits against all, from those without each."""
     return np.asarray(-change * (np.sum(power) - power) / power)
 
 
@@ -133,7 +132,7 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Slope and its standard error, weighted by x^2."""
+    """Return the slope and its standard error, weighted by x^2."""
     columns = np.column_stack([x, x**2])
     value, *_ = np.linalg.lstsq(columns, x * y, rcond=None)
     left = x * y - columns @ value

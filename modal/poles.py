@@ -22,10 +22,10 @@ class OrthogonalBasis:
     values: Complexes
     """Weight times p_k on each line, shape (lines, n + 1)."""
     recurrence: Complexes
-    """Shape (n + 1, n)."""
+    """Recurrence coefficients, shape (n + 1, n)."""
 
     def roots(self, coefficients: Complexes) -> Complexes:
-        """Zeros of sum of coefficients[k] p_k, k = 0 .. m, by the eigenvalues of its comrade matrix, shape (m,)."""
+        """Return the zeros of sum of coefficients[k] p_k, k = 0 .. m, by the comrade matrix, shape (m,)."""
         m = coefficients.size - 1
         comrade = self.recurrence[:m, :m].copy()
         comrade[:, -1] -= self.recurrence[m, m - 1] * coefficients[:m] / coefficients[m]
@@ -33,7 +33,7 @@ class OrthogonalBasis:
 
 
 def orthogonal_basis(x: Floats, weight: Complexes, order: int) -> OrthogonalBasis:
-    """Basis up to this order at x, shape (lines,), with these weights, shape (lines,)."""
+    """Build the basis up to this order at x, shape (lines,), with these weights, shape (lines,)."""
     rows = np.empty((order + 1, x.size), dtype=np.complex128)
     recurrence = np.zeros((order + 1, order), dtype=np.complex128)
     rows[0] = weight / np.linalg.norm(weight)
@@ -51,23 +51,23 @@ def orthogonal_basis(x: Floats, weight: Complexes, order: int) -> OrthogonalBasi
 _OrderPoles = tuple[Complexes, Complexes]
 
 EXTRA_POLYNOMIAL_DEGREE = 2
-"""Degree of the polynomial that stands for all poles outside the band, negative frequencies among them."""
+"""Degree of the polynomial for all poles outside the band, negative frequencies included."""
 MAX_LSCF_LINES = 600
-"""Lines that poles are computed from; of more, every so many."""
+"""Most lines that poles are computed from; longer axes are thinned."""
 LSCF_RIDGE = 1e-12
-"""Added to the unit diagonal of the normal equations for the residues, so that coinciding poles can be solved for."""
+"""Ridge added to the unit diagonal of the normal equations for the residues, for coinciding poles."""
 POLE_TOLERANCE = 0.25
-"""A pole is stable where one of the order below lies within this many half-power half-widths ..."""
+"""Largest distance of a stable pole from one of the order below (half-power half-widths)."""
 FLEXIBILITY_TOLERANCE = 0.35
-"""... with a modal flexibility that differs by less than this share of its own."""
+"""Largest relative change of the modal flexibility of a stable pole."""
 
 
 @dataclass(frozen=True, eq=False)
 class StabilisationChart:
-    """Poles of all orders, shape (k,), lower orders first; those that decay and lie inside the band."""
+    """Poles of all model orders that decay and lie inside the band, lower orders first."""
 
     order: Integers
-    """Order of the model: the number of poles it has, shape (k,)."""
+    """Order of the model: its number of poles, shape (k,)."""
     frequency: Floats
     """Undamped natural frequency (Hz), shape (k,)."""
     damping_ratio: Floats
@@ -75,7 +75,7 @@ class StabilisationChart:
     flexibility: Complexes
     """Modal flexibility 1/K, complex (m/N), in each of p FRFs, shape (k, p)."""
     previous: Integers
-    """Place of the same pole at the order below, -1 where there is none (the pole is not stable), shape (k,)."""
+    """Index of the same pole at the order below, -1 if there is none (the pole is not stable), shape (k,)."""
 
     @property
     def stable(self) -> Flags:
@@ -84,20 +84,39 @@ class StabilisationChart:
 
 
 def fit_lscf_poles(frequency: Floats, receptance: Complexes, weight: Floats, orders: int) -> StabilisationChart:
-    """Poles of the models of order 1 .. orders, fitted to H = B/A with complex polynomials of the frequency.
+    """Fit poles of the models of order 1 .. orders by LSCF: H = B/A with complex polynomials of the frequency.
 
-    The weighted error w (A H - B) is linear in the coefficients; B, of a degree higher by two than A, is eliminated
-    first, and what is left gives A of every order from one matrix. frequency (Hz) has shape (n,), receptance (m/N)
-    and weight (p, n); several FRFs share their poles. Both bases are orthonormal over the lines, which may be
-    spaced unevenly and begin anywhere.
+    The weighted error w (A H - B) is linear in the coefficients. B, whose degree is two higher than that of A, is
+    eliminated first; the rest gives A of every order from one matrix. Several FRFs share their poles. Both bases are
+    orthonormal over the lines, which may be spaced unevenly and begin anywhere.
 
-    Source: Peeters et al. (2004), The PolyMAX frequency-domain method, Shock and Vibration 11, 395; Richardson &
+    Parameters
+    ----------
+    frequency : ndarray, shape (n,)
+        Frequencies (Hz).
+    receptance : ndarray, shape (p, n)
+        Receptances of p FRFs (m/N).
+    weight : ndarray, shape (p, n)
+        Weights of the lines.
+    orders : int
+        Highest order.
+
+    Returns
+    -------
+    StabilisationChart
+        Poles of all orders.
+
+    References
+    ----------
+    Peeters et al. (2004), The PolyMAX frequency-domain method, Shock and Vibration 11, 395; Richardson &
     Formenti (1982), Parameter estimation from FRF measurements using rational fraction polynomials, IMAC 1.
 
+    Examples
+    --------
     >>> line = np.linspace(400.0, 600.0, 201)  # Hz
     >>> receptance = Mode(500.0, 0.02, 2e7).receptance(line)[np.newaxis]  # m/N, (1, 201)
-    >>> compute_lobe_chart = fit_lscf_poles(line, receptance, np.ones((1, 201)), orders=1)
-    >>> compute_lobe_chart.order.tolist(), compute_lobe_chart.frequency.round(2).tolist(), compute_lobe_chart.damping_ratio.round(4).tolist()  # -, Hz, -
+    >>> chart = fit_lscf_poles(line, receptance, np.ones((1, 201)), orders=1)
+    >>> chart.order.tolist(), chart.frequency.round(2).tolist(), chart.damping_ratio.round(4).tolist()  # -, Hz, -
     ([1], [500.0], [0.02])
     """
     orders = min(orders, (2 * frequency.size - 2 * EXTRA_POLYNOMIAL_DEGREE) // 6)
@@ -114,7 +133,7 @@ class _LscfModel:
 
     @property
     def x(self) -> Floats:
-        """Frequency on -1 .. 1."""
+        """Frequency scaled to -1 .. 1."""
         return (self.frequency - self.middle) / self.half
 
     @property
@@ -127,7 +146,7 @@ class _LscfModel:
 
 
 def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
-    """Poles (complex frequencies, Hz) inside the band and their flexibilities (k, p), order by order."""
+    """Yield the poles inside the band (complex frequencies, Hz) and their flexibilities (k, p), order by order."""
     p, n = model.receptance.shape
     if orders < 1:
         return
@@ -146,13 +165,13 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
 
 
 def _is_inside_band(model: _LscfModel, poles: Complexes) -> Flags:
-    """Which of the poles decay and lie in the band."""
+    """Return which poles decay and lie in the band."""
     size = np.abs(poles)
     return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
 
 
 def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Complexes) -> Complexes:
-    """Complex 1/K of every pole by linear least squares, shape (k, p)."""
+    """Return the complex 1/K of every pole by linear least squares, shape (k, p)."""
     fractions = 1 / (model.frequency[:, None] - poles)
     residues = np.empty((poles.size, len(above)), dtype=np.complex128)
     for i, basis in enumerate(above):
@@ -165,7 +184,7 @@ def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Compl
 
 
 def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> Integers:
-    """For each pole its place among the poles of the order below, -1 where it is not there."""
+    """Return for each pole its index among the poles of the order below, -1 if it is not there."""
     if not below[0].size:
         return np.full(here[0].size, -1)
     distance = np.abs(here[0][:, None] - below[0])
@@ -195,12 +214,12 @@ def _build_chart(orders: list[_OrderPoles], p: int) -> StabilisationChart:
 
 
 MIN_STABLE_ORDERS = 4
-"""Orders in a row that a mode is stable in, at least."""
+"""Fewest consecutive orders in which a mode is stable."""
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicalPoles:
-    """Poles that stay where they are as the order grows, m of them, by rising frequency."""
+    """Poles that stay in place as the order grows, m of them, by rising frequency."""
 
     frequency: Floats
     """Undamped natural frequencies (Hz), shape (m,)."""
@@ -209,25 +228,37 @@ class PhysicalPoles:
     flexibility: Complexes
     """Modal flexibilities 1/K, complex (m/N), in each of p FRFs, shape (m, p)."""
     n_orders: Integers
-    """Orders that each is stable in, shape (m,)."""
+    """Number of orders in which each pole is stable, shape (m,)."""
 
     @property
     def largest(self) -> Floats:
-        """Size of each flexibility in the FRF where it is largest (m/N), shape (m,)."""
+        """Size of each flexibility in the FRF with the largest (m/N), shape (m,)."""
         return np.asarray(np.abs(self.flexibility).max(axis=1))
 
 
 def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
-    """Chains of poles, each the same as that of the order below (by frequency, damping and flexibility).
+    """Select the poles of a stabilisation chart that are stable over at least four orders.
 
-    Of chains that share a pole the longest counts; a chain of fewer than five poles is none. A mode is the median of
-    the upper half of its chain, part by part.
+    Poles form chains, each pole the same as one of the order below (by frequency, damping and flexibility).
+    Of chains that share a pole the longest counts. A mode is the median of the upper half of its chain.
 
+    Parameters
+    ----------
+    chart : StabilisationChart
+        Poles of all orders.
+
+    Returns
+    -------
+    PhysicalPoles
+        Stable poles.
+
+    Examples
+    --------
     >>> line = np.linspace(400.0, 600.0, 201)  # Hz
-    >>> noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, 201))  # m/N, beside a peak of 1.25e-6
+    >>> noise = np.random.default_rng(1).normal(0.0, 2e-9, (2, 201))  # m/N, a peak has 1.25e-6
     >>> measured = Mode(500.0, 0.02, 2e7).receptance(line) + noise[0] + 1j * noise[1]
-    >>> compute_lobe_chart = fit_lscf_poles(line, measured[np.newaxis], np.ones((1, 201)), orders=10)
-    >>> poles = select_physical_poles(compute_lobe_chart)  # of all 55 those that stay where they are
+    >>> chart = fit_lscf_poles(line, measured[np.newaxis], np.ones((1, 201)), orders=10)
+    >>> poles = select_physical_poles(chart)  # of all 55 those that stay in place
     >>> poles.frequency.round(1).tolist(), poles.damping_ratio.round(3).tolist()  # Hz, -
     ([500.0], [0.02])
     """
@@ -247,7 +278,7 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
 
 
 def _chain_lengths(chart: StabilisationChart) -> Integers:
-    """Stable poles in the chain that ends at each pole."""
+    """Return the number of stable poles in the chain that ends at each pole."""
     lengths = np.zeros(chart.order.size, dtype=np.int64)
     for i in np.flatnonzero(chart.stable):
         lengths[i] = lengths[chart.previous[i]] + 1
@@ -255,7 +286,7 @@ def _chain_lengths(chart: StabilisationChart) -> Integers:
 
 
 def _trace_chain(chart: StabilisationChart, end: int) -> Integers:
-    """Places of the poles of the chain that ends here, the last one first."""
+    """Return the indices of the poles of the chain that ends here, the last one first."""
     chain = [end]
     while chart.previous[chain[-1]] >= 0:
         chain.append(int(chart.previous[chain[-1]]))

@@ -25,43 +25,43 @@ DOFS_ACROSS_JOINT = 4
 
 
 class CalibratedSprings(NamedTuple):
-    """The springs that have a common factor, m of them, and the shaft without them."""
+    """Springs with a common factor, m of them, and the shaft without them."""
 
     parts: tuple[int, ...]
-    """Places in (*bearings, *joints) of what the springs belong to; a joint has two."""
+    """Indices in (*bearings, *joints) of the parts of the springs; a joint has two."""
     model: DynamicStiffness
-    """The shaft without these springs."""
+    """Shaft without these springs."""
     forces: Floats
-    """Pairs of forces across the springs, times the roots of their stiffness and the model's scale, (n_dofs, m)."""
+    """Pairs of forces across the springs, times the roots of their stiffness and the model scale, (n_dofs, m)."""
     housing: Floats
     """Compliance of the housings with the same weights, shape (m, m), diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
 class BearingEigenproblem:
-    """Eigenpairs of the compliance at the calibrated springs of bearings and joints, these springs taken away.
+    """Eigenproblem of the compliance at the calibrated springs, on the shaft without them.
 
     With R = B^T K(w)^-1 B + 1/k_housing, each spring weighted with the root of its stiffness, w is a natural frequency
-    where -1/factor is an eigenvalue of R.
+    if -1/factor is an eigenvalue of R.
     """
 
     springs: CalibratedSprings
     """The calibrated springs."""
     w2: Floats
-    """Square of the angular frequency ((rad/s)^2), shape (n,)."""
+    """Squared angular frequencies ((rad/s)^2), shape (n,)."""
     below: Indices
     """Number of modes of the shaft without these springs below each frequency, shape (n,)."""
     response: Floats
-    """K^-1 B with the weights, over the scale of the model: response of all dofs, shape (n, n_dofs, n_springs)."""
+    """Response K^-1 B of all dofs with the weights, over the scale of the model, shape (n, n_dofs, n_springs)."""
     values: Floats
     """Eigenvalues, rising, shape (n, n_springs)."""
     vectors: Floats
     """Eigenvectors in columns, shape (n, n_springs, n_springs)."""
 
     def pick(self, mode: int) -> Indices:
-        """Index of the eigenvalue that belongs to a mode (1 is the lowest), shape (n,); -1 where there is none.
+        """Return the index of the eigenvalue of a mode (1 is the lowest), shape (n,); -1 if there is none.
 
-        Of the eigenvalues in rising order it is number N - mode (0 is the first), N the number of modes of the shaft
+        In rising order it is number N - mode (0 is the first), N the number of modes of the shaft
         without these springs below w: each factor that passes through such a value moves one mode past w.
         """
         index = self.below - mode
@@ -70,7 +70,7 @@ class BearingEigenproblem:
         return np.where(found & (value < 0), index, -1)
 
     def sensitivity(self, index: int) -> float:
-        """d ln f / d ln k for an eigenvalue at the first frequency.
+        """Return d ln f / d ln k for an eigenvalue at the first frequency.
 
         With -1/factor = v^T R v it is d(v^T R v)/d(w^2) = -phi^T (dK/d w^2) phi, phi = K^-1 B v.
         """
@@ -79,10 +79,10 @@ class BearingEigenproblem:
 
 
 def bearing_eigenproblem(spindle: Spindle, frequency: Floats, group: str | None = None) -> BearingEigenproblem:
-    """The eigenproblem of the parts of a group (see calibrated_parts) at frequencies (Hz, (n,), > 0).
+    """Build the eigenproblem of the parts of a group (see calibrated_parts) at frequencies (Hz, (n,), > 0).
 
-    One factor of K a frequency gives the response and, by its negative pivots, the count of modes. Raises ValueError
-    where there is no such part, for a rigid bearing, and for a shaft not held.
+    One factor of K per frequency gives the response and, by its negative pivots, the count of modes. Raises ValueError
+    if there is no such part, for a rigid bearing, and for an unsupported shaft.
     """
     springs = _calibrated_springs(spindle, 2.0 ** (math.ceil(4 * math.log2(np.max(frequency, initial=1.0))) / 4), group)
     w2 = (2 * np.pi * frequency) ** 2
@@ -96,7 +96,6 @@ def bearing_eigenproblem(spindle: Spindle, frequency: Floats, group: str | None 
 
 @lru_cache(maxsize=32)
 def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | None) -> CalibratedSprings:
-    """Springs of the same spindle are not looked up twice."""
     require_support(spindle)
     chosen = calibrated_parts(spindle, group)
     model = assemble(spindle, top_frequency, left_out=chosen)
@@ -115,9 +114,9 @@ def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | Non
 
 
 def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
-    """Factor on the bearing stiffnesses that puts a mode (1 is the lowest) at each frequency; NaN where none does.
+    """Return the factor on the bearing stiffnesses that puts a mode at each frequency; NaN if none does.
 
-    frequency: (n,) Hz, > 0; shape of the result (n,). group: the bearings that the factor is for; None: all that have
+    frequency: (n,) Hz, > 0; shape of the result (n,). group: bearings that the factor is for; None: all that have
     a group. One eigenproblem of the order of the number of bearings for each frequency.
     """
     f = check_frequencies(frequency)
@@ -130,13 +129,33 @@ def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, grou
 
 
 def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
-    """Bearing stiffness (N/m) for which each frequency is that mode, shape (n,); NaN where it cannot be.
+    """Compute the bearing stiffness for which a mode has each frequency.
 
-    frequency: (n,) Hz, > 0. The stiffnesses keep their given ratios; what is returned is their mean over the group
-    (None: over all bearings that have one), the common stiffness where all are equal. Raises ValueError for
-    frequencies that are not > 0, and as calibrate for the bearings. Figure 8 of Gaber & Hashemi, Shock and Vibration,
-    2015, is such a curve.
+    The stiffnesses keep their given ratios. Figure 8 of Gaber & Hashemi, Shock and Vibration, 2015, is such a curve.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    frequency : array_like, shape (n,)
+        Frequencies (Hz), > 0.
+    mode : int
+        Number of the mode; 1 is the lowest.
+    group : str, optional
+        Group of bearings and joints. Default: all bearings with a group.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Mean stiffness of the group (N/m); NaN if no stiffness gives the frequency.
+
+    Raises
+    ------
+    ValueError
+        For frequencies that are not > 0, and as calibrate for the bearings.
+
+    Examples
+    --------
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> f = natural_frequencies(spindle, 1)[0]
     >>> (stiffness_curve(spindle, [f, 0.9 * f, 3 * f]) / 1e6).round(1).tolist()  # N/um; no bearing gives the last one
@@ -147,35 +166,58 @@ def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group
 
 
 LOOSE_JOINT_FACTOR = 1e-9
-"""Factor on the stiffness of a joint that stands for none."""
+"""Factor on the stiffness of a joint that counts as absent."""
 STANDARD_ERRORS_95_PERCENT = 1.96
-"""Standard errors either way that 95 % stay within."""
+"""Half-width of a 95 % interval (standard errors)."""
 
 
 def calibrate(
     spindle: Spindle, frequency: float, frequency_std: float | None = None, mode: int = 1, group: str | None = None
 ) -> Calibration:
-    """Scale bearing stiffnesses by one factor, so that a mode (1 is the lowest) has its measured frequency (Hz).
+    """Scale bearing stiffnesses by one factor, so that a mode has its measured frequency.
 
-    The given stiffnesses say only in which ratio the bearings share; equal ones make one unknown stiffness of them.
-    group: the bearings and joints that are scaled; None: all bearings that have a group, and no joint, whose wear one
-    frequency cannot tell from theirs (fit_stiffness with several can, and takes all groups). The factor is exact, from
-    an eigenvalue problem of the order of the number of bearings, and a count of modes says which eigenvalue it is; its
-    standard error follows from that of the frequency (`frequency_std`, Hz) by the chain rule. Near the limit of rigid
-    bearings the frequency is straight in 1/k, not in k: the 95 % interval of the stiffness is that of the frequency,
-    end by end. Stiffness of bearings against tilting and of the housing stays as it is.
+    The given stiffnesses define only the ratio of the bearings. The factor is exact, from
+    an eigenvalue problem of the order of the number of bearings; a count of modes selects the eigenvalue. Its
+    standard error follows from that of the frequency by the chain rule. Near the limit of rigid
+    bearings the frequency is linear in 1/k, not in k: the 95 % interval of the stiffness is that of the frequency,
+    end by end. Stiffness of bearings against tilting and of the housing is unchanged.
 
-    Raises UnreachableFrequencyError where the frequency lies outside what the springs can do, ValueError for a
-    frequency not > 0, a shaft that is not held, and a group with no bearing or a rigid one.
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    frequency : float
+        Measured frequency (Hz).
+    frequency_std : float, optional
+        Standard error of the frequency (Hz).
+    mode : int
+        Number of the mode; 1 is the lowest.
+    group : str, optional
+        Group of bearings and joints. Default: all bearings with a group, and no joint, whose wear one
+        frequency cannot separate from theirs (fit_stiffness with several can, and takes all groups).
 
-    Bearings that left the works with 250 N/um, and the frequency of a spindle that has run for some years:
+    Returns
+    -------
+    Calibration
+        Recalibrated spindle with stiffness and error.
+
+    Raises
+    ------
+    UnreachableFrequencyError
+        If the frequency lies outside the range of the springs.
+    ValueError
+        For a frequency not > 0, an unsupported shaft, and a group with no bearing or a rigid one.
+
+    Examples
+    --------
+    Bearings with 250 N/um when new, and the frequency of a spindle that has run for some years:
 
     >>> new = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> measured = 0.95 * natural_frequencies(new, 1)[0]
     >>> now = calibrate(new, measured, frequency_std=2.0)
     >>> format_with_error(now.bearing_stiffness, now.bearing_stiffness_std, 1e6, "N/um"), round(now.factor, 3)
     ('222.2 ± 1.0 N/um', 0.889)
-    >>> abs(now.residual) < 1e-6  # Hz: solved anew
+    >>> abs(now.residual) < 1e-6  # Hz: solved again
     True
     """
     _check_frequency(frequency, frequency_std, mode)
@@ -185,16 +227,17 @@ def calibrate(
     if index < 0:
         raise _unreachable_error(spindle, frequency, mode, chosen)
     factor, sensitivity = float(-1 / problem.values[0, index]), problem.sensitivity(index)
-    stiffness = factor * parts_stiffness(spindle, chosen)
+    stiffness, std, interval = factor * parts_stiffness(spindle, chosen), None, None
+    if frequency_std is not None:
+        std = stiffness * frequency_std / frequency / sensitivity
+        interval = _stiffness_interval(problem, mode, stiffness / factor)
     return Calibration(
         frequency=float(frequency),
         frequency_std=frequency_std,
         mode=mode,
         bearing_stiffness=stiffness,
-        bearing_stiffness_std=None if frequency_std is None else stiffness * frequency_std / frequency / sensitivity,
-        bearing_stiffness_interval=None
-        if frequency_std is None
-        else _stiffness_interval(problem, mode, stiffness / factor),
+        bearing_stiffness_std=std,
+        bearing_stiffness_interval=interval,
         factor=factor,
         sensitivity=sensitivity,
         given=spindle,
@@ -212,7 +255,7 @@ def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -
 
 
 def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats:
-    """The frequency, and the ends of its 95 % interval (Hz)."""
+    """Return the frequency, and the ends of its 95 % interval (Hz)."""
     if frequency_std is None:
         return np.array([frequency])
     half = STANDARD_ERRORS_95_PERCENT * frequency_std
@@ -220,7 +263,7 @@ def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats
 
 
 def _stiffness_interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
-    """Stiffnesses (N/m) for the second and third frequency; 0 and inf where none is as soft or stiff as that."""
+    """Return the stiffnesses (N/m) for the second and third frequency; 0 and inf if they are out of range."""
     low, high = problem.pick(mode)[1:].tolist()
     return (
         0.0 if low < 0 else float(-start / problem.values[1, low]),
@@ -240,7 +283,7 @@ def _unreachable_error(
 
 
 def _limit_spindles(spindle: Spindle, chosen: Sequence[int]) -> tuple[Spindle, Spindle]:
-    """Without the calibrated parts and with rigid ones; a joint is next to nothing, or not there."""
+    """Return the spindle without the calibrated parts and with rigid ones; joints nearly absent and absent."""
     count = len(spindle.bearings)
     soft = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
     hard = [replace(b, stiffness=math.inf) if i in chosen else b for i, b in enumerate(spindle.bearings)]

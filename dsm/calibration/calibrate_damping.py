@@ -1,4 +1,4 @@
-"""Damping of the bearings from one measured damping ratio."""
+"""Calibrate the damping of bearings to one measured damping ratio."""
 
 from __future__ import annotations
 
@@ -18,54 +18,60 @@ from dsm.spindle.attachments import Damping, damping_of_bearings
 from dsm.spindle.spindle import Spindle
 
 FIRST_DAMPER_STEP = 0.3
-"""Longest first step: the damper's share in the force of its spring (-), far from holding the bearing still."""
+"""Longest first step: share of the damper in the force of its spring (-), far from locking the bearing."""
 MAX_DAMPER_GROWTH = 0.5
-"""Longest later step, in parts of the dampers: the damping ratio may fall and rise again."""
+"""Longest later step, over the dampers: the damping ratio may fall and rise again."""
 MAX_DAMPER_SHARE = 3e3
-"""The damper's share in the force of its spring beyond which nothing is sought."""
+"""Largest searched share of the damper in the force of its spring."""
 MAX_DAMPING_STEPS = 100
 """Most steps towards the measured damping ratio."""
 
 
 class UnreachableDampingError(ValueError):
-    """No dampers give the mode the measured damping ratio."""
+    """Raised if no dampers give the mode the measured damping ratio.
+
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    limit : float
+        Least or largest damping ratio that the mode can have (-), whichever was passed.
+    """
 
     def __init__(self, message: str, limit: float) -> None:
-        """Keep the limit beside the message."""
         super().__init__(message)
         self.limit = limit
-        """The least or largest damping ratio that the mode can have (-), whichever was passed."""
 
 
 @dataclass(frozen=True)
 class DampingCalibration:
-    """A spindle whose bearing dampers give a mode its measured damping ratio. Printed, it is a report."""
+    """Spindle whose bearing dampers give a mode its measured damping ratio; str() gives a report."""
 
     damping_ratio: float
     """Measured damping ratio (-)."""
     damping_ratio_std: float | None
-    """Standard error of the measured damping ratio (-); None where it was not given."""
+    """Standard error of the measured damping ratio (-); None if not given."""
     mode: int
-    """Number of the mode it belongs to; 1 is the lowest without damping."""
+    """Number of the mode; 1 is the lowest without damping."""
     frequency: float
-    """|s|/2 pi of the mode with this damping (Hz)."""
+    """Natural frequency |s|/2 pi of the mode with this damping (Hz)."""
     other_damping_ratio: float
-    """Damping ratio of the mode without the calibrated dampers (-): of the loss factor and of other bearings."""
+    """Damping ratio of the mode without the calibrated dampers (-): from the loss factor and other bearings."""
     loss_factor: float
     """Loss factor of shaft, bearings, housing and joints (-)."""
     bearing_damping: float
     """Mean viscous damping of the calibrated bearings (N s/m)."""
     bearing_damping_std: float | None
-    """Standard error of the bearing damping from that of the damping ratio (N s/m); None where that was not given."""
+    """Standard error of the bearing damping from that of the damping ratio (N s/m); None if not given."""
     sensitivity: float
-    """d zeta / d ln c of the mode (-): 1 % more of these dampers adds a hundredth of it to the damping ratio."""
+    """Sensitivity d zeta / d ln c of the mode (-)."""
     given: Spindle
-    """The spindle as given."""
+    """Spindle as given."""
     spindle: Spindle
-    """The spindle with the dampers."""
+    """Spindle with the dampers."""
 
     def __str__(self) -> str:
-        """The report."""
+        """Return the report."""
         damping = format_with_error(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
         measured = format_with_error(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
         return "\n".join(
@@ -80,16 +86,16 @@ class DampingCalibration:
 
 
 class _DampingPoint(NamedTuple):
-    """The mode at one amount of the dampers."""
+    """Mode at one amount of the dampers."""
 
     amount: float
     mode: DampedMode
     slope: float
-    """d zeta / d amount."""
+    """Slope d zeta / d amount."""
 
 
 class _Dampers(NamedTuple):
-    """What is varied: dampers in a fixed ratio beside all other damping."""
+    """Dampers in a fixed ratio that are varied, and all other damping."""
 
     shaft: DampedShaft
     number: int
@@ -101,7 +107,7 @@ class _Dampers(NamedTuple):
         return Damping(self.fixed.viscous + amount * self.ratio, self.fixed.loss_factor)
 
     def point(self, amount: float, mode: DampedMode) -> _DampingPoint:
-        """With d zeta = cos(arg w) Im(dw/w), as zeta = sin(arg w)."""
+        """Return the point of a mode with d zeta = cos(arg w) Im(dw/w), as zeta = sin(arg w)."""
         change = complex(self.shaft.damper_sensitivity(self.at(amount), mode) @ self.ratio) / mode.w
         return _DampingPoint(amount, mode, mode.w.real / abs(mode.w) * change.imag)
 
@@ -118,19 +124,45 @@ def calibrate_damping(
     group: str | None = None,
     loss_factor: float = 0.0,
 ) -> DampingCalibration:
-    """Give bearings viscous dampers, so that a mode (1 is the lowest) has its measured damping ratio (-).
+    """Give bearings viscous dampers, so that a mode has its measured damping ratio.
 
-    group: the bearings that get them; None: all that have a group. Where all of these have damping already, it keeps
-    its ratio; where none has, the dampers are in the ratio of the stiffnesses. Other bearings keep their damping.
-    loss_factor: that of the whole spindle, see damped_modes; its part of the damping ratio is taken off exactly. Of
-    the two dampers that may give the same ratio, a soft one and one that nearly locks the bearing, it is the soft one.
-    The standard error follows from that of the damping ratio (`damping_ratio_std`).
+    If all bearings of the group have damping already, it keeps its ratio; if none has, the dampers are in the ratio of
+    the
+    stiffnesses. Other bearings keep their damping. The part of the loss factor in the damping ratio is subtracted
+    exactly.
+    Of two dampers that give the same ratio, a soft one and one that nearly locks the bearing, the soft one is taken.
 
-    Raises UnreachableDampingError (a ValueError) where other damping alone gives more than was measured, and where it
-    is more than any such damper can give: one that is too strong holds the bearing still and damps nothing. ValueError
-    for a damping ratio outside 0 to 1, for damping given to a part of the bearings only, for a group with no bearing or
-    a rigid one, and a shaft that is not held.
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    damping_ratio : float
+        Measured damping ratio (-).
+    damping_ratio_std : float, optional
+        Standard error of the damping ratio (-).
+    mode : int
+        Number of the mode; 1 is the lowest.
+    group : str, optional
+        Group of bearings. Default: all bearings with a group.
+    loss_factor : float
+        Loss factor of the whole spindle (-), see damped_modes.
 
+    Returns
+    -------
+    DampingCalibration
+        Spindle with dampers.
+
+    Raises
+    ------
+    UnreachableDampingError
+        If other damping alone gives more than was measured, or no damper gives as much: one that is too strong locks
+        the bearing and damps nothing.
+    ValueError
+        For a damping ratio outside 0 to 1, damping given to a part of the bearings only, a group with no bearing or
+        a rigid one, and an unsupported shaft.
+
+    Examples
+    --------
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> damped = calibrate_damping(spindle, 0.03, damping_ratio_std=0.003)
     >>> f"{damped.bearing_damping:.0f} +- {damped.bearing_damping_std:.0f} N s/m"
@@ -176,7 +208,7 @@ def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: 
 
 
 def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
-    """Dampers to start from: those given, or such that damper over stiffness is 1 us in each bearing."""
+    """Return the given dampers, or dampers with damper over stiffness of 1 us in each bearing."""
     ratio = np.zeros(len(spindle.bearings))
     damped = [index for index in chosen if spindle.bearings[index].damping > 0]
     if damped and len(damped) < len(chosen):
@@ -191,7 +223,7 @@ def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
 
 
 def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _DampingPoint:
-    """The weakest dampers with the damping ratio `target`."""
+    """Find the weakest dampers with the damping ratio `target`."""
     without_dampers = start.mode.damping_ratio
     if without_dampers >= target:
         raise UnreachableDampingError(
@@ -211,7 +243,7 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
 
 
 def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tuple[_DampingPoint, _DampingPoint]:
-    """Two points with the target between them; where the curve has several humps, on the first that is high enough."""
+    """Return two points with the target between them; of several humps, on the first that is high enough."""
     springs = np.array([bearing.stiffness for bearing in dampers.shaft.spindle.bearings])
     unit = 1 / (abs(low.mode.w) * float(np.max(dampers.ratio / springs)))
     longest, most = math.inf, low.mode.damping_ratio
@@ -236,12 +268,12 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
 
 
 def _damper_step(low: _DampingPoint, target: float) -> float:
-    """Twice the step of Newton, which falls short where the curve bends down."""
+    """Return twice the Newton step, which is too short if the curve bends down."""
     return 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
 
 
 def _find_maximum(dampers: _Dampers, low: _DampingPoint, high: _DampingPoint) -> _DampingPoint:
-    """The point with the largest damping ratio between one where it rises and one where it falls."""
+    """Find the largest damping ratio between a point with rising and one with falling slope."""
     return dampers.follow(
         low, _find_root(lambda value: dampers.follow(low, value).slope, low.amount, high.amount, rtol=1e-10)
     )

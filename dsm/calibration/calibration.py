@@ -17,19 +17,19 @@ from dsm.spindle.attachments import Bearing
 from dsm.spindle.spindle import Spindle
 
 PRELOAD_EXPONENTS = 0.27, 0.32
-"""d ln k / d ln F of radial stiffness k over preload F, of angular contact ball bearings of 15 to 25 degrees."""
+"""Exponents d ln k / d ln F of radial stiffness k over preload F, angular contact balls of 15 to 25 degrees."""
 
 
 class RemainingPreload(NamedTuple):
-    """Range in which the preload over that at the start lies (-). Printed, it says what it rests on."""
+    """Range of the preload over that at the start (-); str() states the assumption."""
 
     low: float
-    """The lower end."""
+    """Lower end (-)."""
     high: float
-    """The upper end."""
+    """Upper end (-)."""
 
     def __str__(self) -> str:
-        """For people."""
+        """Return a sentence."""
         low, high = (f"{100 * end:.2g}" if end < 0.995 else f"{100 * end:.0f}" for end in self)
         steep, flat = (1 / exponent for exponent in PRELOAD_EXPONENTS)
         law = f"stiffness to the power of {flat:.1f} to {steep:.1f}"
@@ -37,13 +37,26 @@ class RemainingPreload(NamedTuple):
 
 
 def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPreload | None:
-    """Range of the preload left in bearings whose radial stiffness is `factor` times that at the start (-, > 0).
+    """Estimate the remaining preload of ball bearings from their stiffness.
 
-    Of Jones's model at rest (T. A. Harris and M. N. Kotzalas, Rolling Bearing Analysis, 2007) the radial exponents;
-    where its axial ones are those of makers' catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at 25, they lie
-    between these. Nothing finer is known without the geometry of the bearings. None without bearings or where one has
-    rollers.
+    The radial exponents of Jones's model at rest (T. A. Harris and M. N. Kotzalas, Rolling Bearing Analysis, 2007). Its
+    axial ones are those of makers' catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at 25, or between. A finer
+    estimate needs the geometry of the bearings.
 
+    Parameters
+    ----------
+    bearings : iterable of Bearing
+        Bearings.
+    factor : float
+        Radial stiffness over that at the start (-), > 0.
+
+    Returns
+    -------
+    RemainingPreload or None
+        Range; None without bearings or if one has rollers.
+
+    Examples
+    --------
     >>> left = remaining_preload([Bearing(0.1, 2.5e8), Bearing(0.35, 2.5e8)], 0.8)
     >>> f"{left.low:.2f} to {left.high:.2f} of the preload"
     '0.44 to 0.50 of the preload'
@@ -57,8 +70,17 @@ def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPr
 
 
 class UnreachableFrequencyError(ValueError):
-    """No bearing stiffness puts the mode at the measured frequency.
+    """Raised if no bearing stiffness puts the mode at the measured frequency.
 
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    reachable : tuple of float
+        Frequencies of the mode without the calibrated bearings and with rigid ones (Hz).
+
+    Examples
+    --------
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> calibrate(spindle, 5000.0)
     Traceback (most recent call last):
@@ -67,22 +89,22 @@ class UnreachableFrequencyError(ValueError):
     """
 
     def __init__(self, message: str, reachable: tuple[float, float]) -> None:
-        """Keep the limits beside the message."""
         super().__init__(message)
         self.reachable = reachable
-        """Frequencies of the mode without the calibrated bearings and with rigid ones (Hz)."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A spindle whose bearing stiffnesses, scaled by one factor, put a mode at its measured frequency.
+    """Spindle whose bearing stiffnesses, scaled by one factor, put a mode at its measured frequency.
 
-    "Before" is the spindle as given, "after" the recalibrated one; stiffnesses are those at the tool tip, worked out
-    when they are asked for. Printed, it is a report.
+    "Before" is the spindle as given, "after" the recalibrated one; stiffnesses are those at the tool tip, computed
+    when needed. str() gives a report.
 
+    Examples
+    --------
     >>> new = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> now = calibrate(new, 0.95 * natural_frequencies(new, 1)[0])
-    >>> round(now.energy_share, 2)  # of the bearings in the strain energy of the mode: why it answers to them
+    >>> round(now.energy_share, 2)  # of the bearings in the strain energy of the mode, which makes it sensitive to them
     0.88
     >>> round(now.static_stiffness_after / now.static_stiffness_before, 2)  # left at the tip
     0.98
@@ -91,33 +113,33 @@ class Calibration:
     frequency: float
     """Measured frequency (Hz)."""
     frequency_std: float | None
-    """Standard error of the measured frequency (Hz); None where it was not given."""
+    """Standard error of the measured frequency (Hz); None if not given."""
     mode: int
-    """Number of the mode it belongs to; 1 is the lowest."""
+    """Number of the mode; 1 is the lowest."""
     bearing_stiffness: float
-    """Mean of the calibrated bearing stiffnesses (N/m); the common one where all were given equal.
+    """Mean of the calibrated bearing stiffnesses (N/m); the common one if all were given equal.
 
     An equivalent number of this model: compare it only with others of the same geometry and beam theory.
     """
     bearing_stiffness_std: float | None
-    """Standard error of the bearing stiffness from that of the frequency (N/m); None where that was not given.
+    """Standard error of the bearing stiffness from that of the frequency (N/m); None if not given.
 
     Of first order: near the limit of rigid bearings the interval is much longer upwards.
     """
     bearing_stiffness_interval: tuple[float, float] | None
-    """Ends of its 95 % interval (N/m), from 0 to inf; None where the error of the frequency was not given."""
+    """Ends of its 95 % interval (N/m), from 0 to inf; None without a standard error of the frequency."""
     factor: float
     """Bearing stiffness after over before, the same for all calibrated bearings (-)."""
     sensitivity: float
-    """d ln f / d ln k of the mode after calibration, 0 to 1/2 (-): half these bearings' share of its strain energy."""
+    """Sensitivity d ln f / d ln k of the mode after calibration (-): half the energy share of these bearings."""
     given: Spindle
-    """The spindle as given."""
+    """Spindle as given."""
     parts: tuple[int, ...]
-    """Places of the calibrated parts in (*bearings, *joints)."""
+    """Indices of the calibrated parts in (*bearings, *joints)."""
 
     @cached_property
     def spindle(self) -> Spindle:
-        """The recalibrated spindle."""
+        """Recalibrated spindle."""
         return scale_parts(self.given, self.parts, self.factor)
 
     @property
@@ -127,13 +149,13 @@ class Calibration:
 
     @property
     def remaining_preload(self) -> RemainingPreload | None:
-        """Range of the preload over that as given (-) in the calibrated bearings; see preload_left. None where open."""
+        """Range of the preload over that as given (-) in the calibrated bearings; None if the stiffness is open."""
         calibrated = [bearing for index, bearing in enumerate(self.given.bearings) if index in self.parts]
         return None if self.is_open else remaining_preload(calibrated, self.factor)
 
     @property
     def is_open(self) -> bool:
-        """Whether the frequency leaves the stiffness open: next to nothing of it is felt, or it has no upper end."""
+        """Whether the frequency leaves the stiffness open: almost no effect, or no upper end."""
         return self.energy_share < MIN_ENERGY_SHARE or self._is_unbounded
 
     @property
@@ -142,7 +164,7 @@ class Calibration:
 
     @property
     def remarks(self) -> tuple[FitRemark, ...]:
-        """What makes the stiffness doubtful."""
+        """Remarks on doubtful stiffness."""
         if not self.is_open:
             return ()
         text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them"
@@ -153,7 +175,7 @@ class Calibration:
 
     @cached_property
     def residual(self) -> float:
-        """Natural frequency of the recalibrated spindle, solved anew, less the measured one (Hz)."""
+        """Natural frequency of the recalibrated spindle, solved again, less the measured one (Hz)."""
         return float(natural_frequencies(self.spindle, self.mode)[-1]) - self.frequency
 
     @cached_property
@@ -177,7 +199,7 @@ class Calibration:
         return modal_stiffness(self.spindle, self.mode)
 
     def __str__(self) -> str:
-        """The report."""
+        """Return the report."""
         start = self.bearing_stiffness / self.factor / 1e6
         static = self.static_stiffness_before / 1e6, self.static_stiffness_after / 1e6
         modal = self.modal_stiffness_before / 1e6, self.modal_stiffness_after / 1e6

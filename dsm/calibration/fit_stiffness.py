@@ -1,4 +1,4 @@
-"""Several bearing and joint stiffnesses from several measured natural frequencies."""
+"""Fit several bearing and joint stiffnesses to several measured natural frequencies."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
 
 EXTRA_STARTS = 8
-"""Further starts, about a factor of e around the given one, where that leads to no minimum or to a poor one."""
+"""Further starts, about a factor of e around the given one, if that leads to no minimum or to a poor one."""
 BACKTRACK_SHARES = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0)
-"""Parts of the way to where an unfelt stiffness has run off, at which it is tried to stay."""
+"""Shares of the way to a runaway value that are tried for a stiffness without effect."""
 MAX_CONDITION_NUMBER = 30.0
-"""A larger condition number is reported."""
+"""Largest condition number that is not reported."""
 CLOSE_MODE_SHARE = 0.01
-"""Modes nearer to each other than this part of their frequency are reported."""
+"""Largest relative distance of close modes, which are reported."""
 
 
 def fit_stiffness(
@@ -47,34 +47,58 @@ def fit_stiffness(
     start: Sequence[float] | None = None,
     tolerance: float = 0.0,
 ) -> StiffnessFit:
-    """Scale each group of bearings and joints by a factor of its own, so that modes have their measured frequencies.
+    """Scale each group of bearings and joints by its own factor, so that modes have their measured frequencies.
 
-    spindle: one, or several with the same bearings and joints, such as one spindle with two tools: a group has the
-    same factor in all of them. frequency: (n,) Hz. frequency_std: their standard errors (n,) Hz, the weights; None: all
-    count by their relative error. mode: their numbers (n,), 1 is the lowest; None: 1 to n. groups: names of bearing and
-    joint groups, no more than n; None: all. shaft: which of the spindles each was measured on (n,), 0 is the first;
-    None: the first. start: factors to begin the search with (g,), and no others; None: 1, and others where
-    that leads to none that fits. tolerance: relative standard error of each diameter of the drawing (-), which counts
-    where frequency_std is given.
-
-    A bearing keeps its stiffness against tilting and that of its housing; a joint has both of its stiffnesses scaled,
-    or each by itself (`Joint.rotational_group`). One group and one mode are what `calibrate` solves without iteration.
+    A bearing keeps its stiffness against tilting and that of its housing; a joint has both stiffnesses scaled,
+    or each separately (`Joint.rotational_group`). `calibrate` solves one group and one mode without iteration.
 
     Least squares in the logarithms of the factors by Levenberg and Marquardt, with d ln f / d ln factor = half the
     group's share of the strain energy. Modes keep their number, never their shape: every step solves for certified
-    modes, and where two come close (veering) they exchange shapes while their numbers stay. Veering makes local minima:
-    where the given stiffnesses lead to none that fits, a few starts around them are tried and the best is kept. Of
-    several solutions that fit, such as the two of a symmetric shaft, it is the first that is found, unless another fits
-    better by more than 95 % intervals allow; a remark has the others.
+    modes, and two close modes (veering) exchange shapes while their numbers stay. Veering makes local minima:
+    if the given stiffnesses lead to no fit, a few starts around them are tried and the best is kept. Of
+    several solutions that fit, such as the two of a symmetric shaft, the first one is returned, unless another fits
+    better by more than 95 % intervals allow; a remark names the others.
 
-    The result has remarks where the frequencies leave a stiffness open (identifiability), where modes do not tell the
-    groups apart, lie close together, or do not fit; where it has none, the 95 % intervals are to be believed.
+    Remarks tell if the frequencies leave a stiffness open (identifiability), if modes do not separate the
+    groups, lie close together, or do not fit. Without remarks the 95 % intervals hold.
 
-    Raises ValueError for bad frequencies and groups, UnreachableFrequencyError (a ValueError) where no factor from 1e-6
-    to 1e6 puts a mode where it was measured, StiffnessFitError (an ArithmeticError, with the best estimate) where no
-    minimum is found.
+    Parameters
+    ----------
+    spindle : Spindle or sequence of Spindle
+        One spindle, or several with the same bearings and joints, such as one with two tools: a group has the
+        same factor in all of them.
+    frequency : array_like, shape (n,)
+        Measured frequencies (Hz).
+    frequency_std : array_like, shape (n,), optional
+        Standard errors (Hz), the weights. Default: equal relative errors.
+    mode : sequence of int, shape (n,), optional
+        Numbers of the modes, 1 is the lowest. Default: 1 to n.
+    groups : sequence of str, optional
+        Groups of bearings and joints, no more than n. Default: all.
+    shaft : sequence of int, shape (n,), optional
+        Spindle of each measurement, 0 is the first. Default: the first.
+    start : sequence of float, shape (g,), optional
+        Only start factors (-). Default: 1, and others if that leads to no fit.
+    tolerance : float
+        Relative standard error of each diameter of the drawing (-), used with frequency_std.
 
-    Front and rear bearings that have lost differently, from three modes:
+    Returns
+    -------
+    StiffnessFit
+        Fitted spindles with factors, errors and remarks.
+
+    Raises
+    ------
+    ValueError
+        For bad frequencies and groups.
+    UnreachableFrequencyError
+        If no factor from 1e-6 to 1e6 gives a mode its frequency.
+    StiffnessFitError
+        If no minimum is found; it holds the best estimate.
+
+    Examples
+    --------
+    Front and rear bearings that have worn differently, from three modes:
 
     >>> shaft = [Segment(0.12, 0.03), Segment(0.2, 0.07), Segment(0.15, 0.05)]
     >>> new = Spindle(shaft, [Bearing(0.15, 2.5e8, group="front"), Bearing(0.4, 2.5e8, group="rear")])
@@ -111,7 +135,7 @@ def fit_stiffness(
 
 
 def _search(problem: StiffnessProblem, begin: Floats | None) -> tuple[Iterate, bool]:
-    """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
+    """Return the best state, and whether it is a minimum, from the given start or from others if that is poor."""
     size = len(problem.names)
     state, found = minimize(problem, np.zeros(size) if begin is None else begin)
     if not found:
@@ -126,10 +150,10 @@ def _search(problem: StiffnessProblem, begin: Floats | None) -> tuple[Iterate, b
 
 
 def _restore_unfelt(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, bool]:
-    """A fit with the factors of which next to nothing is felt at what was given, or as near as the frequencies allow.
+    """Fit with the factors without effect at their given values, or as near as the frequencies allow.
 
-    Such factors run off, to the end of what is allowed or to where rounding ends the search. What was given and False
-    where there are none, or nothing fits.
+    Such factors run away, to the end of the range or to where rounding ends the search. Returns the state and False
+    if there are none, or nothing fits.
     """
     away = np.flatnonzero(np.max(state.share, axis=0) < MIN_ENERGY_SHARE)
     if away.size == 0:
@@ -144,7 +168,7 @@ def _restore_unfelt(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate,
 
 
 def _improve(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, ProfileScan | None]:
-    """The solution, or another that fits better by more than 95 % intervals allow; with it what lies around."""
+    """Return the solution, or another that fits better by more than 95 % intervals allow, with its profile scan."""
     for _ in range(EXTRA_STARTS):
         covariance = _covariance(problem, state)
         if covariance is None:
@@ -186,9 +210,9 @@ def _build_result(
 
 
 def _covariance(problem: StiffnessProblem, state: Iterate) -> Floats | None:
-    """(J^T J)^-1, times the variance of the residuals where no standard errors were given.
+    """Return (J^T J)^-1, times the variance of the residuals if no standard errors were given.
 
-    A group that is not felt, known to a factor of 30 at best, counts as known to that and independent of all others.
+    A group without effect, known to a factor of 30 at best, counts as known to that and independent of all others.
     """
     given = problem.measured.std is not None
     if not given and problem.degrees_of_freedom == 0:
@@ -205,14 +229,14 @@ def _covariance(problem: StiffnessProblem, state: Iterate) -> Floats | None:
 
 
 def _inverse_normal_matrix(slope: Floats) -> Floats:
-    """(J^T J)^-1, large where J is singular."""
+    """Return (J^T J)^-1, large if J is singular."""
     _, values, vectors = np.linalg.svd(slope, full_matrices=False)
     root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
     return np.asarray(root @ root.T)
 
 
 def _collinear_group_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
-    """Groups that change the frequencies in the same ratio, however much they do."""
+    """Return a remark on groups that change the frequencies in the same ratio."""
     if np.any(np.max(state.share, axis=0) < MIN_ENERGY_SHARE):
         return []
     ratio = state.share / np.linalg.norm(state.share, axis=0)
@@ -226,7 +250,7 @@ def _collinear_group_remarks(problem: StiffnessProblem, state: Iterate) -> list[
 
 
 def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
-    """Pairs of neighbours with a measured one among them."""
+    """Return remarks on pairs of close modes with a measured one among them."""
     measured = problem.measured
     remarks = []
     for number, frequency in enumerate(state.frequency):
@@ -256,7 +280,7 @@ def _misfit_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark
 
 
 def _require_reachable(problem: StiffnessProblem) -> None:
-    """Raise UnreachableFrequencyError for a mode measured outside of what the factors can do; all raise all modes."""
+    """Raise UnreachableFrequencyError for a mode measured outside the range of the factors; all raise all modes."""
     measured, names = problem.measured, problem.names
     ends = np.empty((2, measured.mode.size))
     for number, spindle in enumerate(problem.spindles):

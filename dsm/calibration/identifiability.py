@@ -1,4 +1,4 @@
-"""Whether the measured modes tell the stiffness of each group: the profile likelihood beside the standard error."""
+"""Identifiability: whether the measured modes determine the stiffness of each group, by profile likelihood."""
 
 from __future__ import annotations
 
@@ -16,43 +16,43 @@ from dsm.calibration.least_squares import Iterate, StiffnessProblem, minimize
 from dsm.calibration.report_text import FitRemark
 
 PROFILE_CONFIDENCE = 0.95
-"""Of the intervals that are compared."""
+"""Confidence of the compared intervals."""
 MAX_LOG_INTERVAL = math.log(30.0)
-"""An interval wider than this, in the logarithm of the factor, is none."""
+"""Largest interval, in the logarithm of the factor."""
 PROFILE_STEPS = 0.2, 0.7, 1.7, 3.4
-"""Distances beyond the interval of first order, in the logarithm of the factor, at which S(v) is looked at."""
+"""Distances beyond the first-order interval at which S(v) is computed (logarithm of the factor)."""
 RIVAL_START_DISTANCES = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
-"""Distances, in the logarithm of a factor, of starts along the direction that is known least."""
+"""Distances of starts along the least certain direction (logarithm of a factor)."""
 MIN_INTERVAL_COVERAGE = 1 - 2 * (1 - PROFILE_CONFIDENCE)
-"""What an interval must hold by the likelihood."""
+"""Least coverage of an interval by the likelihood."""
 MIN_INTERVAL_RISE = 0.8
-"""Ends at which the sum of squares rises by this part of what it should, or more, are as good as those of S(v)."""
+"""Least rise of the sum of squares at an end over the expected one for which the end is good enough."""
 PROFILE_TOLERANCE = 0.1
-"""Other factors are found anew until a step would change no frequency by more than this part of the least error."""
+"""Convergence of the other factors: change of a frequency over the least error."""
 MIN_PROFILE_WIDTH = 1e-6
-"""Intervals and distances smaller than this, as of computed frequencies, are not looked at."""
+"""Smallest interval that is examined; computed frequencies have smaller ones."""
 MIN_RIVAL_DISTANCE = 4.0
-"""Standard errors of a factor that another solution is away at least."""
+"""Least distance of another solution (standard errors of a factor)."""
 LOW_ENERGY_SHARE = 0.1
-"""Below this part of the strain energy of every measured mode, stiffness far from what was found is tried."""
+"""Energy share in every measured mode below which stiffness far from the fit is tried."""
 MIN_ENERGY_SHARE = 0.01
-"""A group with less than this part of the strain energy of every measured mode is reported."""
+"""Least energy share in a measured mode of a group with effect."""
 IDENTIFIABILITY_REMEDY = "measure more or other modes, or leave the group out"
 
 
 class AllowedExcess(NamedTuple):
-    """By how much a sum of squares may exceed the least one with a factor still inside its 95 % interval."""
+    """Allowed excess of the sum of squares for a factor inside its 95 % interval."""
 
     variance: float
-    """Variance of the scaled residuals: 1, or from their scatter where no standard errors were given."""
+    """Variance of the scaled residuals: 1, or from their scatter without standard errors."""
     rise: float
-    """Student's t^2."""
+    """Square of Student's t."""
     degrees_of_freedom: float
-    """Degrees of freedom of the variance: inf where it is known."""
+    """Degrees of freedom of the variance: inf if it is known."""
 
     @classmethod
     def of(cls, problem: StiffnessProblem, best: Iterate) -> AllowedExcess:
-        """For a fit with a covariance."""
+        """Return the excess for a fit with a covariance."""
         given = problem.measured.std is not None
         variance, spare = (
             (1.0, math.inf) if given else (best.cost / problem.degrees_of_freedom, problem.degrees_of_freedom)
@@ -61,11 +61,11 @@ class AllowedExcess(NamedTuple):
 
     @property
     def limit(self) -> float:
-        """The excess."""
+        """Allowed excess."""
         return self.variance * self.rise
 
     def log_density(self, excess: float) -> float:
-        """Logarithm of the likelihood of so much excess, over that of none: normal, or Student's."""
+        """Return the logarithm of the likelihood of an excess, over that of none: normal, or Student's."""
         square = excess / self.variance
         return (
             -square / 2
@@ -75,34 +75,35 @@ class AllowedExcess(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """The least sum of squares over all other factors, S(v), along the logarithm v of one factor."""
+    """Least sum of squares over all other factors, S(v), along the logarithm v of one factor."""
 
     ends: tuple[Iterate, Iterate]
-    """The ends of its interval of first order, below and above; the best fit where that is none."""
+    """Ends of its first-order interval, below and above; the best fit without an interval."""
     beyond: tuple[tuple[Iterate, ...], tuple[Iterate, ...]]
-    """Further and further away, below and above; empty where that is not looked at."""
+    """States further away, below and above; empty if not computed."""
 
     def sides(self) -> Iterator[tuple[Iterate, ...]]:
-        """Each end with what lies beyond."""
+        """Yield each end with the states beyond."""
         for end, further in zip(self.ends, self.beyond, strict=True):
             yield end, *further
 
 
 class ProfileScan(NamedTuple):
-    """What lies around a fit over the whole range of factors."""
+    """Profiles and other minima around a fit over the whole range of factors."""
 
     profiles: tuple[Profile | None, ...]
-    """Along each factor; None where its interval is too small to be looked at, or the model cannot be solved there."""
+    """Profile of each factor; None if its interval is too small, or the model cannot be solved there."""
     rivals: tuple[Iterate, ...]
-    """Other minima to which these ways lead, the lowest first; they may be lower than the fit."""
+    """Other minima, the lowest first; they may be lower than the fit."""
 
 
 def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
-    """Along each factor: its interval, and up to a factor of 30 beyond and through the given stiffness.
+    """Scan each factor over its interval, and up to a factor of 30 beyond and through the given stiffness.
 
-    Beyond it is looked at of a group that has little energy in all measured modes at what was found, at what was given,
-    or half-way. Other minima, such as that of a nearly symmetric shaft, are looked for from wherever S(v) falls again
-    on the way, and nearer by along the direction that is known least.
+    Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness,
+    or half-way. Other minima, such as that of a nearly symmetric shaft, are searched from all places where S(v) falls
+    again
+    on the way, and nearby along the least certain direction.
     """
     ways: list[Profile | None] = []
     for index, felt in enumerate(_min_group_shares(problem, best).tolist()):
@@ -121,7 +122,7 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floa
 
 
 def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> Floats:
-    """Least share, of what was found, what was given and half-way, of each group in the mode that has most of it."""
+    """Return the least of the largest energy shares of each group at the fit, the given stiffness and half-way."""
     states = [best]
     for share in (0.0, 0.5):
         with suppress(ArithmeticError):
@@ -130,7 +131,7 @@ def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> Floats:
 
 
 def _weakest_direction_starts(best: Iterate, log_covariance: Floats) -> list[Floats]:
-    """Starts in the direction that is known least, where several factors are sought."""
+    """Return starts in the least certain direction of several factors."""
     direction = np.linalg.eigh(log_covariance)[1][:, -1]
     direction /= np.max(np.abs(direction))
     return [best.log_factor + step * direction for step in RIVAL_START_DISTANCES if direction.size > 1]
@@ -139,16 +140,15 @@ def _weakest_direction_starts(best: Iterate, log_covariance: Floats) -> list[Flo
 def identifiability_remarks(
     problem: StiffnessProblem, best: Iterate, log_covariance: Floats | None, around: ProfileScan | None
 ) -> list[FitRemark]:
-    """Remarks on groups whose factor the frequencies leave open.
+    """Return remarks on groups whose factor the frequencies leave open.
 
     For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
-    interval of first order holds where S - S_min reaches Student's t^2 (times the variance of the residuals where no
-    standard errors were given) at its ends (D. J. Venzon and S. H. Moolgavkar, A method for computing
+    first-order interval holds if S - S_min reaches Student's t^2 (times the variance of the residuals without
+    standard errors) at its ends (D. J. Venzon and S. H. Moolgavkar, A method for computing
     profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of S - S_min as
-    normal deviates, the rises at its ends say how often it holds the truth, and the likelihood beyond them, summed over
-    v, takes its part of that: not twice as often wrong as it says is good enough. Other minima that the 95 % intervals
-    do not exclude are all told. Without a covariance there is nothing to compare with, and the energy shares decide
-    alone.
+    normal deviates, the rises at its ends give its coverage, and the likelihood beyond them, integrated over
+    v, reduces it: not twice as often wrong as stated is good enough. All other minima within the 95 % intervals
+    are reported. Without a covariance the energy shares alone decide.
     """
     felt = np.max(best.share, axis=0)
     remarks = [
@@ -176,7 +176,7 @@ def identifiability_remarks(
 
 
 def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: Floats, rivals: Sequence[Iterate]) -> str:
-    """Factors of all solutions that fit as well, far off in one that is not open."""
+    """Return the factors of all solutions that fit as well, far off in one that is not open."""
     error, highest = np.sqrt(np.diag(log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
     far = np.where(error < MAX_LOG_INTERVAL, MIN_RIVAL_DISTANCE * error + MIN_PROFILE_WIDTH, math.inf)
     apart = [best.log_factor]
@@ -214,7 +214,7 @@ def _likelihood_profile(
 def _open_interval_text(
     problem: StiffnessProblem, best: Iterate, variance: float, index: int, way: Profile | None
 ) -> str:
-    """What is wrong with the interval of one factor, in words; empty where nothing is."""
+    """Return the fault of the interval of one factor; empty if there is none."""
     allowed = AllowedExcess.of(problem, best)
     half = math.sqrt(allowed.rise * variance)
     if not half < MAX_LOG_INTERVAL:
@@ -240,9 +240,9 @@ def _open_interval_text(
 def _likelihood_masses(
     best: Iterate, side: Sequence[Iterate], index: int, allowed: AllowedExcess
 ) -> Iterator[tuple[float, float]]:
-    """Likelihood over that of the best fit, summed from each place to the next, and how far that is (logarithm).
+    """Yield the likelihood over that of the best fit, integrated from place to place, and the distance (logarithm).
 
-    In between its logarithm is taken for straight.
+    In between its logarithm is linear.
     """
     for near, far in pairwise(side):
         distance = abs(float(far.log_factor[index] - near.log_factor[index]))
@@ -252,7 +252,7 @@ def _likelihood_masses(
 
 
 def _interval_reach(side: Sequence[tuple[float, float]], least: float, half: float) -> float:
-    """How far the likelihood goes with no more than so little of it left out."""
+    """Return how far the likelihood extends with no more than a given part left out."""
     left_out = 0.0
     for part, place in reversed(side):
         left_out += part
@@ -262,14 +262,14 @@ def _interval_reach(side: Sequence[tuple[float, float]], least: float, half: flo
 
 
 def _interval_coverage(rises: Sequence[float]) -> float:
-    """How often an interval holds the truth at whose ends the sum of squares rises by so many times what it should."""
+    """Return the coverage of an interval from the rises of the sum of squares at its ends over the expected one."""
     outside = (1 - PROFILE_CONFIDENCE) / 2
     deviates = [-float(scipy.special.ndtri(outside)) * math.sqrt(max(rise, 0.0)) for rise in rises]
     return float(1 - scipy.special.ndtr(-deviates[0]) - scipy.special.ndtr(-deviates[1]))
 
 
 def _lower_points(side: Sequence[Iterate]) -> list[Iterate]:
-    """Places beyond the first that lie lower than the one before and not above the one behind."""
+    """Return places beyond the first that are lower than the one before and not above the next."""
     costs = [state.cost for state in side]
     behind = [*costs[2:], math.inf]
     return [state for state, last, next_ in zip(side[1:], costs, behind, strict=False) if last > state.cost <= next_]
@@ -283,9 +283,9 @@ def _profile_tolerance(problem: StiffnessProblem, best: Iterate) -> float:
 def _extend_profile(
     problem: StiffnessProblem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int
 ) -> Iterator[Iterate]:
-    """The least sum of squares further and further from the first fixed factor found, beyond an end of its interval.
+    """Yield the least sum of squares further and further from the first fixed factor, beyond an end of its interval.
 
-    Where it is large, as at the place before, it need not be known well.
+    A large value, as at the place before, need not be accurate.
     """
     index = fixed[0]
     half = abs(float(end.log_factor[index] - best.log_factor[index]))

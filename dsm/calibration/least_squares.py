@@ -1,4 +1,4 @@
-"""Least squares of measured frequencies in the logarithms of stiffness factors."""
+"""Least squares of measured frequencies in the logarithms of stiffness factors, with errors of the drawing."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle
 
 DIAMETER_STEP = 1e-3
-"""Relative change of a diameter by which its effect is worked out, either way."""
+"""Relative change of a diameter for its effect, either way."""
 TOOL_TOLERANCE_RATIO = 3.0
-"""Tolerance of all diameters of a tool together over that of one of the drawing: what stands for flutes is rough."""
+"""Tolerance of all diameters of a tool together over that of one of the drawing: flutes are modelled roughly."""
 ALL_SPINDLES = -1
-"""Stands for all spindles in the place of a diameter."""
+"""Number for all spindles in the key of a diameter."""
 DiameterKey = tuple[int, int]
-"""The spindle of a segment, and its number from the rear end; 0: all that no other spindle has, together."""
+"""Spindle of a segment, and its number from the rear end; 0: all that no other spindle has, together."""
 
 
 def diameter_keys(spindles: Sequence[Spindle]) -> list[list[DiameterKey]]:
-    """A name for the diameters of each segment of each spindle; segments that all have at their rear are the same.
+    """Return a key for the diameters of each segment of each spindle; common segments at the rear share theirs.
 
-    The last name of a spindle with others, its tool, is that of all these together.
+    The last key of a spindle with other segments, its tool, is that of all these together.
     """
     shared = 0
     for rear in zip(*(reversed(spindle.segments) for spindle in spindles), strict=False):
@@ -48,9 +48,9 @@ def diameter_keys(spindles: Sequence[Spindle]) -> list[list[DiameterKey]]:
 
 
 def diameter_effects(spindle: Spindle, values: Callable[[Spindle], Floats], names: Sequence[DiameterKey]) -> Floats:
-    """d ln value / d ln diameter, outside and inside alike, of each of the names, shape (n_values, n_names).
+    """Return d ln value / d ln diameter, outside and inside alike, of each key, shape (n_values, n_names).
 
-    Of all diameters of a tool together it is TOGETHER times as much.
+    All diameters of a tool together count TOOL_TOLERANCE_RATIO times.
     """
     columns = []
     for number in range(len(spindle.segments)):
@@ -63,7 +63,7 @@ def diameter_effects(spindle: Spindle, values: Callable[[Spindle], Floats], name
 def frequency_effects(
     spindles: Sequence[Spindle], mode: Indices, shaft: Indices, names: Sequence[Sequence[DiameterKey]]
 ) -> Floats:
-    """Effects on modes of several spindles, shape (n_modes, n_diameters), diameters by name in order of appearance."""
+    """Return the effects on modes of several spindles, shape (n_modes, n_diameters), in order of appearance."""
     order = diameter_columns(names)
     found = np.zeros((mode.size, len(order)))
     for number, spindle in enumerate(spindles):
@@ -74,12 +74,11 @@ def frequency_effects(
 
 
 def _frequency_function(mode: Indices) -> Callable[[Spindle], Floats]:
-    """What gives the frequencies of these modes (Hz)."""
     return lambda spindle: np.asarray(natural_frequencies(spindle, int(np.max(mode)))[mode - 1])
 
 
 def diameter_columns(names: Sequence[Sequence[DiameterKey]]) -> dict[DiameterKey, int]:
-    """Column of each diameter."""
+    """Return the column of each diameter."""
     return {name: column for column, name in enumerate(dict.fromkeys(name for row in names for name in row))}
 
 
@@ -104,20 +103,20 @@ def _scale_segment(segment: Segment, factor: float) -> Segment:
 
 
 class MeasuredModes(NamedTuple):
-    """What was measured."""
+    """Measured modes."""
 
     mode: Indices
     """Numbers of the modes, shape (n,); 1 is the lowest."""
     frequency: Floats
     """Frequencies (Hz), shape (n,)."""
     std: Floats | None
-    """Standard errors (Hz), shape (n,); None where not given."""
+    """Standard errors (Hz), shape (n,); None if not given."""
     shaft: Indices
-    """Number of the spindle that each belongs to, shape (n,); 0 is the first."""
+    """Number of the spindle of each mode, shape (n,); 0 is the first."""
 
     @property
     def scale(self) -> Floats:
-        """What residuals are divided by: standard errors (Hz); where there are none, the frequencies."""
+        """Divisor of the residuals: standard errors (Hz), or the frequencies without them."""
         return self.frequency if self.std is None else self.std
 
 
@@ -128,7 +127,7 @@ def check_measured_modes(
     mode: Sequence[int] | None,
     shaft: Sequence[int] | None,
 ) -> MeasuredModes:
-    """What was measured of so many spindles, as fit_stiffness takes it; ValueError for what cannot be."""
+    """Check the measured modes of so many spindles, as fit_stiffness takes them; ValueError for invalid ones."""
     f = check_frequencies(frequency)
     if np.any(f == 0):
         raise ValueError("frequency=0 Hz is not > 0")
@@ -151,7 +150,7 @@ def check_measured_modes(
 
 
 def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None) -> None:
-    """Of one spindle."""
+    """Check the mode numbers of one spindle."""
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
     if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
         raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
@@ -163,30 +162,30 @@ def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None)
 
 
 MAX_LOG_FACTOR = math.log(1e6)
-"""Factors are sought between 1e-6 and 1e6."""
+"""Largest logarithm of a factor: 1e-6 to 1e6."""
 MAX_LOG_STEP = 2.0
 """Largest change of the logarithm of a factor in one step."""
 FACTOR_STEP_TOLERANCE = 1e-12
-"""A step that would change no frequency by more than this part of it ends the search."""
+"""Relative change of the frequencies that ends the search."""
 ROUNDING_STEP_LIMIT = 1e-8
-"""Below this, a step that brings nothing has met rounding, and the search has ended as well."""
+"""Relative change below which a step without gain has met rounding and ends the search."""
 FREQUENCY_ROUNDING = 1e-10
-"""Frequencies may be off by this part of them: a step that promises no more than that can hide has met it too."""
+"""Relative rounding error of frequencies, which may hide the gain of a step."""
 MIN_CHI_SQUARE_PROBABILITY = 1e-3
-"""A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
+"""Least probability of a chi-square, or least relative residual without standard errors, that is reported."""
 
 
 class Iterate(NamedTuple):
-    """The model at one choice of factors."""
+    """Model at one choice of factors."""
 
     log_factor: Floats
     """Logarithms of the factors (-), shape (g,)."""
     spindles: tuple[Spindle, ...]
-    """The spindles scaled by them."""
+    """Scaled spindles."""
     frequency: tuple[Floats, ...]
     """Frequencies of all modes of each spindle up to the one beyond the highest measured (Hz)."""
     fitted: Floats
-    """Frequencies that the model gives the measured modes (Hz), (n,)."""
+    """Frequencies of the measured modes in the model (Hz), (n,)."""
     share: Floats
     """Energy shares (n, g) of the measured modes."""
     residual: Floats
@@ -201,19 +200,19 @@ class Iterate(NamedTuple):
 
 
 class StiffnessProblem(NamedTuple):
-    """Which factors are sought from which frequencies."""
+    """Problem of fitting factors to frequencies."""
 
     spindles: tuple[Spindle, ...]
     """Spindles as given; parts of one group have the same factor in all of them."""
     names: tuple[str, ...]
-    """Groups, each with a factor."""
+    """Groups with one factor each."""
     measured: MeasuredModes
-    """The frequencies."""
+    """Measured modes."""
     weight: Floats | None = None
-    """What scaled residuals are multiplied by (n, n), where their errors depend on each other."""
+    """Matrix that multiplies the scaled residuals (n, n), if their errors depend on each other."""
 
     def with_drawing(self, state: Iterate, tolerance: float) -> StiffnessProblem:
-        """The same with all diameters of the drawing off by this standard error (-), as they act on this state."""
+        """Return the problem with this relative standard error of all diameters, as they act on this state."""
         measured = self.measured
         effect = frequency_effects(state.spindles, measured.mode, measured.shaft, diameter_keys(state.spindles))
         scaled = tolerance * effect * (measured.frequency / measured.scale)[:, np.newaxis]
@@ -226,7 +225,7 @@ class StiffnessProblem(NamedTuple):
         return self.measured.frequency.size - len(self.names)
 
     def evaluate(self, log_factor: Floats) -> Iterate:
-        """The model with these factors; certified modes."""
+        """Return the model with these factors and certified modes."""
         measured, factors = self.measured, dict(zip(self.names, np.exp(log_factor).tolist(), strict=True))
         scaled = tuple(scale_groups(spindle, factors) for spindle in self.spindles)
         fitted, share = np.empty(measured.mode.size), np.empty((measured.mode.size, len(self.names)))
@@ -244,7 +243,7 @@ class StiffnessProblem(NamedTuple):
         return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope)
 
     def fits(self, state: Iterate) -> bool:
-        """Whether the residuals are of the size that is to be expected."""
+        """Return whether the residuals have the expected size."""
         measured = self.measured
         if measured.std is None:
             return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < MIN_CHI_SQUARE_PROBABILITY
@@ -254,9 +253,9 @@ class StiffnessProblem(NamedTuple):
 def minimize(
     problem: StiffnessProblem, start: Floats, fixed: int | Sequence[int] = (), converged: float = FACTOR_STEP_TOLERANCE
 ) -> tuple[Iterate, bool]:
-    """The last state on the way down from a start by Levenberg and Marquardt, and whether it is a minimum.
+    """Return the last state from a start by Levenberg and Marquardt, and whether it is a minimum.
 
-    fixed: indices of factors that stay. converged: the change of frequencies that ends it.
+    fixed: indices of factors that stay. converged: relative change of frequencies that ends it.
     """
     free = np.flatnonzero(~np.isin(np.arange(start.size), fixed))
     state = problem.evaluate(start)
@@ -284,14 +283,14 @@ def minimize(
 
 
 def _is_hidden_by_rounding(problem: StiffnessProblem, state: Iterate, free: Indices) -> bool:
-    """Whether the sum of squares falls, by the step of Gauss and Newton, by no more than rounding changes it."""
+    """Return whether the gain of a Gauss-Newton step is no more than rounding."""
     left = state.residual + state.slope @ _damped_step(state, free, 0.0)
     blur = FREQUENCY_ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
     return state.cost - float(left @ left) <= 2 * math.sqrt(state.cost) * blur + blur**2
 
 
 def _damped_step(state: Iterate, free: Indices, damping: float) -> Floats:
-    """Step of Levenberg and Marquardt; with damping 0 that of Gauss and Newton."""
+    """Return the Levenberg-Marquardt step; with damping 0 that of Gauss and Newton."""
     slope = state.slope[:, free]
     weight = math.sqrt(damping) * np.linalg.norm(slope, 2)
     matrix = np.vstack([slope, weight * np.eye(free.size)])

@@ -28,23 +28,45 @@ def receptance_map(
     loss_factor: float = 0.0,
     group: str | None = None,
 ) -> Complexes:
-    """Deflection over force (m/N) with bearing stiffnesses times each factor, shape (n_factors, n_frequencies).
+    """Compute the receptance for bearing stiffnesses times each of several factors.
 
-    frequency: (n_frequencies,) Hz; factor: (n_factors,) > 0. position, loss_factor eta: as for receptance, which each
-    row is. group: the bearings whose springs are scaled, their dampers and housings are not; None: all with a group.
-
-    One eigenproblem of the order of the number of bearings a frequency. At one factor f0 let H0 be the receptance, S
+    One eigenproblem of the order of the number of bearings per frequency. At one factor f0 let H0 be the receptance, S
     the compliance across the springs and e their elongation under a unit force, both weighted with the roots of the
     spring stiffnesses. With S = V diag(s) V^-1 and d = (1 + i eta)(f/f0 - 1), Woodbury's formula is
     H = H0 - sum over i of p_i d/(1 + d s_i), p = (V^T e)(V^-1 e).
 
-    Raises ValueError as receptance does, for factors not finite and > 0, and a group with no bearing or a rigid one.
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle with dampers.
+    frequency : array_like, shape (n_frequencies,)
+        Frequencies (Hz).
+    factor : array_like, shape (n_factors,)
+        Factors on the bearing springs (-), > 0; dampers and housings are unchanged.
+    position : float
+        Distance from the tool tip (m).
+    loss_factor : float
+        Loss factor eta (-), as for receptance.
+    group : str, optional
+        Group of bearings. Default: all bearings with a group.
 
+    Returns
+    -------
+    ndarray of complex, shape (n_factors, n_frequencies)
+        Deflection over force (m/N).
+
+    Raises
+    ------
+    ValueError
+        As receptance, for factors not finite and > 0, and a group with no bearing or a rigid one.
+
+    Examples
+    --------
     >>> spindle = Spindle([Segment(0.4, 0.05)], [Bearing(0.1, 2e8), Bearing(0.35, 1e8)])
     >>> softer = receptance_map(spindle, np.arange(1.0, 1500.0), [1.0, 0.8, 0.6], loss_factor=0.04)
     >>> softer.shape
     (3, 1499)
-    >>> (abs(softer).argmax(axis=1) + 1).tolist()  # Hz: where the peak at the tip goes as the bearings wear
+    >>> (abs(softer).argmax(axis=1) + 1).tolist()  # Hz: peak at the tip as the bearings wear
     [1124, 1019, 896]
     """
     f, factors = check_frequencies(frequency), _check_factors(factor)
@@ -78,7 +100,7 @@ def _check_factors(factor: ArrayLike) -> Floats:
 
 
 def _compliance(spindle: Spindle, w: Complexes, places: Sequence[float], loss_factor: float) -> Complexes:
-    """Deflections under forces, both at `order_taps` (m), shape (n, n_places, n_places)."""
+    """Return the deflections under forces, both at `places` (m), shape (n, n_places, n_places)."""
     damping = damping_of_bearings(spindle.bearings, loss_factor)
     model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
     dofs = [2 * model.node(place) for place in places]
@@ -95,7 +117,7 @@ def _compliance(spindle: Spindle, w: Complexes, places: Sequence[float], loss_fa
 def _spring_terms(
     bearings: Sequence[Bearing], compliance: Complexes, w: Complexes, loss_factor: float
 ) -> tuple[Complexes, Complexes]:
-    """s and p of the formula above, shape (n, n_bearings) each."""
+    """Return s and p of the formula above, shape (n, n_bearings) each."""
     held = supports(bearings, w, damping_of_bearings(bearings, loss_factor))
     root = np.sqrt([bearing.stiffness for bearing in bearings])
     matrix = np.outer(root, root) * held.across(compliance[:, 1:, 1:])

@@ -10,33 +10,51 @@ from typing import TypeGuard
 
 @dataclass(frozen=True)
 class FitRemark:
-    """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
+    """Remark on a fit. Programs use `code` and `about`; `text` and `cure` may be reworded."""
 
     code: str
     """Kind of remark: words in lower case joined by hyphens, never changed."""
     about: str
-    """Groups or modes that it concerns; empty for the whole."""
+    """Groups or modes of the remark; empty for the whole."""
     text: str
     """Finding, with figures and units, without a full stop."""
     cure: str
-    """Advice what to do about it."""
+    """Remedy."""
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Return one sentence."""
         return ": ".join(filter(None, (self.about, self.text))) + f"; {self.cure}"
 
 
 MIN_SHOWN_ERROR_SHARE = 1e-7
-"""Share of its value below which an error is not shown: a fit of computed data has such."""
+"""Least relative error that is shown: fits of computed data have smaller ones."""
 
 
 def format_with_error(
     value: float, std: float | None, scale: float = 1.0, unit: str = "", *, percent: bool = False
 ) -> str:
-    """Value and standard error with two digits of the error, e.g. "1326.8 ± 5.3 N/um (0.40 %)"; "-" without a value.
+    """Format a value and its standard error with two digits of the error.
 
-    Both are divided by `scale` first. Without an error where there is none (None, NaN, infinite) or next to none.
+    Parameters
+    ----------
+    value : float
+        Value.
+    std : float or None
+        Standard error; not shown if None, NaN, infinite, or almost zero.
+    scale : float
+        Divisor of both (-).
+    unit : str
+        Unit after scaling.
+    percent : bool
+        Add the relative error.
 
+    Returns
+    -------
+    str
+        Text such as "1326.8 ± 5.3 N/um (0.4 %)"; "-" without a value.
+
+    Examples
+    --------
     >>> format_with_error(1326.8e6, 5.3e6, scale=1e6, unit="N/um", percent=True)
     '1326.8 ± 5.3 N/um (0.4 %)'
     >>> format_with_error(696.2, None, unit="Hz")
@@ -51,13 +69,29 @@ def format_with_error(
 
 
 def format_rounded(value: float, std: float | None = None, scale: float = 1.0, digits: int = 6) -> str:
-    """Value with as many digits as its standard error leaves, e.g. "1326.8" of 1326.812 ± 5.3; "-" without a value.
+    """Format a value with as many digits as its standard error justifies, without exponent.
 
-    Both are divided by `scale` first. Without an error so many digits, eight where it is next to none; no exponent.
+    Parameters
+    ----------
+    value : float
+        Value.
+    std : float, optional
+        Standard error.
+    scale : float
+        Divisor of both (-).
+    digits : int
+        Number of digits without an error; eight if the error is almost zero.
 
-    >>> rounded(1326.812e6, 5.3e6, scale=1e6)
+    Returns
+    -------
+    str
+        Text such as "1326.8"; "-" without a value.
+
+    Examples
+    --------
+    >>> format_rounded(1326.812e6, 5.3e6, scale=1e6)
     '1326.8'
-    >>> rounded(1.125e13, scale=1e6)
+    >>> format_rounded(1.125e13, scale=1e6)
     '11250000'
     """
     if not math.isfinite(value):
@@ -75,5 +109,5 @@ def _has_error(std: float | None, value: float) -> TypeGuard[float]:
 
 
 def _error_decimals(error: float) -> int:
-    """Decimals that show two digits of an error, none where it is large."""
+    """Return the decimals that show two digits of an error, none if it is large."""
     return max(1 - math.floor(math.log10(error)), 0)

@@ -17,7 +17,7 @@ from dsm.modes.natural_frequencies import modes_at
 from dsm.spindle.spindle import Spindle
 
 OPEN_REMARK_CODES = ("group-not-felt", "stiffness-ambiguous")
-"""Codes of the remarks that leave a stiffness open."""
+"""Codes of remarks that leave a stiffness open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class StiffnessFit:
     """Spindles whose groups of bearings and joints, each scaled by a factor, put modes at measured frequencies.
 
     n modes, g groups, one spindle or several that share them. Standard errors are of first order in those of the
-    frequencies. They hold for the logarithm of a factor too: an error of 10 % is 0.1 there. Printed, it is a report.
+    frequencies. They hold for the logarithm of a factor too: an error of 10 % is 0.1 there. str() gives a report.
     """
 
     groups: tuple[str, ...]
@@ -35,50 +35,61 @@ class StiffnessFit:
     frequency: Floats
     """Measured frequencies (Hz), shape (n,)."""
     frequency_std: Floats | None
-    """Their standard errors (Hz), shape (n,); None where they were not given."""
+    """Standard errors of the frequencies (Hz), shape (n,); None if not given."""
     fitted_frequency: Floats
     """Frequencies of the fitted spindle (Hz), shape (n,)."""
     factor: Floats
     """Stiffness after over before (-), shape (g,)."""
     log_covariance: Floats | None
-    """Covariance of the logarithms of the factors (-), shape (g, g); None: no errors given, and no mode to spare.
+    """Covariance of the logarithms of the factors (-), shape (g, g); None without errors and without spare modes.
 
-    Propagated from the standard errors of the frequencies, whatever the residuals are. Where none were given, from
-    the scatter of the residuals, taken as errors of equal size in relation to the frequency.
+    Propagated from the standard errors of the frequencies, whatever the residuals are. Without them, from
+    the scatter of the residuals, as equal relative errors of the frequencies.
     """
     energy_share: Floats
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
     remarks: tuple[FitRemark, ...]
-    """Remarks on what makes the result doubtful, and what to do about it."""
+    """Remarks on doubtful results, and remedies."""
     shaft: Indices
-    """Number of the spindle that each mode was measured on, shape (n,); 0 is the first."""
+    """Number of the spindle of each mode, shape (n,); 0 is the first."""
     given: tuple[Spindle, ...]
-    """The spindles as given."""
+    """Spindles as given."""
     spindles: tuple[Spindle, ...]
-    """The fitted spindles."""
+    """Fitted spindles."""
     chi_square: float | None
-    """Sum of squares of the residuals over their errors, those of the drawing included (-); None: no errors given."""
+    """Sum of squared residuals over their errors, those of the drawing included (-); None without errors."""
     tolerance: float
     """Relative standard error of each diameter of the drawing (-)."""
 
     @property
     def spindle(self) -> Spindle:
-        """The fitted spindle, the first of several."""
+        """Fitted spindle, the first of several."""
         return self.spindles[0]
 
     def apply_to(self, spindle: Spindle) -> Spindle:
-        """A spindle with the stiffnesses that the fit started from, its groups scaled by the factors found."""
+        """Scale the groups of a spindle by the fitted factors.
+
+        Parameters
+        ----------
+        spindle : Spindle
+            Spindle with the stiffnesses that the fit started from.
+
+        Returns
+        -------
+        Spindle
+            Scaled spindle.
+        """
         return scale_groups(spindle, dict(zip(self.groups, self.factor.tolist(), strict=True)))
 
     @property
     def open_groups(self) -> frozenset[str]:
-        """Groups whose stiffness the measured modes leave open, as the remarks say."""
+        """Groups whose stiffness the measured modes leave open, by the remarks."""
         about = [remark.about for remark in self.remarks if remark.code in OPEN_REMARK_CODES]
         return frozenset(name for entry in about for name in ([entry] if entry in self.groups else self.groups))
 
     @property
     def has_misfit(self) -> bool:
-        """Whether the frequencies do not fit one another, far beyond their errors."""
+        """Whether the frequencies contradict one another far beyond their errors."""
         return any(remark.code == "frequencies-misfit" for remark in self.remarks)
 
     @property
@@ -88,30 +99,29 @@ class StiffnessFit:
 
     @property
     def factor_std(self) -> Floats | None:
-        """Standard error of the factors (-), shape (g,); None where there is no covariance."""
+        """Standard errors of the factors (-), shape (g,); None without a covariance."""
         if self.log_covariance is None:
             return None
         return np.asarray(self.factor * np.sqrt(np.diag(self.log_covariance)))
 
     @property
     def stiffness(self) -> Floats:
-        """Mean radial stiffness of the parts of each group after the fit (N/m), shape (g,).
+        """Mean radial stiffness of each group after the fit (N/m), shape (g,).
 
-        Of a group of stiffnesses against tilting alone it is their mean (N m/rad).
-
-        An equivalent number of this model: compare it only with others of the same geometry and beam theory.
+        For a group of stiffnesses against tilting only it is their mean (N m/rad). An equivalent number of this model:
+        compare it only with others of the same geometry and beam theory.
         """
         return np.array([group_stiffness(self.spindles, group) for group in self.groups])
 
     @property
     def stiffness_std(self) -> Floats | None:
-        """Its standard error (N/m), shape (g,); None where there is no covariance."""
+        """Standard error of the stiffness (N/m), shape (g,); None without a covariance."""
         std = self.factor_std
         return None if std is None else np.asarray(self.stiffness * std / self.factor)
 
     @property
     def correlation(self) -> Floats | None:
-        """Correlations of the factors (-), shape (g, g); None where there is no covariance."""
+        """Correlations of the factors (-), shape (g, g); None without a covariance."""
         if self.log_covariance is None:
             return None
         std = np.sqrt(np.diag(self.log_covariance))
@@ -119,20 +129,17 @@ class StiffnessFit:
 
     @property
     def condition(self) -> float:
-        """Largest over smallest singular value of d ln f / d ln factor (-); inf where a factor has no effect at all."""
+        """Condition number of d ln f / d ln factor (-); inf if a factor has no effect."""
         return float(np.linalg.cond(self.energy_share))
 
     @property
     def reduced_chi_square(self) -> float | None:
-        """Mean square of residual over standard error, per mode to spare (-), about 1 where the model is right.
-
-        None where no standard errors were given or there is no mode to spare.
-        """
+        """Chi-square per spare mode (-), about 1 if the model is right; None without errors or spare modes."""
         spare = self.frequency.size - self.factor.size
         return None if self.chi_square is None or spare == 0 else self.chi_square / spare
 
     def __str__(self) -> str:
-        """The report."""
+        """Return the report."""
         return "\n".join(
             [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines(), *self._remark_lines()]
         )
@@ -182,42 +189,69 @@ class StiffnessFit:
 
 
 class StiffnessFitError(ArithmeticError):
-    """No minimum was found; the best estimate is kept."""
+    """Raised if no minimum was found; holds the best estimate.
+
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    best : StiffnessFit
+        Best estimate; not reliable.
+    """
 
     def __init__(self, message: str, best: StiffnessFit) -> None:
-        """Keep the estimate beside the message."""
         super().__init__(message)
         self.best = best
-        """The best estimate; not to be trusted."""
 
 
 MAX_LOG_FACTOR_CHANGE = math.log(30.0)
-"""A stiffness that is known less well than to this factor (its logarithm) is moved by no more ..."""
+"""Largest change of a factor (logarithm) for the error of a predicted mode."""
 MIN_LOG_FACTOR_CHANGE = 1e-9
-"""... and by no less than this."""
+"""Smallest change of a factor (logarithm) for the error of a predicted mode."""
 
 
 class PredictedMode(NamedTuple):
-    """One mode of a spindle with the fitted bearings and joints."""
+    """Mode of a spindle with the fitted bearings and joints."""
 
     frequency: float
     """Natural frequency (Hz)."""
     frequency_std: float | None
-    """Standard error of the frequency from those of the stiffnesses (Hz); None where these are not known."""
+    """Standard error of the frequency from those of the stiffnesses (Hz); None if these are unknown."""
     stiffness: float
-    """Modal stiffness where it is looked at (N/m)."""
+    """Modal stiffness at the position (N/m)."""
     stiffness_std: float | None
-    """Standard error of the modal stiffness, likewise (N/m)."""
+    """Standard error of the modal stiffness (N/m); None if those of the bearings are unknown."""
 
 
 def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: float = 0.0) -> PredictedMode:
-    """A mode (1 is the lowest) of a spindle with the groups of the fit, at `position` from its tool tip (m).
+    """Predict a mode of another spindle with the fitted groups, such as one with a third tool.
 
-    spindle: with the stiffnesses that the fit started from, such as the same one with a third tool. The errors are half
-    the change from one end of each principal axis of the factors' covariance to the other, added in squares, and what
-    the tolerance of the drawing adds: diameters that it shares with the fitted spindles act on both. Raises ValueError
-    as modes_at.
+    The errors are half the change between the ends of each principal axis of the factors' covariance, added in squares,
+    and the effect of the drawing tolerance: diameters common with the fitted spindles act on both.
 
+    Parameters
+    ----------
+    fit : StiffnessFit
+        Fitted stiffnesses.
+    spindle : Spindle
+        Spindle with the stiffnesses that the fit started from.
+    mode : int
+        Number of the mode; 1 is the lowest.
+    position : float
+        Distance from the tool tip (m).
+
+    Returns
+    -------
+    PredictedMode
+        Frequency and modal stiffness with errors.
+
+    Raises
+    ------
+    ValueError
+        As modes_at.
+
+    Examples
+    --------
     >>> bearings = [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)]
     >>> tapped = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], bearings)
     >>> fit = fit_stiffness(tapped, [0.95 * natural_frequencies(tapped, 1)[0]], frequency_std=[2.0])
@@ -254,7 +288,7 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
 def _joint_diameter_effects(
     fit: StiffnessFit, spindle: Spindle, values: Callable[[Spindle], Floats]
 ) -> tuple[Floats, Floats]:
-    """Effects of all diameters on the modes of the fit (n, d), and on two values of another spindle (2, d)."""
+    """Return the effects of all diameters on the modes of the fit (n, d), and on two values of a spindle (2, d)."""
     names = diameter_keys([*fit.spindles, spindle])
     order = diameter_columns(names)
     own = np.zeros((2, len(order)))
@@ -264,7 +298,7 @@ def _joint_diameter_effects(
 
 
 def _diameter_variance(fit: StiffnessFit, effect: tuple[Floats, Floats], slope: Floats) -> Floats:
-    """What the drawing adds to the relative variances (2,), whose part by the factors holds its effect on the fit.
+    """Return the part of the drawing in the relative variances (2,), including its effect on the fit.
 
     slope: d ln value / d ln factor, shape (g, 2).
     """

@@ -1,4 +1,4 @@
-"""Bearings and joints that are calibrated together, by the name of their group."""
+"""Groups of bearings and joints that are calibrated together."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ _StiffPart = Bearing | Joint
 
 
 def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
-    """Places in (*bearings, *joints) of what has one common factor: all parts of a group.
+    """Return the indices in (*bearings, *joints) of the parts with one common factor: all parts of a group.
 
-    None: all bearings with a group; joints stay as given, as one factor cannot tell their wear from that of bearings.
-    Raises ValueError where there is none, and for a rigid bearing.
+    None: all bearings with a group; joints are excluded, as one factor cannot separate their wear from that of
+    bearings.
+    Raises ValueError if there is none, and for a rigid bearing.
     """
     if group is None:
         return calibrated_bearings(spindle)
@@ -32,7 +33,7 @@ def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
 
 
 def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]:
-    """Indices (0 is the first) of the bearings of a group; None: of all but those of no group."""
+    """Return the indices (0 is the first) of the bearings of a group; None: of all bearings with a group."""
     chosen = [
         index
         for index, bearing in enumerate(spindle.bearings)
@@ -48,7 +49,7 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 
 
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
-    """The spindle with bearing stiffnesses, and both stiffnesses of joints, times a factor; see calibrated_parts."""
+    """Scale bearing stiffnesses, and both stiffnesses of joints, by a factor; see calibrated_parts."""
     factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
     return _with_parts(
         spindle, [_scale_part(part, one, one) for part, one in zip(_parts(spindle), factors, strict=True)]
@@ -56,15 +57,15 @@ def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spind
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
-    """Mean radial stiffness of parts (N/m)."""
+    """Return the mean radial stiffness of parts (N/m)."""
     parts = _parts(spindle)
     return math.fsum(parts[index].stiffness for index in chosen) / len(chosen)
 
 
 def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> tuple[str, ...]:
-    """The groups to calibrate; None: all that the spindles have, bearings first, in order of appearance.
+    """Return the groups to calibrate; None: all groups of the spindles, bearings first, in order of appearance.
 
-    Raises ValueError for a group that is not there or named twice, for none, and for one with a rigid bearing.
+    Raises ValueError for a group that is unknown or named twice, for none, and for one with a rigid bearing.
     """
     known_names = tuple(dict.fromkeys(name for spindle in spindles for name in _group_names(spindle) if name))
     names = known_names if groups is None else tuple(groups)
@@ -84,7 +85,7 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 
 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
-    """The spindle with bearing stiffnesses, and both stiffnesses of joints, times the factor of their group."""
+    """Scale bearing stiffnesses, and both stiffnesses of joints, by the factor of their group."""
 
     def scaled(part: _StiffPart) -> _StiffPart:
         tilting = factors.get(_tilting_group(part), 1.0) if isinstance(part, Joint) else 1.0
@@ -94,9 +95,9 @@ def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
 
 
 def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
-    """Mean radial stiffness of the bearings and joints of a group (N/m), in the first of the spindles that has it.
+    """Return the mean radial stiffness of a group (N/m), in the first of the spindles that has it.
 
-    Of a group of stiffnesses against tilting alone it is their mean (N m/rad); see is_tilting.
+    For a group of stiffnesses against tilting only it is their mean (N m/rad); see is_tilting.
     """
     for spindle in spindles:
         chosen = [index for index, part in enumerate(_parts(spindle)) if part.group == group]
@@ -109,12 +110,15 @@ def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
 
 
 def is_tilting(spindles: Sequence[Spindle], group: str) -> bool:
-    """Whether a group holds nothing but stiffnesses against tilting."""
+    """Return whether a group holds stiffnesses against tilting only."""
     return all(part.group != group for spindle in spindles for part in _parts(spindle))
 
 
 def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
-    """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor."""
+    """Return the share of each group in the strain energy of each mode (-), shape (n_modes, n_groups).
+
+    It is d ln w^2 / d ln factor.
+    """
     energy = spring_energy(modes)
     shares = np.zeros((modes.frequency.size, len(groups)))
     springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
@@ -126,7 +130,7 @@ def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
 
 
 def _tilting_group(joint: Joint) -> str:
-    """Group of its stiffness against tilting."""
+    """Return the group of the stiffness against tilting."""
     return joint.rotational_group or joint.group
 
 

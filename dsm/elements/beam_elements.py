@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Flags, Floats, Indices
-from dsm.elements import matrix_series
 from dsm.elements.element_series import (
     FIRST_SERIES_POLE,
     MAX_ELEMENT_X,
@@ -25,7 +24,7 @@ from dsm.spindle.spindle import Theory
 def stiffness_elements(
     shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
 ) -> Floats:
-    """Dynamic stiffness of elements as series, shape (10, n, n_terms); arguments as for transfer_series.
+    """Return the dynamic stiffness of elements as series, shape (10, n, n_terms); arguments as for transfer_series.
 
     With u, t of both ends the rows are k(u1,u1), k(u1,t1), k(t1,t1); k(u2,u2), k(u2,t2), k(t2,t2); k(u1,u2), k(u1,t2),
     k(t1,u2), k(t1,t2).
@@ -48,27 +47,31 @@ def stiffness_elements(
 def link_elements(
     shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
 ) -> Floats:
-    """Short elements as series that lose nothing however short they are, shape (10, n, n_terms); arguments as above.
+    """Return short elements as series without loss of digits, shape (10, n, n_terms); arguments as for transfer_series.
 
-    Unknown beside q1 = (u1, t1) are the force and the moment p at end 2: [f1; 0; f2] = [[S, -H^T, 0], [-H, -F, I],
-    [0, I, 0]] [q1; p; q2], so that q2 = H q1 + F p: a rigid lever H, the flexibility F in series, the inertia in S. The
-    rows are S(u,u), S(u,t), S(t,t); -F(Q,Q), -F(Q,M), -F(M,M); -H^T(u,Q), -H^T(u,M), -H^T(t,Q), -H^T(t,M).
+    Further unknowns besides q1 = (u1, t1) are the force and the moment p at end 2: [f1; 0; f2] = [[S, -H^T, 0],
+    [-H, -F, I], [0, I, 0]] [q1; p; q2], so that q2 = H q1 + F p: a rigid lever H, the flexibility F in series, the
+    inertia
+    in S. The rows are S(u,u), S(u,t), S(t,t); -F(Q,Q), -F(Q,M), -F(M,M); -H^T(u,Q), -H^T(u,M), -H^T(t,Q), -H^T(t,M).
     """
     if segment.size == 0:
         return np.zeros((10, 0, count_series_terms(apart)))
     transfer = transfer_series(shaft, theory, segment, start, end, apart)
     _, b, c, d = _split_quarters(transfer)
-    lever = matrix_series.inverse(d)  # H^T
-    flexibility = matrix_series.product(b, lever)
-    inertia = matrix_series.product(lever, c)
+    lever = _invert_series(d)  # H^T
+    flexibility = _multiply_series(b, lever)
+    inertia = _multiply_series(lever, c)
     return np.stack([*_upper_triangle(inertia), *_upper_triangle(-flexibility), *_matrix_entries(-lever)])
 
 
 def _stiffness_from_transfer(transfer: Floats) -> Floats:
-    """Of f1 = -(Q1, M1) and f2 = (Q2, M2) with q2 = A q1 + B (Q1, M1): K11 = B^-1 A, K12 = -B^-1, K22 = D B^-1."""
+    """Return the stiffness rows from q2 = A q1 + B (Q1, M1): K11 = B^-1 A, K12 = -B^-1, K22 = D B^-1.
+
+    End forces are f1 = -(Q1, M1) and f2 = (Q2, M2).
+    """
     a, b, _, d = _split_quarters(transfer)
-    across = matrix_series.inverse(b)
-    near, far = matrix_series.product(across, a), matrix_series.product(d, across)
+    across = _invert_series(b)
+    near, far = _multiply_series(across, a), _multiply_series(d, across)
     return np.stack([*_upper_triangle(near), *_upper_triangle(far), *_matrix_entries(-across)])
 
 
@@ -81,29 +84,66 @@ def _matrix_entries(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def _upper_triangle(matrix: Floats) -> tuple[Floats, Floats, Floats]:
-    """The upper half of a symmetric matrix, the mean of the two halves."""
+    """Return the upper half of a symmetric matrix, the mean of both halves."""
     return matrix[:, 0, 0], (matrix[:, 0, 1] + matrix[:, 1, 0]) / 2, matrix[:, 1, 1]
 
 
+def _multiply_series(a: Floats, b: Floats) -> Floats:
+    """Multiply power series of 2 x 2 matrices, shape (n, 2, 2, n_terms), cut off after n_terms."""
+    near, far = _terms_outside(a), _terms_outside(b)
+    series = np.zeros_like(far)
+    for power in np.flatnonzero(near.any(axis=(0, 1, 3))):
+        series[:, :, power:] += _multiply(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
+    return _terms_last(series)
+
+
+def _invert_series(a: Floats) -> Floats:
+    """Invert a power series of 2 x 2 matrices whose term 0 has an inverse."""
+    given = _terms_outside(a)
+    (p, q), (r, s) = given[:, :, :1]
+    inverted = np.array([[s, -q], [-r, p]]) / (p * s - q * r)
+    series, remainder = np.zeros_like(given), np.zeros_like(given)
+    remainder[0, 0, 0] = remainder[1, 1, 0] = 1.0
+    for power in range(given.shape[2]):
+        if not np.any(remainder[:, :, power]):
+            continue
+        series[:, :, power, np.newaxis] = _multiply(inverted, remainder[:, :, power, np.newaxis])
+        earlier = _multiply(given[:, :, 1 : given.shape[2] - power], series[:, :, power, np.newaxis])
+        remainder[:, :, power + 1 :] -= earlier
+    return _terms_last(series)
+
+
+def _multiply(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, :1] * b[:1] + a[:, 1:] * b[1:])
+
+
+def _terms_outside(series: Floats) -> Floats:
+    return np.ascontiguousarray(series.transpose(1, 2, 3, 0))
+
+
+def _terms_last(terms: Floats) -> Floats:
+    return np.ascontiguousarray(terms.transpose(3, 0, 1, 2))
+
+
 MAX_SHAFT_ELEMENTS = 1000
-"""More are refused: the work grows with their third power."""
+"""Most elements: the work grows with their third power."""
 MAX_TAPER_RATIO = 1.5
-"""Largest ratio of outer diameters, and of walls, of the ends of one element; steeper cones are divided."""
+"""Largest ratio of outer diameters, and of walls, at the ends of an element; steeper cones are divided."""
 SHORT_ELEMENT_SHARE = 0.05
-"""Elements shorter than this part of the longest allowed are links: their stiffness is beyond 1e4 of their inertia."""
+"""Length over the longest allowed below which an element is a link: its stiffness exceeds its inertia 1e4 times."""
 MAX_LINK_SHARE = 0.4
-"""Links longer than this part of the longest element would need more terms: x < 0.8, their pole is at 1.875."""
+"""Largest length of a link over the longest element; longer ones need more terms: x < 0.8, their pole is at 1.875."""
 
 
 class Nodes(NamedTuple):
     """Nodes along a shaft and the elements between them."""
 
     position: Floats
-    """Places of the nodes (m), rising, shape (n,)."""
+    """Positions of the nodes (m), rising, shape (n,)."""
     segment: Indices
-    """Index of the segment that each element is part of, shape (n - 1,)."""
+    """Index of the segment of each element, shape (n - 1,)."""
     short: Flags
-    """Whether an element is so short that stiffness alone would drown all else in rounding, shape (n - 1,)."""
+    """Whether an element is a link, because its stiffness would lose all else to rounding, shape (n - 1,)."""
 
 
 def place_nodes(
@@ -114,7 +154,7 @@ def place_nodes(
     spin: float | None,
     links: bool = False,
 ) -> Nodes:
-    """Nodes at the ends of segments and the `wanted` places (m), and what divides elements that are too long.
+    """Place nodes at the ends of segments and the `wanted` places (m), and divide elements that are too long.
 
     Too long for the series at `top_frequency` (Hz), or for the steepness of a cone; spin (rad/s) and links as in
     assemble. Raises ValueError for a place off the shaft, ArithmeticError for too many elements.
@@ -126,8 +166,8 @@ def place_nodes(
     parts = np.ceil(size / longest * (1 - 1e-12)).clip(1, MAX_SHAFT_ELEMENTS + 1).astype(int)
     if parts.sum() > MAX_SHAFT_ELEMENTS:
         raise ArithmeticError(
-            f"{top_frequency:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements: ask for lower frequencies and modes, "
-            "and look for segments far too thin or soft, and for wrong units"
+            f"{top_frequency:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements: ask for lower frequencies and "
+            "modes, and look for segments far too thin or soft, and for wrong units"
         )
     if parts.max() > 1:
         split = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(nodes[:-1], nodes[1:], parts, strict=True)]
@@ -136,7 +176,7 @@ def place_nodes(
 
 
 def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> Floats:
-    """Nodes at ends of segments, inside steep cones and at the wanted places; places that are the same count once."""
+    """Return nodes at ends of segments, inside steep cones and at the wanted places, equal places once."""
     ends = shaft.ends
     slack = SAME_PLACE * ends[-1]
     nodes, places = np.append(ends, _cone_nodes(shaft)), np.sort(wanted)
@@ -149,7 +189,7 @@ def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> Floats:
 
 
 def _cone_nodes(shaft: Sections) -> Floats:
-    """Places (m) that divide each cone into parts of equal ratio of what changes most, outer diameter or wall."""
+    """Return places (m) that divide each cone into parts of equal ratio of outer diameter or wall."""
     places = [np.zeros(0)]
     for index in np.flatnonzero(shaft.is_cone):
         outer, end_outer, bore, end_bore = shaft.diameters[:4, index]
@@ -164,7 +204,7 @@ def _cone_nodes(shaft: Sections) -> Floats:
 def _element_size(
     shaft: Sections, segment: Indices, nodes: Floats, theory: Theory, top_frequency: float, spin: float | None
 ) -> Floats:
-    """Length of each element over the longest for which w stays as far below its clamped frequencies as x = MAX_X.
+    """Return the length of each element over the longest for which w stays as far below its poles as MAX_ELEMENT_X.
 
     Dunkerley: 1/w_clamped^2 <= sum of those of bending, of shear and of rotary inertia alone; in a cone each with the
     softest and the heaviest of its cross-sections.

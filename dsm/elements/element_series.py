@@ -13,17 +13,17 @@ from dsm.spindle.sections import Sections
 from dsm.spindle.spindle import Theory
 
 SERIES_TERMS = 12
-"""Terms kept: the first pole is at z = 4.7300^4 = 500.56, so that the rest is below 1e-17 for z <= MAX_X^4."""
+"""Number of terms: the first pole is at z = 500.56, so that the rest is below 1e-17 for z <= MAX_ELEMENT_X^4."""
 FIRST_SERIES_POLE = 500.5639
-"""Lowest pole in z = x^4: where the element with clamped ends resonates, 4.7300^4."""
+"""Lowest pole in z = x^4: resonance of the element with clamped ends, 4.7300^4."""
 MAX_ELEMENT_X = 2.0
-"""Largest x = L (m w^2/EI)^(1/4) of an element: longer ones are split, and no clamped frequency is left below w."""
+"""Largest x = L (m w^2/EI)^(1/4) of an element: longer ones are divided, and no clamped frequency is below w."""
 
 _FractionSeries = list[Fraction]
 
 
 def element_series(bending_stiffness: Floats, mass_per_length: Floats, length: Floats) -> Floats:
-    """Coefficients of the element matrices in powers of w^2, shape (6, n_elements, TERMS).
+    """Return the coefficients of the element matrices in powers of w^2, shape (6, n_elements, SERIES_TERMS).
 
     bending_stiffness EI (N m^2), mass_per_length m (kg/m), length L (m): shape (n_elements,). With u the deflection
     and t = du/dz the slope at both ends, the six rows are k(u1,u1), k(u1,t1), k(t1,t1), k(u1,u2), k(u1,t2), k(t1,t2);
@@ -40,7 +40,7 @@ def element_series(bending_stiffness: Floats, mass_per_length: Floats, length: F
 
 @cache
 def _unit_series() -> Floats:
-    """The six series in z = m w^2 L^4/EI for EI = L = 1, shape (6, TERMS), rounded once from exact fractions.
+    """Return the six series in z = m w^2 L^4/EI for EI = L = 1, shape (6, SERIES_TERMS), from exact fractions.
 
     The solutions of u'''' = z u with one unit derivative at s = 0 are c_j(s) = sum z^n s^(4n+j)/(4n+j)!, and at
     s = 1 c_3' = c_2, c_2' = c_1, c_1' = c_0, c_0' = z c_3. Solving for the end forces gives the fractions below.
@@ -76,17 +76,18 @@ def _divide_series(a: _FractionSeries, b: _FractionSeries) -> _FractionSeries:
 
 
 def count_series_terms(apart: bool) -> int:
-    """Terms kept of each series."""
+    """Return the number of terms of each series."""
     return SERIES_TERMS * SERIES_TERMS if apart else SERIES_TERMS
 
 
 def combine_rotary_terms(series: Floats, spin: float) -> Floats:
-    """A series with rotary inertia apart as one in powers of w, at a speed of rotation W = `spin` (rad/s).
+    """Combine a series with separate rotary inertia to one in powers of w, at a speed of rotation W = `spin` (rad/s).
 
-    Term TERMS n + j of the series (..., TERMS^2) belongs to w^2 to the power n - j times r to the power j <= n, r what
-    rotary inertia is multiplied by: products of such series are those of their terms, cut off alike. In the circular
+    Term SERIES_TERMS n + j of the series (..., SERIES_TERMS^2) belongs to w^2 to the power n - j times r to the power
+    j <= n, r the factor of rotary inertia: products of such series are those of their terms, cut off alike. In the
+    circular
     whirl u exp(i w t), forward for w > 0, of a round shaft gyroscopic moments make r = w^2 - 2 W w. Result: (...,
-    2 TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
+    2 SERIES_TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
     """
     kept, lowered, binomial = _rotary_terms()
     weight = binomial * (-2 * spin) ** lowered
@@ -95,7 +96,7 @@ def combine_rotary_terms(series: Floats, spin: float) -> Floats:
 
 @cache
 def _rotary_terms() -> tuple[Indices, Indices, Floats]:
-    """Terms that are not 0, and how (w^2 - 2 W w)^j w^(2n - 2j) is made of powers of w: exponents of -2 W, factors."""
+    """Return the indices of non-zero terms, and exponents and factors of (w^2 - 2 W w)^j w^(2n - 2j) in powers of w."""
     pairs = [(n, j) for n in range(SERIES_TERMS) for j in range(n + 1)]
     lowered = np.zeros((len(pairs), 2 * SERIES_TERMS - 1), dtype=int)
     binomial = np.zeros(lowered.shape)
@@ -106,19 +107,21 @@ def _rotary_terms() -> tuple[Indices, Indices, Floats]:
 
 
 GAUSS_POINTS = 16
-"""Gauss points of an element: cross-sections that change by MOST_TAPER are integrated to rounding."""
+"""Gauss points of an element: cross-sections that change by MAX_TAPER_RATIO are integrated to rounding."""
 
 
 def transfer_series(
     shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
 ) -> Floats:
-    """State (u, t, Q, M) at `end` from that at `start`, in powers of w^2: (n, 4, 4, number_of_terms(apart)).
+    """Return the state (u, t, Q, M) at `end` from that at `start`, in powers of w^2: (n, 4, 4, n_terms).
 
     segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of
     the cross-section, Q the shear force and M the bending moment: EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u and
-    M' = -Q - rho I r t with r = w^2, where Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a
-    variable of its own, see whirl_terms. Each term follows from those below it by integration (Picard), exact but for
-    rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ..., Phil.
+    M' = -Q - rho I r t with r = w^2; Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a
+    separate variable, see combine_rotary_terms. Each term follows from those below it by integration (Picard), exact
+    but
+    for rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ...,
+    Phil.
     Mag. 41 (1921).
     """
     place, weight, running = _quadrature()
@@ -152,7 +155,7 @@ def transfer_series(
 
 @cache
 def _quadrature() -> tuple[Floats, Floats, Floats]:
-    """Gauss points and weights on 0 to 1, and the matrix that integrates from 0 to each point."""
+    """Return Gauss points and weights on 0 to 1, and the matrix that integrates from 0 to each point."""
     point, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     order = np.arange(GAUSS_POINTS)
     to_legendre = (order[:, np.newaxis] + 0.5) * np.polynomial.legendre.legvander(point, GAUSS_POINTS - 1).T * weight

@@ -1,4 +1,4 @@
-"""From a spindle to its dynamic stiffness matrix."""
+"""Assemble the dynamic stiffness matrix of a spindle."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from dsm.spindle.segment import Material, Segment, nearest_index
 from dsm.spindle.spindle import Spindle, Theory
 
 SLOW_SPIN_SHARE = 0.25
-"""Speeds below this part of the highest w divide the shaft alike: gyroscopic moments are small beside its inertia."""
+"""Speed over the highest w below which shafts are divided alike: gyroscopic moments are small then."""
 HeldDof = tuple[float, int]
-"""A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
+"""Fixed degree of freedom: position (m), and 0 for the deflection or 1 for the slope."""
 
 
 def assemble(
@@ -33,13 +33,13 @@ def assemble(
     spin: float | None = None,
     links: bool = False,
 ) -> DynamicStiffness:
-    """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `order_taps` (m) and `held` dofs.
+    """Assemble the matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
 
-    Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
-    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: places in (*bearings, *joints) of parts
-    that are taken away but for their nodes: the radial spring of a bearing, both springs of a joint. spin (rad/s): a
+    Elements longer than the series allows at `top_frequency` (Hz) are divided into equal parts. A pinned end is
+    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: indices in (*bearings, *joints) of parts
+    that are removed except for their nodes: the radial spring of a bearing, both springs of a joint. spin (rad/s): a
     polynomial in w for circular whirl, see DynamicStiffness. links: all elements are links, twice the work, for
-    bearings far softer than the shaft. The same one is not made twice.
+    bearings far softer than the shaft. Matrices are cached.
     Raises ValueError for a place off the shaft.
     """
     nodes = tuple(map(float, places))
@@ -102,9 +102,9 @@ def _assemble_shaft(
     fastest: float | None,
     links: bool,
 ) -> DynamicStiffness:
-    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common.
+    """Assemble the shaft and its joints alone, common to spindles that differ in bearings and masses.
 
-    fastest: for speeds up to that (rad/s), terms as for whirl_terms; None: for a shaft at rest.
+    fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
     """
     shaft = sections_of_segments(segments, material)
     position, segment, short = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
@@ -114,7 +114,7 @@ def _assemble_shaft(
 
 
 def shared_spin_limit(spin: float, top_frequency: float) -> float:
-    """A speed (rad/s) not below this one that others share, and with it nodes and series."""
+    """Return a speed (rad/s) not below this one for which nodes and series are shared."""
     fastest = SLOW_SPIN_SHARE * 2 * math.pi * top_frequency
     while fastest < spin:
         fastest *= 2
@@ -122,7 +122,7 @@ def shared_spin_limit(spin: float, top_frequency: float) -> float:
 
 
 def _reverse_spin(model: DynamicStiffness) -> DynamicStiffness:
-    """The same shaft spinning the other way round: speed and frequency change their signs together."""
+    """Return the shaft with the opposite sense of rotation: speed and frequency change their signs together."""
     sign = (-1.0) ** np.arange(model.diagonal.shape[2])
     spin = None if model.spin is None else -model.spin
     return replace(model, diagonal=sign * model.diagonal, coupling=sign * model.coupling, spin=spin)
@@ -136,7 +136,7 @@ def _part_positions(spindle: Spindle) -> list[float]:
 def _element_series(
     theory: Theory, shaft: Sections, position: Floats, segment: Indices, short: Flags, apart: bool
 ) -> Floats:
-    """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
+    """Return the series of all elements, (10, n_elements, n_terms): link_elements if short, else stiffness_elements."""
     blocks = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
         blocks.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
@@ -148,7 +148,7 @@ def _element_series(
 def _insert_joints(
     joints: Sequence[Joint], position: Floats, series: Floats, short: Flags
 ) -> tuple[Floats, Floats, Flags]:
-    """Nodes and elements with a link of no length at each joint."""
+    """Insert a link of zero length at each joint."""
     for joint in joints:
         node = nearest_index(position, joint.position)
         link = np.zeros((10, series.shape[2]))
@@ -163,7 +163,7 @@ def _insert_joints(
 def _join_elements(
     position: Floats, series: Floats, short: Flags, top_frequency: float, least: tuple[float, float]
 ) -> DynamicStiffness:
-    """Elements put together, with a node of force and moment inside each link; its scale is that of `least` only."""
+    """Join elements, with a node of force and moment inside each link; the scale is that of `least` only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
     count, terms = node[-1] + 1, series.shape[2]
     diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
@@ -181,7 +181,7 @@ def _join_elements(
 
 
 def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
-    """Stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
+    """Return the stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
     middle = np.arange(shaft.ends.size - 1)
     rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
     length = float(shaft.ends[-1])
@@ -189,7 +189,7 @@ def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
 
 
 def _dof_scale(model: DynamicStiffness) -> Floats:
-    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+    """Return one over the root of the stiffness, or of the flexibility, at each dof, limited by the whole shaft."""
     sizes = np.maximum(model.diagonal[::2, :, 0], model.scale[:2, np.newaxis] ** -2)
     link = np.flatnonzero(model.is_link)
     sizes[:, link] = np.maximum(-model.diagonal[::2, link, 0], 1 / sizes[:, link - 1])
@@ -207,7 +207,7 @@ def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
 
 
 def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[HeldDof]:
-    """Add the bearings; what they hold rigidly is returned."""
+    """Add the bearings and return the dofs of rigid ones."""
     rigid: list[HeldDof] = []
     nodes = (model.dofs(spindle.bearings) // 2).tolist()
     for index, (bearing, node) in enumerate(zip(spindle.bearings, nodes, strict=True)):

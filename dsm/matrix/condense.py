@@ -14,7 +14,7 @@ from dsm.spindle.spindle import Spindle
 
 
 class CondensedStiffness(NamedTuple):
-    """What a whole shaft opposes to deflection u and slope t of one node; (n,) each, n frequencies."""
+    """Stiffness of a whole shaft against deflection u and slope t of one node; (n,) each, n frequencies."""
 
     uu: Complexes
     """Force over deflection (N/m)."""
@@ -29,10 +29,10 @@ class CondensedStiffness(NamedTuple):
 
 
 class _Elimination(NamedTuple):
-    """What the nodes before one do to it: stiffness to be added, and how the node before it follows its motion."""
+    """Effect of the nodes before one: lost stiffness, and their motion from its motion."""
 
     lost: tuple[Complexes, Complexes, Complexes]
-    """uu, ut, tt to be taken from the stiffness of the node."""
+    """Values of uu, ut, tt to be subtracted from the stiffness of the node."""
     follow: tuple[Complexes, Complexes, Complexes, Complexes]
     """Motion of the node before over that of this one, with changed sign: u/u, u/t, t/u, t/t."""
 
@@ -42,9 +42,9 @@ def condense_to_node(
 ) -> CondensedStiffness:
     """Eliminate all nodes but one, from both ends, all frequencies at once.
 
-    diagonal, coupling: blocks of K as in DynamicStiffness.blocks. is_link: which nodes are those of force and moment;
+    diagonal, coupling: blocks of K as in DynamicStiffness.blocks. is_link: nodes of force and moment;
     each is eliminated together with the node before it, which alone may be free to move (a tip at rest). start: a node
-    not beyond `node` whose deflection is carried along; None: the node itself.
+    not beyond `node` whose deflection is returned; None: the node itself.
     """
     diagonal, coupling = diagonal.swapaxes(0, 1), coupling.swapaxes(0, 1)
     begin = node if start is None else start
@@ -61,7 +61,7 @@ def condense_to_node(
 def _eliminate(
     diagonal: Complexes, coupling: Complexes, is_link: Flags, start: int
 ) -> tuple[tuple[Complexes, Complexes, Complexes], Complexes, Complexes]:
-    """What the last of the nodes takes from the stiffness of the next; with it, the deflection of node `start`."""
+    """Return the stiffness that the last node takes from the next one, and the deflection of node `start`."""
     nothing = np.zeros(1, dtype=np.complex128)
     lost = nothing, nothing, nothing
     share_u, share_t = nothing + 1, nothing
@@ -88,7 +88,7 @@ def _across_element(pivot: tuple[Complexes, ...], coupling: Complexes) -> _Elimi
 
 
 def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes, far: Complexes) -> _Elimination:
-    """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a tip that nothing holds."""
+    """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a free tip."""
     shape = near[0].shape
     a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
     both = np.array(
@@ -110,10 +110,10 @@ def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes
 def damped_blocks(
     model: DynamicStiffness, spindle: Spindle, w: Complexes, damping: Damping, derivative: bool = False
 ) -> tuple[Complexes, Complexes]:
-    """Blocks of K(w) as in DynamicStiffness.blocks, for a shaft that does not spin, at w (rad/s), shape (n,), complex.
+    """Return the blocks of K(w) with damping, for a shaft at rest at complex w (rad/s), shape (n,).
 
-    Shaft, bearings, housing and joints have the complex stiffness k (1 + i eta). Beside it each bearing has its viscous
-    damper, i w c in parallel with its spring, before the housing; those of `damping` count, not those of the spindle.
+    Shaft, bearings, housing and joints have the complex stiffness k (1 + i eta). Each bearing also has its viscous
+    damper, i w c parallel to its spring, before the housing, taken from `damping`, not from the spindle.
     With `derivative`, the blocks of dK/dw.
     """
     complexity = damping.complexity
@@ -145,10 +145,10 @@ def condense_damped(
     start: int | None = None,
     extra: Complexes | None = None,
 ) -> CondensedStiffness:
-    """All of a shaft that does not spin condensed to one node, dynamically, exact at each frequency (Hz), shape (n,).
+    """Condense a shaft at rest dynamically to one node, exact at each frequency (Hz), shape (n,).
 
-    loss_factor: of all stiffness, see Damping; below 0 a ValueError. node and start: as for condense. extra: stiffness
-    uu, ut, tt that something else adds at the last node, shape (3, n).
+    loss_factor: of all stiffness, see Damping; ValueError below 0. node and start: as for condense_to_node. extra:
+    stiffness uu, ut, tt to be added at the last node, shape (3, n).
     """
     damping = damping_of_bearings(spindle.bearings, loss_factor)
     w = np.asarray(2 * np.pi * frequency, dtype=np.complex128)

@@ -16,7 +16,7 @@ from dsm.spindle.segment import nearest_index, nearest_indices
 
 
 def check_frequencies(frequency: ArrayLike) -> Floats:
-    """The frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
+    """Return the frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
     f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
     if f.ndim != 1:
         raise ValueError(f"frequency has shape {f.shape}; a 1-D array (Hz) is needed")
@@ -27,12 +27,12 @@ def check_frequencies(frequency: ArrayLike) -> Floats:
 
 
 class SymmetricFactor(NamedTuple):
-    """L D L^T by the pivoting of Bunch and Kaufman, as LAPACK keeps it."""
+    """Factor L D L^T with the pivoting of Bunch and Kaufman, in the format of LAPACK."""
 
     values: Floats
-    """L, and D of 1 x 1 and 2 x 2 blocks."""
+    """Entries of L, and of D in 1 x 1 and 2 x 2 blocks."""
     pivots: NDArray[np.int32]
-    """Rows exchanged; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
+    """Row exchanges; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
 
     @property
     def negative(self) -> int:
@@ -42,12 +42,12 @@ class SymmetricFactor(NamedTuple):
         return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs)
 
     def solve(self, right: Floats) -> Floats:
-        """Solutions of matrix times y = right, shape (n, m)."""
+        """Solve matrix times y = right, shape (n, m)."""
         return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
 
 
 def symmetric_factor(matrix: Floats) -> SymmetricFactor:
-    """The factor of a matrix (n, n) in Fortran's order, its lower half alone looked at; the matrix is overwritten."""
+    """Factor a matrix (n, n) in Fortran order from its lower half; the matrix is overwritten."""
     values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
     return SymmetricFactor(values, pivots)
 
@@ -56,7 +56,7 @@ Number = TypeVar("Number", np.float64, np.complex128)
 
 
 class _PositionedPart(Protocol):
-    """A part of a spindle."""
+    """Part of a spindle."""
 
     @property
     def position(self) -> float:
@@ -67,81 +67,81 @@ class _PositionedPart(Protocol):
 class DynamicStiffness:
     """Stiffness matrix K of a chain of beam elements, a polynomial in w^2 (w the angular frequency, rad/s).
 
-    For a shaft that spins it is a polynomial in w, for the circular whirl u exp(i w t) of both planes together. What
-    is called eigenvalue below is w^2, or w where it spins. Lumped masses, bearings and joints of no length are in it.
+    For a spinning shaft it is a polynomial in w, for the circular whirl u exp(i w t) of both planes together. The
+    eigenvalue below is w^2, or w for a spinning shaft. Lumped masses, bearings and joints of no length are included.
     Node i has the deflection u_i and the slope t_i = du/dz, in this order. Between two nodes that are very near to each
-    other, or on both sides of a joint, stands a node of force and moment instead: a link, with its flexibility in place
-    of its stiffness, whose rounding would drown all else (link_elements). A dof that is held has its row and column
+    other, or on both sides of a joint, is a node of force and moment: a link, with flexibility instead
+    of stiffness, whose rounding would hide all else (link_elements). A held dof has its row and column
     replaced by those of the unit matrix: it stays at zero and adds a positive pivot; a link adds two negative ones.
     Exact for w up to that of `top_frequency`, where no element has a clamped natural frequency of its own (J0 = 0 of
     Wittrick and Williams).
     """
 
     position: Floats
-    """Nodes from the tool tip on (m), shape (n_nodes,); inf for those of force and moment."""
+    """Nodes from the tool tip on (m), shape (n_nodes,); inf for nodes of force and moment."""
     diagonal: Floats
     """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of the eigenvalue, (3, n_nodes, n_terms)."""
     coupling: Floats
-    """The same of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, shape (4, n_nodes - 1, n_terms)."""
+    """Coefficients of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, (4, n_nodes - 1, n_terms)."""
     held: Flags
-    """Dofs that cannot move, shape (n_nodes, 2)."""
+    """Fixed dofs, shape (n_nodes, 2)."""
     scale: Floats
-    """Factors on rows and columns of a full matrix that make them of one size, shape (2 n_nodes,)."""
+    """Scale factors of rows and columns of a full matrix, shape (2 n_nodes,)."""
     top_frequency: float
     """Highest frequency of interest (Hz)."""
     spin: float | None = None
-    """Speed of rotation (rad/s); forward whirl turns with it. None: the polynomial is one in w^2."""
+    """Speed of rotation (rad/s); forward whirl has its sense. None: the polynomial is one in w^2."""
 
     @property
     def is_link(self) -> Flags:
-        """Which nodes are those of force and moment, shape (n_nodes,)."""
+        """Which nodes are nodes of force and moment, shape (n_nodes,)."""
         return np.isinf(self.position)
 
     @cached_property
     def link_pivots(self) -> int:
-        """Negative pivots that belong to links: two each, but for forces that are held at zero."""
+        """Number of negative pivots of links: two each, except for forces that are held at zero."""
         return int(np.count_nonzero(~self.held[self.is_link]))
 
     def to_eigenvalue(self, frequency: Floats) -> Floats:
-        """The variable of the polynomial at frequencies (Hz), any shape."""
+        """Convert frequencies (Hz), any shape, to the variable of the polynomial."""
         w = 2 * np.pi * frequency
         return np.asarray(w if self.spin is not None else w * w)
 
     def to_frequency(self, eigenvalue: Floats) -> Floats:
-        """Frequencies (Hz) at values of the variable, any shape."""
+        """Convert the variable of the polynomial, any shape, to frequencies (Hz)."""
         return np.asarray((eigenvalue if self.spin is not None else np.sqrt(eigenvalue)) / (2 * np.pi))
 
     def node(self, position: float) -> int:
-        """Index of the node nearest to a position (m)."""
+        """Return the index of the node nearest to a position (m)."""
         return nearest_index(self.position, position)
 
     def dofs(self, parts: Sequence[_PositionedPart]) -> Indices:
-        """Indices of the deflections of the nodes of parts in a full matrix, shape (n,)."""
+        """Return the indices of the deflections at parts in a full matrix, shape (n,)."""
         if not parts:
             return np.zeros(0, dtype=int)
         return 2 * nearest_indices(self.position, [part.position for part in parts])
 
     def blocks(self, eigenvalue: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
-        """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n), in SI units, at eigenvalues (n,).
+        """Return diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n), in SI units, at eigenvalues (n,).
 
-        These may be complex or negative. With `derivative`, those of dK by the eigenvalue.
+        Eigenvalues may be complex or negative. With `derivative`, the derivatives by the eigenvalue.
         """
         powers = self._powers(eigenvalue, derivative)
         return self.diagonal @ powers, self.coupling @ powers
 
     def dense(self, eigenvalue: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
-        """K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
+        """Return K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
         return full_matrices(*self.blocks(eigenvalue, derivative))
 
     def scaled(self, eigenvalue: Floats) -> list[Floats]:
-        """K at each eigenvalue, rows and columns times `scale`, in Fortran's order; the lower half, 0 above it."""
+        """Return K at each eigenvalue, scaled, in Fortran order; the lower half, 0 above it."""
         place, coefficients = self._lower
         matrices = np.zeros((eigenvalue.size, self.scale.size**2))
         matrices[:, place] = (coefficients @ self._powers(eigenvalue)).T
         return [matrix.reshape(self.scale.size, -1).T for matrix in matrices]
 
     def slope_of(self, eigenvalue: Floats, shape: Floats) -> Floats:
-        """phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
+        """Return phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
         place, coefficients = self._lower
         column, row = np.divmod(place, self.scale.size)
         twice = np.where(row == column, 1.0, 2.0) * shape[row] * shape[column]
@@ -149,7 +149,7 @@ class DynamicStiffness:
 
     @cached_property
     def _lower(self) -> tuple[Indices, Floats]:
-        """Places in the flattened matrix, columns one after the other, and scaled coefficients of its lower half."""
+        """Indices in the flattened matrix, column by column, and scaled coefficients of its lower half."""
         rows, columns = _lower_half(self.position.size)
         terms = self.diagonal.shape[2]
         coefficients = np.concatenate([self.diagonal.reshape(-1, terms), self.coupling.reshape(-1, terms)])
@@ -157,7 +157,7 @@ class DynamicStiffness:
         return columns * self.scale.size + rows, coefficients
 
     def _powers(self, eigenvalue: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
-        """Powers of each eigenvalue, or their derivatives, shape (n_terms, n)."""
+        """Return powers of each eigenvalue, or their derivatives, shape (n_terms, n)."""
         powers = np.empty((self.diagonal.shape[2], eigenvalue.size), dtype=eigenvalue.dtype)
         powers[0], powers[1:] = 1.0, eigenvalue
         np.multiply.accumulate(powers, out=powers)
@@ -167,15 +167,15 @@ class DynamicStiffness:
         return powers
 
     def solve(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
-        """Solutions of full matrices times y = right, shape (n, 2 n_nodes, m), rows and columns made of one size."""
+        """Solve full matrices times y = right, shape (n, 2 n_nodes, m), with scaled rows and columns."""
         scale = self.scale[:, np.newaxis]
         solution = np.linalg.solve(matrices * (scale * self.scale), scale * right)
         return np.asarray(scale * solution, dtype=matrices.dtype)
 
     def solve_singular(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
-        """The same for inverse iteration: of matrices that are singular, of those that are equal but for rounding.
+        """Solve nearly singular matrices times y = right for inverse iteration.
 
-        Peters and Wilkinson, SIAM Review 21 (1979): a pivot of zero may be replaced by one of rounding's size.
+        Peters and Wilkinson, SIAM Review 21 (1979): a pivot of zero may be replaced by one of rounding size.
         """
         try:
             return self.solve(matrices, right)
@@ -184,14 +184,14 @@ class DynamicStiffness:
             return self.solve(np.asarray(matrices + rounding, dtype=matrices.dtype), right)
 
     def term(self, power: int) -> Floats:
-        """Coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
+        """Return the coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
         return np.asarray(
             full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
         )
 
 
 def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
-    """Full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
+    """Return full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
     uu, ut, tt = diagonal
     size = 2 * uu.shape[0]
     matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
@@ -201,7 +201,7 @@ def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArr
 
 @lru_cache(maxsize=32)
 def _lower_half(n_nodes: int) -> tuple[Indices, Indices]:
-    """Rows and columns of the blocks on and below the diagonal, in the order of diagonal and coupling."""
+    """Return rows and columns of the blocks on and below the diagonal, in the order of diagonal and coupling."""
     u = 2 * np.arange(n_nodes)
     left, right = u[:-1], u[1:]
     pairs = [(u, u), (u + 1, u), (u + 1, u + 1)]
@@ -212,7 +212,7 @@ def _lower_half(n_nodes: int) -> tuple[Indices, Indices]:
 
 @lru_cache(maxsize=32)
 def _block_indices(n_nodes: int) -> Indices:
-    """Where the blocks stand in a flattened matrix: diagonal ones, those above and those below them."""
+    """Return the indices of the blocks in a flattened matrix: on, above and below the diagonal."""
     u = 2 * np.arange(n_nodes)
     left, right = u[:-1], u[1:]
     above = [(left, right), (left, right + 1), (left + 1, right), (left + 1, right + 1)]
@@ -221,12 +221,12 @@ def _block_indices(n_nodes: int) -> Indices:
 
 
 def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
-    """Number of natural frequencies below w, shape (n,), for w^2 (w where it spins): the negative pivots of K(w).
+    """Count the natural frequencies below w, shape (n,), for w^2 (w if spinning): the negative pivots of K(w).
 
     None is missed and double ones count twice. Source: W. H. Wittrick and F. W. Williams, A general algorithm for
     computing natural frequencies of elastic structures, Q. J. Mech. Appl. Math. 24 (1971), with J0 = 0. The pivoting
-    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance; those
-    of links are taken off. Where the shaft spins, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
+    of Bunch and Kaufman and scaled rows keep it right if a part of the shaft is at resonance; the pivots
+    of links are subtracted. For a spinning shaft, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
     falls through 0 once, for any phi.
     """
     counts = [count_modes_of_factor(model, symmetric_factor(matrix)) for matrix in model.scaled(eigenvalue)]
@@ -234,5 +234,5 @@ def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
 
 
 def count_modes_of_factor(model: DynamicStiffness, factor: SymmetricFactor) -> int:
-    """The same from the factor of K(w): its negative pivots but for the two of each link that carries force."""
+    """Count the modes below w from the factor of K(w): negative pivots without those of links."""
     return factor.negative - model.link_pivots

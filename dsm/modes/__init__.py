@@ -1,1 +1,1 @@
-"""Natural modes, none missed: frequencies, shapes, energy, damping, whirl."""
+"""Natural modes, proved complete: frequencies, shapes, energy, damping, whirl."""

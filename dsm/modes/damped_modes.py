@@ -17,21 +17,21 @@ from dsm.spindle.attachments import Damping, damping_of_bearings, supports
 from dsm.spindle.spindle import Spindle, require_support
 
 INVERSE_ITERATION_OFFSET = 1e-10
-"""Relative distance from the frequency at which K is inverted: it is singular at the frequency itself."""
+"""Relative distance from the frequency at which K, which is singular there, is inverted."""
 MAX_NEWTON_ROUNDS = 8
-"""More are not spent on one step of damping."""
+"""Most Newton steps for one step of damping."""
 MIN_OSCILLATION_SHARE = 1e-4
-"""A mode whose damped frequency is a smaller part of |w| counts as one that has ceased to oscillate."""
+"""Least damped frequency over |w| of an oscillating mode."""
 DAMPED_MODE_TOLERANCE = 1e-8
 """Last relative change of w; Rayleigh's quotient has cubed the error once more by then."""
 MAX_PREDICTION_MISS = 0.2
-"""Largest miss of the prediction of first order, in parts of the predicted change; steps that miss more are halved."""
+"""Largest error of the first-order prediction over the predicted change; steps with more are halved."""
 MIN_DAMPING_STEP = 2.0**-16
-"""Part of the whole change of damping; where smaller steps are needed, the mode is lost."""
+"""Least share of the whole change of damping per step; below it the mode is lost."""
 
 
 class DampedMode(NamedTuple):
-    """A motion phi exp(i w t) that dies away."""
+    """Decaying motion phi exp(i w t)."""
 
     w: complex
     """Complex angular frequency (rad/s), in the first quadrant."""
@@ -40,24 +40,24 @@ class DampedMode(NamedTuple):
 
     @property
     def damping_ratio(self) -> float:
-        """-Re s/|s| of s = i w (-)."""
+        """Damping ratio -Re s/|s| of s = i w (-)."""
         return self.w.imag / abs(self.w)
 
 
 @dataclass(frozen=True, eq=False)
 class DampedShaft:
-    """The dynamic stiffness of a shaft at rest, at complex w, for any damping."""
+    """Dynamic stiffness of a shaft at rest, at complex w, for any damping."""
 
     spindle: Spindle
-    """Shaft, springs and masses; its dampers are not looked at."""
+    """Shaft, springs and masses; its dampers are ignored."""
     model: DynamicStiffness
-    """The matrix without damping."""
+    """Matrix without damping."""
     undamped: Floats
-    """Frequencies of its modes (Hz), shape (n_modes,)."""
+    """Undamped natural frequencies (Hz), shape (n_modes,)."""
 
     @classmethod
     def of(cls, spindle: Spindle, count: int) -> DampedShaft:
-        """With its `count` lowest modes. ValueError for a shaft that is not held and a count below 1."""
+        """Build it with the `count` lowest modes. ValueError for an unsupported shaft and a count below 1."""
         require_support(spindle)
         undamped = natural_frequencies(spindle, count)
         # A damper that locks its bearing raises the frequency towards that of rigid bearings.
@@ -66,11 +66,11 @@ class DampedShaft:
 
     @property
     def no_damping(self) -> Damping:
-        """No damping."""
+        """Zero damping."""
         return Damping(np.zeros(len(self.spindle.bearings)), 0.0)
 
     def start(self, number: int) -> DampedMode:
-        """Mode `number` (1 is the lowest) without damping: K(w) phi = 0, by inverse iteration."""
+        """Return mode `number` (1 is the lowest) without damping: K(w) phi = 0, by inverse iteration."""
         w = 2 * np.pi * float(self.undamped[number - 1])
         stiffness, by_w = self.matrices(self.no_damping, w * (1 + INVERSE_ITERATION_OFFSET))
         shape = np.ones(self.model.held.size, dtype=np.complex128)
@@ -88,7 +88,7 @@ class DampedShaft:
         return complex(w[0]), moved[0] / np.sqrt(energy[0])
 
     def matrices(self, damping: Damping, w: complex) -> tuple[Complexes, Complexes]:
-        """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
+        """Return K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
         at = np.array([w], dtype=np.complex128)
         stiffness, by_w = (
             full_matrices(*damped_blocks(self.model, self.spindle, at, damping, derivative))[0]
@@ -97,7 +97,7 @@ class DampedShaft:
         return stiffness, by_w
 
     def damper_sensitivity(self, damping: Damping, mode: DampedMode) -> Complexes:
-        """dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
+        """Return dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
         bearings = self.spindle.bearings
         movable = [index for index, bearing in enumerate(bearings) if np.isfinite(bearing.stiffness)]
         held = supports(
@@ -111,9 +111,9 @@ class DampedShaft:
         return change
 
     def follow(self, number: int, mode: DampedMode, old: Damping, new: Damping) -> DampedMode:
-        """Mode `number` at the damping `new`, reached from that at `old` in steps small enough not to lose it.
+        """Follow mode `number` from the damping `old` to `new` in steps small enough not to lose it.
 
-        Raises ArithmeticError where it stops oscillating, or merges with another mode, on the way.
+        Raises ArithmeticError if it stops oscillating, or merges with another mode, on the way.
         """
         done, step = 0.0, 1.0
         while done < 1:
@@ -133,7 +133,7 @@ class DampedShaft:
         return mode
 
     def _newton(self, mode: DampedMode, damping: Damping) -> DampedMode | None:
-        """The mode at a damping near by; None where it is not the one that is foreseen."""
+        """Return the mode at a damping nearby; None if it is not the predicted one."""
         w, shape = mode
         foreseen = w
         for number in range(MAX_NEWTON_ROUNDS):
@@ -152,25 +152,45 @@ class DampedShaft:
 
 @dataclass(frozen=True, eq=False)
 class DampedModes:
-    """Modes that die away as exp(s t), each in the place of the undamped mode from which it comes."""
+    """Decaying modes exp(s t), each in the place of the undamped mode it comes from."""
 
     frequency: Floats
-    """|s|/2 pi (Hz), shape (n_modes,); where damping is uneven they need not rise."""
+    """Natural frequency |s|/2 pi (Hz), shape (n_modes,); not always rising for uneven damping."""
     damping_ratio: Floats
-    """zeta = -Re s/|s| (-), shape (n_modes,)."""
+    """Damping ratio zeta = -Re s/|s| (-), shape (n_modes,)."""
 
 
 def damped_modes(spindle: Spindle, count: int, loss_factor: float = 0.0) -> DampedModes:
-    """The `count` lowest modes of the shaft at rest, with the dampers of its bearings and a loss factor, exact.
+    """Compute the lowest modes of the shaft at rest with bearing dampers and a loss factor, exactly.
 
-    loss_factor eta: shaft, bearings, housing and joints have the stiffness k (1 + i eta). Alone it gives each mode
-    zeta = sin(atan(eta)/2), for small ones eta/2. Each certified undamped mode is followed up to the given damping by
-    Newton steps on the complex matrix K(w), s = i w, from the estimate of first order. A loss factor is a model of
-    steady vibration; the more a mode is damped, the less it means.
+    A loss factor alone gives each mode zeta = sin(atan(eta)/2), eta/2 if small. Each certified undamped mode is
+    followed
+    up to the given damping by Newton steps on the complex matrix K(w), s = i w, from the first-order estimate. A loss
+    factor is a model of steady vibration; the more a mode is damped, the less it means.
 
-    Raises ValueError for a count below 1, a shaft that is not held and a loss factor below 0, ArithmeticError for a
-    mode that does not oscillate any more.
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle with dampers.
+    count : int
+        Number of modes.
+    loss_factor : float
+        Loss factor eta (-): shaft, bearings, housing and joints have the stiffness k (1 + i eta).
 
+    Returns
+    -------
+    DampedModes
+        Frequencies and damping ratios.
+
+    Raises
+    ------
+    ValueError
+        For a count below 1, an unsupported shaft and a loss factor below 0.
+    ArithmeticError
+        For a mode that stops oscillating.
+
+    Examples
+    --------
     A loss factor alone gives every mode half of it as damping ratio, sin(atan(eta) / 2):
 
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])

@@ -22,11 +22,11 @@ def newton_step(
     shape: NDArray[Number],
     solve: Callable[..., NDArray[Number]],
 ) -> tuple[NDArray[Number], NDArray[Number], NDArray[Number]]:
-    """Better solutions of K(s) phi = 0, all modes at once, shape (n,): s, phi (n, n_dofs) and phi^T K' phi (n,).
+    """Return better solutions of K(s) phi = 0, all modes at once, shape (n,): s, phi (n, n_dofs) and phi^T K' phi (n,).
 
-    matrix, slope: K and its derivative K' at `trial` (n,), beside the s that is sought, where K can be inverted: shape
+    matrix, slope: K and its derivative K' at `trial` (n,), near the wanted s, where K can be inverted: shape
     (n, n_dofs, n_dofs). The shape becomes K^-1 K' phi, and s the zero of Rayleigh's quotient phi^T K(s) phi, to first
-    order in s; its error is that of the shape squared. solve: solutions y of K y = right.
+    order in s; its error is that of the shape squared. solve: returns y of K y = right.
     """
     moved = solve(matrix, slope @ shape[..., np.newaxis])[..., 0]
     energy = quadratic_form(slope, moved)
@@ -34,19 +34,19 @@ def newton_step(
 
 
 def quadratic_form(matrix: NDArray[Number], shape: NDArray[Number]) -> NDArray[Number]:
-    """phi^T A phi of each mode, shape (n,)."""
+    """Return phi^T A phi of each mode, shape (n,)."""
     return np.asarray(np.sum(shape * (matrix @ shape[..., np.newaxis])[..., 0], axis=1))
 
 
 LINK_SUPPORT_RATIO = 1e6
-"""A dof held beside a link: stiffness of the spring that stands for it here, over the largest of the shaft."""
+"""Stiffness of the spring that replaces a held dof beyond a link, over the largest of the shaft."""
 
 
 def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, Floats]:
-    """w^2 (count,) of the lowest modes at rest and their shapes phi (count, 2 n_nodes), phi^T M phi = 1: upper bounds.
+    """Return w^2 (count,) of the lowest modes at rest and shapes phi (count, 2 n_nodes), phi^T M phi = 1: upper bounds.
 
     Solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no exception. Raises ArithmeticError
-    where the model has fewer modes.
+    if the model has fewer modes.
     """
     basis, springs = _independent_motions(model)
     size = basis.shape[1]
@@ -61,11 +61,11 @@ def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, F
 
 
 def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: int) -> tuple[Floats, Floats]:
-    """w (count,) of the lowest modes of forward whirl of a shaft that spins and shapes phi, -phi^T K' phi = 1: a start.
+    """Return start values w (count,) of the lowest modes of forward whirl and shapes phi, -phi^T K' phi = 1.
 
-    Made of the modes at rest above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
+    Combines the modes at rest above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
     y = w z it is diag(K0, I) (z, y) = w [[-K1, I], [I, 0]] (z, y), whose left side is positive definite. Raises
-    LinAlgError where it is not.
+    LinAlgError if it is not.
     """
     if np.any(w2 <= 0):
         raise np.linalg.LinAlgError("a shaft that nothing holds")
@@ -82,10 +82,10 @@ def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: in
 
 
 def _independent_motions(model: DynamicStiffness) -> tuple[Floats, Floats]:
-    """Motions (2 n_nodes, n) that are independent, and the stiffness to add for them, diagonal: (n, n).
+    """Return independent motions (2 n_nodes, n), and the diagonal stiffness to be added for them: (n, n).
 
-    Beyond a link it is the motion against the rigid lever that the link is but for its flexibility: the stiffness of
-    the link is left to that motion alone, where it drowns nothing. Held dofs do not move; those beyond a link are held
+    Beyond a link the motion is that against the rigid lever of the link: the stiffness of
+    the link belongs to that motion alone, where it hides nothing. Held dofs do not move; those beyond a link are held
     by a spring.
     """
     link = np.flatnonzero(model.is_link)
@@ -111,6 +111,6 @@ def _independent_motions(model: DynamicStiffness) -> tuple[Floats, Floats]:
 
 
 def _reduced_term(model: DynamicStiffness, basis: Floats, power: int) -> Floats:
-    """A term of K for the independent motions; forces of links do no work here."""
+    """Return a term of K for the independent motions; forces of links do no work here."""
     moving = np.repeat(~model.is_link, 2)
     return np.asarray(basis[moving].T @ model.term(power)[np.ix_(moving, moving)] @ basis[moving])

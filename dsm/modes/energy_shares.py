@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Floats
-from dsm.elements import GAUSS_POINTS
+from dsm.elements.element_series import GAUSS_POINTS
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes, evaluate_between_nodes
 from dsm.spindle.sections import sections
@@ -17,22 +17,22 @@ from dsm.spindle.spindle import Spindle, require_support
 
 
 class SpringEnergy(NamedTuple):
-    """Twice the strain energy of each spring in each mode; of a mode of unit modal mass all parts together have w^2."""
+    """Twice the strain energy of each spring in each mode; for unit modal mass all parts together have w^2."""
 
     radial: Floats
-    """Radial springs of the bearings, shape (n_modes, n_bearings); 0 where rigid."""
+    """Radial springs of the bearings, shape (n_modes, n_bearings); 0 if rigid."""
     tilting: Floats
-    """Their stiffness against tilting, shape (n_modes, n_bearings)."""
+    """Stiffness of the bearings against tilting, shape (n_modes, n_bearings)."""
     housings: Floats
-    """Housings behind them, shape (n_modes, n_bearings); 0 where rigid."""
+    """Housings of the bearings, shape (n_modes, n_bearings); 0 if rigid."""
     shifts: Floats
     """Radial springs of the joints, shape (n_modes, n_joints)."""
     kinks: Floats
-    """Their stiffness against tilting, shape (n_modes, n_joints)."""
+    """Stiffness of the joints against tilting, shape (n_modes, n_joints)."""
 
 
 def spring_energy(modes: Modes) -> SpringEnergy:
-    """The energy of all springs of modes with nodes at all parts, as find_modes gives them."""
+    """Return the energy of all springs of modes with nodes at all parts, as find_modes gives them."""
     spindle = modes.spindle
     radial, tilting, housings = np.zeros((3, modes.frequency.size, len(spindle.bearings)))
     for index, bearing in enumerate(spindle.bearings):
@@ -46,7 +46,7 @@ def spring_energy(modes: Modes) -> SpringEnergy:
 
 
 def _joint_energy(modes: Modes) -> tuple[Floats, Floats]:
-    """A joint stands between two nodes at one place."""
+    """Return the energy of both springs of each joint, which is between two nodes at one place."""
     shifts, kinks = np.zeros((2, modes.frequency.size, len(modes.spindle.joints)))
     for index, joint in enumerate(modes.spindle.joints):
         node = modes.node(joint.position)
@@ -58,9 +58,9 @@ def _joint_energy(modes: Modes) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, eq=False)
 class EnergyShares:
-    """Shares of the parts of a spindle in the strain energy of its modes (-); over all parts they add up to 1.
+    """Shares of the parts of a spindle in the strain energy of its modes (-); they add up to 1.
 
-    A share is d ln f^2 / d ln k, k the stiffness of the part: what 1 % of it moves the square of the frequency by, in
+    A share is d ln f^2 / d ln k, k the stiffness of the part: 1 % of k changes the square of the frequency by this many
     percent.
     """
 
@@ -69,19 +69,37 @@ class EnergyShares:
     segments: Floats
     """Bending (and shear) of the segments, shape (n_modes, n_segments)."""
     bearings: Floats
-    """Bearings, radial spring and stiffness against tilting together, shape (n_modes, n_bearings); 0 where rigid."""
+    """Bearings, radial and tilting stiffness together, shape (n_modes, n_bearings); 0 if rigid."""
     housings: Floats
-    """Housing behind each bearing, in series with its radial spring, shape (n_modes, n_bearings); 0 where rigid."""
+    """Housing of each bearing, in series with its radial spring, shape (n_modes, n_bearings); 0 if rigid."""
     joints: Floats
-    """Joints, both their springs together, shape (n_modes, n_joints)."""
+    """Joints, both springs together, shape (n_modes, n_joints)."""
 
 
 def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
-    """Strain energy shares of the `count` lowest modes, exact, also of elements long against the wave.
+    """Compute the strain energy shares of the lowest modes, exact even for elements long against the wave.
 
-    Raises ValueError for a count below 1 and a shaft that is not held,
-    ArithmeticError where rounding spoils the count of modes.
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    count : int
+        Number of modes.
 
+    Returns
+    -------
+    EnergyShares
+        Shares of all parts.
+
+    Raises
+    ------
+    ValueError
+        For a count below 1 and an unsupported shaft.
+    ArithmeticError
+        If rounding spoils the count of modes.
+
+    Examples
+    --------
     >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
     >>> shares = energy_shares(spindle, 1)
     >>> shares.bearings.round(2).tolist()  # front and rear, of the first mode
@@ -100,7 +118,7 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
 
 
 def _segment_energy(spindle: Spindle, modes: Modes) -> Floats:
-    """Twice the integral of M^2/EI + Q^2/(kappa G A) along each segment, by Gauss points in each element."""
+    """Return twice the integral of M^2/EI + Q^2/(kappa G A) along each segment, by Gauss points in each element."""
     shaft = sections(spindle)
     element = np.flatnonzero(np.diff(modes.position) > 0)
     start, length = modes.position[element], np.diff(modes.position)[element]

@@ -1,4 +1,4 @@
-"""The lowest natural modes, none missed."""
+"""Find the lowest natural modes of a spindle, proved complete."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
 
 MODE_INTERVAL_WIDTH = 2e-10
-"""Relative half-width, in w^2 (w where it spins), of the interval in which each mode is proved to lie."""
+"""Relative half-width, in w^2 (w if spinning), of the interval in which each mode is proved to lie."""
 MODE_ROUNDING = 1024 * np.finfo(np.float64).eps
-"""The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
+"""Half-width from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
 MAX_MODE_INTERVAL = 0.1
-"""An interval wider than this part of its w^2 proves nothing worth having."""
+"""Largest interval over its w^2 that proves a mode."""
 MAX_DIRECT_INTERVAL = 1e-5
-"""Where stiffness gives one wider than this, links are taken: the error is some 1e-4 of the interval."""
+"""Largest interval without links: the error is about 1e-4 of the interval."""
 
 MODE_STEP_TOLERANCE = 1e-8
-"""Relative change by a step that leaves less than rounding to the next: each step at least squares the error."""
+"""Relative change of the last step, after which rounding is larger: each step at least squares the error."""
 
 MAX_MODES = 100
-"""More are refused: the work grows with their third power."""
+"""Most modes: the work grows with their third power."""
 
 EXTRA_WHIRL_MODES = 12
-"""Modes at rest beyond those wanted of which modes of whirl are made to begin with."""
+"""Further modes at rest that the start values of whirl are made of."""
 
 ROUNDING_MESSAGE = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
@@ -44,15 +44,15 @@ ROUNDING_MESSAGE = (
 def find_modes(
     spindle: Spindle, count: int, places: Sequence[float] = (), held: Sequence[HeldDof] = (), spin: float | None = None
 ) -> Modes:
-    """The `count` lowest modes, with nodes also at `order_taps` (m) and the dofs `held` fixed (see assemble).
+    """Find the `count` lowest modes, with nodes also at `places` (m) and the dofs `held` fixed (see assemble).
 
-    Hermite elements give a start, inverse iteration with Newton steps on the exact matrix the modes, and two
-    Wittrick-Williams counts the proof that mode n is the n-th; bisection on the count where the proof fails.
-    Where rounding of the stiffness blurs the modes of a shaft on soft bearings, links take its place. Frequencies that
-    rounding cannot tell from zero (a free shaft) are 0. spin (rad/s): the modes of forward whirl of a
-    supported shaft that spins so fast; of backward whirl with -spin.
+    Hermite elements give start values, inverse iteration with Newton steps on the exact matrix the modes, and two
+    Wittrick-Williams counts the proof that mode n is the n-th, with bisection on the count if the proof fails.
+    If rounding of the stiffness blurs the modes of a shaft on soft bearings, links are used. Frequencies that
+    rounding cannot separate from zero (a free shaft) are 0. spin (rad/s): the modes of forward whirl of a
+    supported shaft at this speed; of backward whirl with -spin.
 
-    Raises ValueError for a count outside 1 to MOST_MODES, ArithmeticError where rounding spoils the count.
+    Raises ValueError for a count outside 1 to MAX_MODES, ArithmeticError if rounding spoils the count.
     """
     if not 1 <= count <= MAX_MODES:
         raise ValueError(f"{count} modes were asked for; 1 to {MAX_MODES} can be: beams say nothing of higher ones")
@@ -64,7 +64,7 @@ def find_modes(
 
 
 class _RoundingError(ArithmeticError):
-    """Rounding leaves modes in doubt."""
+    """Raised if rounding makes modes uncertain."""
 
     def __init__(self) -> None:
         super().__init__(ROUNDING_MESSAGE)
@@ -99,7 +99,7 @@ def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
 
 
 def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, Floats, Floats]:
-    """A matrix exact up to the last mode, and the modes of its finite elements."""
+    """Return a matrix exact up to the last mode, and the modes of its finite elements."""
     spindle, count, places, held, spin = wanted
     top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
@@ -134,14 +134,14 @@ def _modes_at_rest(
     spin: float,
     links: bool,
 ) -> tuple[Floats, Floats]:
-    """What starts the search at all speeds that share nodes with `spin`."""
+    """Return the start values for all speeds that share nodes with `spin`."""
     model = assemble(spindle, top, places, held, spin=spin, links=links)
     return finite_element_modes(model, min(count, int(np.count_nonzero(~model.held[~model.is_link]))))
 
 
 @lru_cache(maxsize=32)
 def _first_guess(spindle: Spindle, phase: float) -> float:
-    """Frequency (Hz) at which a wave along the shaft turns by about `phase` (rad); 1/w^2 adds up as in Dunkerley's."""
+    """Estimate the frequency (Hz) at which a wave along the shaft has this phase (rad), adding 1/w^2 as Dunkerley."""
     shaft = sections(spindle)
     length, middle = np.diff(shaft.ends), (shaft.ends[1:] + shaft.ends[:-1]) / 2
     section = shaft.at(np.arange(length.size), middle)
@@ -154,7 +154,7 @@ def _first_guess(spindle: Spindle, phase: float) -> float:
 
 
 def _refine_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
-    """Inverse iteration with a Newton step each, all modes at once; sorted."""
+    """Refine all modes at once by inverse iteration with Newton steps, and sort them."""
     for _ in range(8):
         previous = eigenvalue
         eigenvalue, shape = _iterate_once(model, eigenvalue, shape, width)
@@ -165,7 +165,7 @@ def _refine_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, wi
 
 
 def _iterate_once(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
-    """One step from beside each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
+    """Take one step from next to each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
     trial = eigenvalue + width
     stiffness, slope = model.dense(trial), model.dense(trial, derivative=True)
     improved, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve_singular)
@@ -173,7 +173,7 @@ def _iterate_once(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, wi
 
 
 def _require_small_rounding(wanted: _ModeRequest, eigenvalue: Floats, width: Floats, widest: float) -> None:
-    """Raise _SpoiltError where rounding leaves modes in doubt, or takes them for motions without bending."""
+    """Raise _RoundingError if rounding makes modes uncertain, or takes them for motions without bending."""
     moving = eigenvalue > width
     still = int(np.sum(~moving))
     doubtful = still > 0 and still > _count_rigid_motions(wanted.spindle, wanted.held, float(np.min(width)))
@@ -182,7 +182,7 @@ def _require_small_rounding(wanted: _ModeRequest, eigenvalue: Floats, width: Flo
 
 
 def _count_rigid_motions(spindle: Spindle, held: Sequence[HeldDof], width: float) -> int:
-    """Number of motions without bending, 0 to 2, that no spring worth the name and no held dof hinders."""
+    """Count the motions without bending, 0 to 2, that neither springs nor held dofs prevent."""
     hindered = [[1.0, z] if dof == 0 else [0.0, 1.0] for z, dof in held]
     for bearing in spindle.bearings:
         if bearing.support_stiffness > width * spindle.mass:
@@ -193,7 +193,7 @@ def _count_rigid_motions(spindle: Spindle, held: Sequence[HeldDof], width: float
 
 
 def _verify_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
-    """The same modes where each is the one it should be; the others found anew by counting."""
+    """Return the modes that are proved; the others are found again by counting."""
     eigenvalue = np.where(eigenvalue > width, eigenvalue, 0.0)
     missed = ~_are_certified(model, eigenvalue, width)
     if np.any(missed):
@@ -205,14 +205,14 @@ def _verify_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, wi
 
 
 def _are_certified(model: DynamicStiffness, eigenvalue: Floats, width: Floats) -> Flags:
-    """For mode n: whether fewer than n modes lie below eigenvalue - width, and n or more below eigenvalue + width."""
+    """Return for mode n whether fewer than n modes are below its interval, and n or more below its end."""
     below, up_to = count_modes_below(model, np.concatenate([eigenvalue - width, eigenvalue + width])).reshape(2, -1)
     order = np.arange(1, eigenvalue.size + 1)
     return np.asarray((below < order) & (order <= up_to))
 
 
 def _bisect_modes(model: DynamicStiffness, order: Indices, width: Floats) -> Floats:
-    """eigenvalue of the modes with these numbers (1 is the first), each within its width, by counting alone."""
+    """Return the eigenvalues of the modes with these numbers (1 is the first), by counting alone."""
     low = -width
     high = np.full(order.size, float(model.to_eigenvalue(np.array(model.top_frequency))))
     if np.any(count_modes_below(model, low) >= order) or np.any(count_modes_below(model, high) < order):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Floats, Indices
-from dsm.elements import count_series_terms, transfer_series
+from dsm.elements.element_series import count_series_terms, transfer_series
 from dsm.spindle.sections import Sections, sections
 from dsm.spindle.segment import SAME_PLACE, nearest_index
 from dsm.spindle.spindle import Spindle, Theory
@@ -18,9 +18,9 @@ class StateVectors(NamedTuple):
     """Motion and internal forces of modes at places, shape (n_modes, n_places) each."""
 
     deflection: Floats
-    """u, of the modes' own scale."""
+    """Deflection u, in the scale of the modes."""
     slope: Floats
-    """t, rotation of the cross-section."""
+    """Rotation t of the cross-section."""
     force: Floats
     """Shear force Q."""
     moment: Floats
@@ -36,11 +36,12 @@ def evaluate_between_nodes(
     places: Floats,
     left: Indices,
 ) -> StateVectors:
-    """The modes of a shaft at rest inside its elements, exact.
+    """Evaluate the modes of a shaft at rest inside its elements, exactly.
 
     frequency (Hz), shape (n_modes,); position of the nodes (m) and the shape (deflection, slope) there, (n_modes,
-    n_nodes) each; places (m), shape (n_places,), and the node left of each. What the element carries from its left node
-    on, (u, t, Q, M)' = T (u1, t1, Q1, M1), must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
+    n_nodes) each; places (m), shape (n_places,), and the node left of each. The state (u, t, Q, M)' = T (u1, t1, Q1,
+    M1)
+    from the left node of the element must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
     """
     start, end = position[left], position[left + 1]
     segment = shaft.segment_at((start + end) / 2)
@@ -58,6 +59,8 @@ def evaluate_between_nodes(
 class Modes:
     """Undamped natural modes, lowest first, scaled to a modal mass of 1 kg.
 
+    Examples
+    --------
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> modes = mode_shapes(shaft, 2)
     >>> (modes.stiffness_at(0.125) / 1e6).round(1).tolist()  # N/um, at a quarter of the length
@@ -67,24 +70,43 @@ class Modes:
     frequency: Floats
     """Natural frequencies (Hz), shape (n_modes,)."""
     position: Floats
-    """Places along the shaft from the tool tip (m), shape (n_nodes,)."""
+    """Positions along the shaft from the tool tip (m), shape (n_nodes,)."""
     deflection: Floats
     """Deflection (kg^-1/2), shape (n_modes, n_nodes)."""
     slope: Floats
     """Slope of the deflection (kg^-1/2 m^-1), shape (n_modes, n_nodes)."""
     spindle: Spindle
-    """The shaft they belong to."""
+    """Spindle of the modes."""
     spin: float = 0.0
-    """Speed at which it spins (rad/s)."""
+    """Speed of rotation (rad/s)."""
 
     def node(self, position: float) -> int:
-        """Index of the place of these modes nearest to a position (m); at a joint that of the side of the tool tip."""
+        """Return the index of the position nearest to a place; at a joint that on the side of the tool tip.
+
+        Parameters
+        ----------
+        position : float
+            Distance from the tool tip (m).
+        """
         return nearest_index(self.position, position)
 
     def at(self, places: Floats) -> Modes:
-        """The same modes at other places on the shaft (m, shape (n,)), exact; a place next to a node has its values.
+        """Return the modes at other places on the shaft, exactly; a place next to a node has its values.
 
-        Raises ValueError for a shaft that spins: its modes have no modal mass of 1 kg.
+        Parameters
+        ----------
+        places : ndarray, shape (n,)
+            Distances from the tool tip (m).
+
+        Returns
+        -------
+        Modes
+            Same modes at these places.
+
+        Raises
+        ------
+        ValueError
+            For a spinning shaft: its modes have no modal mass of 1 kg.
         """
         if self.spin:
             raise ValueError(
@@ -111,13 +133,24 @@ class Modes:
         return replace(self, position=places, deflection=deflection, slope=slope)
 
     def deflection_at(self, position: float) -> Floats:
-        """Deflection at a place on the shaft (m), shape (n_modes,), exact; see at."""
+        """Return the deflection at a place, exactly (kg^-1/2), shape (n_modes,).
+
+        Parameters
+        ----------
+        position : float
+            Distance from the tool tip (m).
+        """
         return self.at(np.array([position])).deflection[:, 0]
 
     def stiffness_at(self, position: float) -> Floats:
-        """Modal stiffness w^2/deflection^2 there (N/m), shape (n_modes,); inf where the mode is at rest.
+        """Return the modal stiffness w^2/deflection^2 at a place (N/m), shape (n_modes,); inf at a node of the mode.
 
         The driving-point receptance is the sum over modes of 1/K/(1 - (f/f_n)^2).
+
+        Parameters
+        ----------
+        position : float
+            Distance from the tool tip (m).
         """
         with np.errstate(divide="ignore"):
             return np.asarray((2 * np.pi * self.frequency / self.deflection_at(position)) ** 2)

@@ -13,13 +13,34 @@ from dsm.spindle.spindle import Spindle
 
 
 def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = False) -> Floats:
-    """The `count` lowest bending frequencies (Hz), shape (count,), rising, none missed; 0 for motions without bending.
+    """Compute the lowest bending frequencies of a spindle, proved complete.
 
-    rigid_bearings: the exact limit of infinitely stiff bearings, which hold the deflection and leave the slope free.
-    Without rotary inertia and shear, and with the same bearing stiffness in all directions, the frequencies seen from
-    the housing do not depend on speed. Raises ValueError for count < 1, ArithmeticError where rounding spoils the
-    count of modes.
+    Without rotary inertia and shear, and with equal bearing stiffness in all directions, the frequencies seen from
+    the housing do not depend on speed.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle.
+    count : int
+        Number of frequencies.
+    rigid_bearings : bool
+        Exact limit of infinitely stiff bearings, which hold the deflection but not the slope.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        Natural frequencies (Hz), rising; 0 for motions without bending.
+
+    Raises
+    ------
+    ValueError
+        For count < 1.
+    ArithmeticError
+        If rounding spoils the count of modes.
+
+    Examples
+    --------
     A shaft on two knife edges, f_n = n^2 pi / (2 L^2) sqrt(E I / (rho A)):
 
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
@@ -33,12 +54,33 @@ def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = Fal
 
 
 def modes_at(spindle: Spindle, count: int, position: float = 0.0) -> tuple[Floats, Floats]:
-    """Natural frequencies (Hz) and modal stiffness at one place (N/m) of the lowest modes, shape (count,) each.
+    """Compute natural frequencies and modal stiffness at one place.
 
-    position: distance from the tool tip (m). The receptance there is the sum over all modes of 1/K/(1 - (f/f_n)^2).
-    K is 0 for a motion without bending and inf where the mode is at rest. Raises ValueError for a position off the
-    shaft, and as natural_frequencies.
+    The receptance there is the sum over all modes of 1/K/(1 - (f/f_n)^2).
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle.
+    count : int
+        Number of modes.
+    position : float
+        Distance from the tool tip (m).
+
+    Returns
+    -------
+    frequency : ndarray, shape (count,)
+        Natural frequencies (Hz).
+    stiffness : ndarray, shape (count,)
+        Modal stiffness (N/m); 0 for a motion without bending, inf at a node of the mode.
+
+    Raises
+    ------
+    ValueError
+        For a position off the shaft, and as natural_frequencies.
+
+    Examples
+    --------
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> frequency, stiffness = modes_at(shaft, 2, position=0.125)
     >>> frequency.round(1).tolist(), (stiffness / 1e6).round(1).tolist()  # Hz, N/um
@@ -49,12 +91,32 @@ def modes_at(spindle: Spindle, count: int, position: float = 0.0) -> tuple[Float
 
 
 def modal_stiffness(spindle: Spindle, mode: int = 1, position: float = 0.0) -> float:
-    """Modal stiffness K of a mode (1 is the lowest) at `position` from the tool tip (m), in N/m; see modes_at.
+    """Compute the modal stiffness K of one mode at one place.
 
-    This, and not the static stiffness, is what the height of a peak of the measured FRF gives: |H| = 1/(2 zeta K).
-    Raises ValueError for a mode below 1, and as modes_at.
+    A peak of the measured FRF gives this, not the static stiffness: |H| = 1/(2 zeta K).
 
-    Of a shaft on two knife edges half the mass moves with its middle:
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle.
+    mode : int
+        Number of the mode; 1 is the lowest.
+    position : float
+        Distance from the tool tip (m).
+
+    Returns
+    -------
+    float
+        Modal stiffness (N/m).
+
+    Raises
+    ------
+    ValueError
+        For a mode below 1, and as modes_at.
+
+    Examples
+    --------
+    For a shaft on two knife edges half the mass moves with its middle:
 
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> w = 2 * np.pi * natural_frequencies(shaft, 1)[0]
@@ -69,12 +131,33 @@ def modal_stiffness(spindle: Spindle, mode: int = 1, position: float = 0.0) -> f
 
 
 def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -> Modes:
-    """The `count` lowest modes with deflection and slope at `order_taps` from the tool tip (m), shape (n,), any order.
+    """Compute the lowest modes with deflection and slope at some places.
 
-    None: at segment ends, bearings, masses and joints. Exact everywhere, inside long segments too; a joint has two
-    sides, and at its place the values are those of the side away from the tool tip. With theory="timoshenko" the slope
-    is the rotation of the cross-section. Raises ValueError for a place off the shaft, and as natural_frequencies.
+    Exact everywhere, inside long segments too. A joint has two sides; at its place the values are those of the side
+    away
+    from the tool tip. With theory="timoshenko" the slope is the rotation of the cross-section.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle.
+    count : int
+        Number of modes.
+    places : array_like, shape (n,), optional
+        Distances from the tool tip (m), any order. Default: segment ends, bearings, masses and joints.
+
+    Returns
+    -------
+    Modes
+        Modes at these places.
+
+    Raises
+    ------
+    ValueError
+        For a place off the shaft, and as natural_frequencies.
+
+    Examples
+    --------
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> modes = mode_shapes(shaft, 1, [0.125, 0.25, 0.375])
     >>> abs(modes.deflection[0] / modes.deflection[0, 1]).round(3).tolist()  # sin(pi z / L)

@@ -14,19 +14,37 @@ from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
 MAX_CRITICAL_SPEED_RATIO = 32
-"""The search for a critical speed ends at so many times the natural frequency at rest."""
+"""Largest searched critical speed over the natural frequency at rest."""
 
 
 def critical_speed(spindle: Spindle, mode: int = 1) -> float:
-    """Speed (rpm) whose unbalance drives the forward whirl of a mode (1 is the lowest): 60 f_n of the shaft that spins.
+    """Compute the critical speed of a mode: unbalance drives its forward whirl, at 60 f_n of the spinning shaft.
 
     For a round Euler-Bernoulli shaft without polar inertia it is 60 times the frequency at rest. Otherwise gyroscopic
-    moments lift the forward frequency with speed, at a rate below that of the speed itself where the two meet: each
+    moments raise the forward frequency with speed, more slowly than the speed itself where the two meet: each
     mode has one critical speed at most.
 
-    Raises ValueError for a mode below 1 and for a shaft that is not held, ArithmeticError where there is none up to
-    32 times the frequency at rest.
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    mode : int
+        Number of the mode; 1 is the lowest.
 
+    Returns
+    -------
+    float
+        Critical speed (rpm).
+
+    Raises
+    ------
+    ValueError
+        For a mode below 1 and for an unsupported shaft.
+    ArithmeticError
+        If there is none up to 32 times the frequency at rest.
+
+    Examples
+    --------
     >>> ends = [Bearing(0.0, np.inf), Bearing(0.5, np.inf)]
     >>> shaft = Spindle([Segment(0.5, 0.05)], ends)
     >>> round(critical_speed(shaft)), round(60 * natural_frequencies(shaft, 1)[0])  # rpm
@@ -36,13 +54,11 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     >>> round(critical_speed(laden)), round(60 * natural_frequencies(laden, 1)[0])
     (21819, 21250)
     """
-
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
     require_support(spindle)
 
     def lead(spin: float) -> float:
-        """Forward whirl less speed (rad/s)."""
         return 2 * math.pi * float(find_modes(spindle, mode, spin=spin).frequency[-1]) - spin
 
     at_rest = lead(0.0)
@@ -58,7 +74,7 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
 
 @dataclass(frozen=True, eq=False)
 class WhirlMap:
-    """Whirl frequencies of a spindle over speed, in the frame that stands still and in the one that turns with it."""
+    """Whirl frequencies of a spindle over speed, in the fixed and in the rotating frame."""
 
     speed_rpm: Floats
     """Speeds (rpm), shape (m,)."""
@@ -67,7 +83,7 @@ class WhirlMap:
     backward: Floats
     """Backward whirl seen from the housing (Hz), lowest first, shape (count, m)."""
     critical_rpm: Floats
-    """Speeds at which one of these forward whirls runs as fast as the shaft (rpm), rising, within `speed_rpm`."""
+    """Critical speeds of these forward whirls (rpm), rising, within `speed_rpm`."""
 
     @property
     def rotating_forward(self) -> Floats:
@@ -81,16 +97,37 @@ class WhirlMap:
 
 
 def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
-    """The `count` lowest forward and backward whirl frequencies at each speed (rpm, (m,), >= 0), none missed.
+    """Compute the lowest forward and backward whirl frequencies over speed, proved complete (Campbell diagram).
 
-    For an Euler-Bernoulli shaft without polar inertia they are the natural frequencies at rest at every speed, and what
-    changes is only the view from the shaft, |f -+ speed/60|: figure 9 of Gaber & Hashemi, Shock and Vibration, 2015.
-    Rotary inertia (theory="timoshenko") and polar inertia of masses part them: forward rises, backward falls. Whirl is
-    circular, as the bearings are as stiff in all directions.
+    For an Euler-Bernoulli shaft without polar inertia they are the natural frequencies at rest at every speed. Only the
+    view from the shaft changes, |f -+ speed/60|: figure 9 of Gaber & Hashemi, Shock and Vibration, 2015.
+    Rotary inertia (theory="timoshenko") and polar inertia of masses separate them: forward rises, backward falls. Whirl
+    is
+    circular, as the bearings are equally stiff in all directions.
 
-    Raises ValueError for speeds below 0 or not finite, a count below 1 and a shaft that is not held, ArithmeticError
-    where rounding spoils the count of modes.
+    Parameters
+    ----------
+    spindle : Spindle
+        Supported spindle.
+    speed_rpm : array_like, shape (m,)
+        Speeds (rpm), >= 0.
+    count : int
+        Number of whirl frequencies of each sense.
 
+    Returns
+    -------
+    WhirlMap
+        Frequencies and critical speeds.
+
+    Raises
+    ------
+    ValueError
+        For speeds below 0 or not finite, a count below 1 and an unsupported shaft.
+    ArithmeticError
+        If rounding spoils the count of modes.
+
+    Examples
+    --------
     >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
     >>> whirl = whirl_map(shaft, [0.0, 12000.0], count=1)
     >>> whirl.rotating_forward.round(1).tolist()  # Hz, seen from the shaft: |f - 200|
@@ -118,7 +155,7 @@ def _check_speeds(speed_rpm: ArrayLike) -> Floats:
 
 
 def _critical_speeds(spindle: Spindle, speed: Floats, forward: Floats) -> Floats:
-    """Each mode that is ahead of the slowest speed and behind the fastest has its critical speed between them."""
+    """Return the critical speed of each mode ahead of the slowest speed and behind the fastest."""
     slowest, fastest = np.argmin(speed), np.argmax(speed)
     ahead = forward[:, slowest] >= speed[slowest] / 60
     crossed = np.flatnonzero(ahead & (forward[:, fastest] <= speed[fastest] / 60))

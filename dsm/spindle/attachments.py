@@ -17,14 +17,16 @@ RollingElements = Literal["balls", "rollers"]
 
 
 def bearing_motion_share(stiffness: Stiffness, softness: Stiffness) -> Stiffness:
-    """Part of the motion of the shaft that goes into a bearing of a stiffness (N/m), not into its housing (m/N)."""
+    """Return the share of the shaft motion that strains a bearing (N/m) and not its housing (m/N)."""
     return 1 / (1 + stiffness * softness)
 
 
 @dataclass(frozen=True)
 class Bearing:
-    """A radial spring, with or without damper, between shaft and housing; checked as part of a Spindle.
+    """Radial spring, with or without damper, between shaft and housing; checked as part of a Spindle.
 
+    Examples
+    --------
     >>> bearing = Bearing(position=0.15, stiffness=2e8, housing_stiffness=2e8)
     >>> bearing.support_stiffness / 1e6  # N/um: two equal springs in series
     100.0
@@ -33,28 +35,34 @@ class Bearing:
     position: float
     """Distance from the tool tip (m)."""
     stiffness: float
-    """Radial stiffness (N/m); inf holds the shaft (in series with the housing, where that has a stiffness)."""
+    """Radial stiffness (N/m); inf holds the shaft (in series with a compliant housing)."""
     damping: float = field(default=0.0, kw_only=True)
-    """Viscous damping beside the spring (N s/m)."""
+    """Viscous damping parallel to the spring (N s/m)."""
     rotational_stiffness: float = field(default=0.0, kw_only=True)
     """Stiffness against tilting (N m/rad)."""
     housing_stiffness: float = field(default=math.inf, kw_only=True)
     """Radial stiffness of the housing behind the bearing, in series with it (N/m); inf: rigid."""
     group: str = field(default="bearings", kw_only=True)
-    """Bearings of one group are calibrated together, in their given ratio; an empty name: known, never calibrated."""
+    """Bearings of one group are calibrated together, in their given ratio; "" is never calibrated."""
 
     rolling_elements: RollingElements = field(default="balls", kw_only=True)
-    """Kind of rolling elements; of balls, the stiffness says in which range the preload left lies."""
+    """Kind of rolling elements; with balls the stiffness gives a range of the remaining preload."""
 
     @property
     def support_stiffness(self) -> float:
-        """What the shaft feels of bearing and housing (N/m)."""
+        """Stiffness of bearing and housing in series (N/m)."""
         if math.isinf(self.stiffness):
             return self.housing_stiffness
         return self.stiffness * bearing_motion_share(self.stiffness, 1 / self.housing_stiffness)
 
     def check(self, where: str) -> None:
-        """Raise ValueError, beginning with `where`, for what is no bearing."""
+        """Raise ValueError, beginning with `where`, for an invalid bearing.
+
+        Parameters
+        ----------
+        where : str
+            Beginning of the message.
+        """
         require_positive(where, "stiffness", self.stiffness, "N/m", infinite=True)
         require_not_negative(where, "damping", self.damping, "N s/m")
         if self.rolling_elements not in get_args(RollingElements):
@@ -66,8 +74,10 @@ class Bearing:
 
 @dataclass(frozen=True)
 class LumpedMass:
-    """A rigid body on the shaft, a pulley or a balance ring; checked as part of a Spindle.
+    """Rigid body on the shaft, such as a pulley or a balance ring; checked as part of a Spindle.
 
+    Examples
+    --------
     >>> pulley = LumpedMass(position=0.25, mass=3.0)  # kg, in the middle of the shaft
     >>> ends = [Bearing(0.0, np.inf), Bearing(0.5, np.inf)]
     >>> bare, laden = (Spindle([Segment(0.5, 0.05)], ends, masses=masses) for masses in ((), (pulley,)))
@@ -82,10 +92,16 @@ class LumpedMass:
     diametral_inertia: float = 0.0
     """Moment of inertia about a diameter (kg m^2)."""
     polar_inertia: float = 0.0
-    """Moment of inertia about the shaft's axis (kg m^2); makes frequencies depend on speed."""
+    """Moment of inertia about the shaft axis (kg m^2); makes frequencies depend on speed."""
 
     def check(self, where: str) -> None:
-        """Raise ValueError, beginning with `where`, for what is no rigid body."""
+        """Raise ValueError, beginning with `where`, for an invalid body.
+
+        Parameters
+        ----------
+        where : str
+            Beginning of the message.
+        """
         require_not_negative(where, "mass", self.mass, "kg")
         require_not_negative(where, "diametral_inertia", self.diametral_inertia, "kg m^2")
         require_not_negative(where, "polar_inertia", self.polar_inertia, "kg m^2")
@@ -98,8 +114,10 @@ class LumpedMass:
 
 @dataclass(frozen=True)
 class Joint:
-    """A compliant joint across the shaft: tool in holder, holder in spindle; checked as part of a Spindle.
+    """Compliant joint across the shaft: tool in holder, holder in spindle; checked as part of a Spindle.
 
+    Examples
+    --------
     >>> holder = Joint(position=0.1, stiffness=1e9, rotational_stiffness=5e5)  # N/m, N m/rad
     >>> shaft = Spindle([Segment(0.4, 0.05)], [Bearing(0.2, 2e8), Bearing(0.35, 1e8)])
     >>> jointed = Spindle(shaft.segments, shaft.bearings, joints=[holder])
@@ -114,18 +132,24 @@ class Joint:
     rotational_stiffness: float
     """Stiffness against tilting between its two sides (N m/rad)."""
     group: str = field(default="", kw_only=True)
-    """Name under which its two stiffnesses are calibrated together; empty: known, never calibrated."""
+    """Group in which both stiffnesses are calibrated together; "" is never calibrated."""
     rotational_group: str = field(default="", kw_only=True)
-    """Name under which fit_stiffness finds that against tilting by itself; empty: with the radial one."""
+    """Group of the stiffness against tilting in fit_stiffness; "" is that of the radial one."""
 
     def check(self, where: str) -> None:
-        """Raise ValueError, beginning with `where`, for what is no joint."""
+        """Raise ValueError, beginning with `where`, for an invalid joint.
+
+        Parameters
+        ----------
+        where : str
+            Beginning of the message.
+        """
         require_positive(where, "stiffness", self.stiffness, "N/m")
         require_positive(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
 
 
 class Damping(NamedTuple):
-    """Damping of a spindle, apart from its stiffness."""
+    """Damping of a spindle, separate from its stiffness."""
 
     viscous: Floats
     """Dampers of the bearings (N s/m), shape (n_bearings,)."""
@@ -134,12 +158,12 @@ class Damping(NamedTuple):
 
     @property
     def complexity(self) -> complex:
-        """1 + i eta."""
+        """Complex factor 1 + i eta."""
         return 1 + 1j * self.loss_factor
 
 
 class Supports(NamedTuple):
-    """Radial springs with dampers, each before the spring of its housing; n frequencies, m bearings."""
+    """Radial springs with dampers, each in series with its housing; n frequencies, m bearings."""
 
     spring: Complexes
     """Stiffness of the bearings alone, dampers included (N/m), shape (n, m)."""
@@ -148,21 +172,21 @@ class Supports(NamedTuple):
 
     @property
     def motion_share(self) -> Complexes:
-        """Part of the motion of the shaft that goes into the bearing and not into its housing (-), shape (n, m)."""
+        """Share of the shaft motion that strains the bearing and not its housing (-), shape (n, m)."""
         return np.asarray(bearing_motion_share(self.spring, self.housing_compliance))
 
     @property
     def stiffness(self) -> Complexes:
-        """Stiffness that the shaft feels (N/m), shape (n, m)."""
+        """Stiffness of bearing and housing in series (N/m), shape (n, m)."""
         return self.spring * self.motion_share
 
     @property
     def stiffness_slope(self) -> Complexes:
-        """Derivative of what the shaft feels by the stiffness of the bearing (-), shape (n, m)."""
+        """Derivative of that stiffness by the stiffness of the bearing (-), shape (n, m)."""
         return self.motion_share**2
 
     def across(self, compliance: Complexes) -> Complexes:
-        """Compliance across the springs of the bearings, (n, m, m), from that of the shaft on them (m/N).
+        """Return the compliance across the bearing springs, (n, m, m), from that of the shaft on them (m/N).
 
         A pair of forces across a spring moves the shaft with the share a of it, and the housing by a times its
         compliance.
@@ -174,7 +198,7 @@ class Supports(NamedTuple):
 
 
 def supports(bearings: Sequence[Bearing], w: Complexes, damping: Damping) -> Supports:
-    """The supports of bearings at angular frequencies w (rad/s), shape (n,); `damping` has one damper for each."""
+    """Return the supports of bearings at angular frequencies w (rad/s), shape (n,); one damper for each bearing."""
     stiffness = np.array([bearing.stiffness for bearing in bearings])
     softness = np.array([1 / bearing.housing_stiffness for bearing in bearings])
     spring = damping.complexity * stiffness + 1j * w[:, np.newaxis] * damping.viscous
@@ -182,7 +206,7 @@ def supports(bearings: Sequence[Bearing], w: Complexes, damping: Damping) -> Sup
 
 
 def damping_of_bearings(bearings: Sequence[Bearing], loss_factor: float) -> Damping:
-    """The dampers of bearings with a loss factor, which is checked."""
+    """Return the dampers of bearings with a loss factor; ValueError for a negative one."""
     if not (math.isfinite(loss_factor) and loss_factor >= 0):
         raise ValueError(f"loss_factor={loss_factor} is not a finite number >= 0")
     return Damping(np.array([bearing.damping for bearing in bearings], dtype=np.float64), loss_factor)

@@ -15,13 +15,13 @@ from dsm.spindle.spindle import Spindle
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """What a beam is made of at some places; all of one shape, worked out when asked for."""
+    """Cross-sections of a beam at some places, all arrays of one shape."""
 
     outer: Floats
     """Outer diameter (m)."""
     bore: Floats
     """Diameter of the bore (m)."""
-    heavy: Floats
+    mass_outer: Floats
     """Outer diameter of the mass (m)."""
     material: Floats
     """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, ...)."""
@@ -34,12 +34,12 @@ class CrossSection:
     @property
     def mass(self) -> Floats:
         """Mass per length (kg/m)."""
-        return np.asarray(self.material[1] * ring_area(self.heavy, self.bore))
+        return np.asarray(self.material[1] * ring_area(self.mass_outer, self.bore))
 
     @property
     def rotary(self) -> Floats:
         """Moment of inertia about a diameter per length, rho I (kg m)."""
-        return np.asarray(self.material[1] * ring_second_moment(self.heavy, self.bore))
+        return np.asarray(self.material[1] * ring_second_moment(self.mass_outer, self.bore))
 
     @property
     def shear(self) -> Floats:
@@ -50,10 +50,10 @@ class CrossSection:
 
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """The segments of a shaft as arrays, from the tool tip on."""
+    """Segments of a shaft as arrays, from the tool tip on."""
 
     ends: Floats
-    """Places where segments begin and end (m), shape (n_segments + 1,)."""
+    """Ends of the segments (m), shape (n_segments + 1,)."""
     diameters: Floats
     """Outer at both ends, bore at both ends, outer of the mass at both ends (m), shape (6, n_segments)."""
     material: Floats
@@ -61,39 +61,39 @@ class Sections:
 
     @cached_property
     def is_cone(self) -> Flags:
-        """Which segments have a diameter that changes, shape (n_segments,)."""
+        """Which segments are conical, shape (n_segments,)."""
         return np.asarray((self.diameters[::2] != self.diameters[1::2]).any(axis=0))
 
     def segment_at(self, position: Floats) -> Indices:
-        """Index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
+        """Return the index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
         return np.asarray(np.searchsorted(self.ends[1:-1], position))
 
     def at(self, segment: Indices, position: Floats) -> CrossSection:
-        """The cross-sections of segments at positions (m), in the shape of these."""
+        """Return the cross-sections of segments at positions (m), in the shape of these."""
         segment = np.broadcast_to(segment, position.shape)
-        outer, bore, heavy = self.diameters[::2, segment]
+        outer, bore, mass_outer = self.diameters[::2, segment]
         if self.is_cone.any():
             start, length = self.ends[segment], self.ends[segment + 1] - self.ends[segment]
             share = (position - start) / length
             far = self.diameters[1::2, segment]
-            outer, bore, heavy = (a + share * (b - a) for a, b in zip((outer, bore, heavy), far, strict=True))
-        return CrossSection(outer, bore, heavy, self.material[:, segment])
+            outer, bore, mass_outer = (a + share * (b - a) for a, b in zip((outer, bore, mass_outer), far, strict=True))
+        return CrossSection(outer, bore, mass_outer, self.material[:, segment])
 
 
 @lru_cache(maxsize=32)
 def sections(spindle: Spindle) -> Sections:
-    """The cross-sections of a spindle."""
+    """Return the cross-sections of a spindle."""
     return sections_of_segments(spindle.segments, spindle.material)
 
 
 def sections_of_segments(segments: Sequence[Segment], common: Material) -> Sections:
-    """Those of segments, some of them of the common material."""
+    """Return the cross-sections of segments, some of them of the common material."""
     rows = []
     for segment in segments:
         (outer, bore), (end_outer, end_bore) = segment.diameters_at(0.0), segment.diameters_at(1.0)
-        heavy = (outer, end_outer) if segment.mass_diameter is None else 2 * (segment.mass_diameter,)
+        mass_outer = (outer, end_outer) if segment.mass_diameter is None else 2 * (segment.mass_diameter,)
         material = segment.material or common
         constants = material.youngs_modulus, material.density, material.shear_modulus, material.poisson_ratio
-        rows.append((segment.length, outer, end_outer, bore, end_bore, *heavy, *constants))
+        rows.append((segment.length, outer, end_outer, bore, end_bore, *mass_outer, *constants))
     table = np.array(rows).T
     return Sections(np.concatenate([[0.0], np.cumsum(table[0])]), table[1:7], table[7:])

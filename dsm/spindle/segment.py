@@ -27,16 +27,16 @@ def require_not_negative(where: str, name: str, value: float, unit: str) -> None
 
 
 SAME_PLACE = 1e-9
-"""Places on the shaft nearer to each other than this part of its length, as by rounding, count as one."""
+"""Largest distance of equal places on the shaft, over its length."""
 
 
 def nearest_index(positions: Floats, place: float) -> int:
-    """Index of the position nearest to a place, the first of several."""
+    """Return the index of the position nearest to a place, the first of several."""
     return int(nearest_indices(positions, [place])[0])
 
 
 def nearest_indices(positions: Floats, places: Sequence[float]) -> Indices:
-    """The same for each of several places, shape (n,)."""
+    """Return the indices of the positions nearest to several places, shape (n,)."""
     return np.asarray(np.abs(np.array(places)[:, np.newaxis] - positions).argmin(axis=1))
 
 
@@ -45,8 +45,15 @@ FloatOrArray = TypeVar("FloatOrArray", float, Floats)
 
 @dataclass(frozen=True)
 class Material:
-    """An elastic material. Raises ValueError for constants that no such material has.
+    """Elastic material.
 
+    Raises
+    ------
+    ValueError
+        For constants that no material has.
+
+    Examples
+    --------
     >>> steel = Material(youngs_modulus=210e9, density=7850.0, shear_modulus=80.77e9)
     >>> round(steel.poisson_ratio, 2)
     0.3
@@ -64,7 +71,7 @@ class Material:
     """Shear modulus G (Pa); used by the Timoshenko theory."""
 
     def __post_init__(self) -> None:
-        """Check the constants; E/2G - 1 is Poisson's ratio."""
+        """Check the constants."""
         require_positive("", "youngs_modulus", self.youngs_modulus, "Pa")
         require_positive("", "density", self.density, "kg/m^3")
         require_positive("", "shear_modulus", self.shear_modulus, "Pa")
@@ -80,12 +87,18 @@ class Material:
         return self.youngs_modulus / (2 * self.shear_modulus) - 1
 
     def shear_coefficient(self, bore_over_outer: float) -> float:
-        """Share kappa of a ring's area that carries shear (-); see shear_coefficient below."""
+        """Return the shear coefficient kappa of a ring (-).
+
+        Parameters
+        ----------
+        bore_over_outer : float
+            Bore over outer diameter (-).
+        """
         return shear_coefficient(self.poisson_ratio, bore_over_outer)
 
 
 def shear_coefficient(poisson_ratio: FloatOrArray, bore_over_outer: FloatOrArray) -> FloatOrArray:
-    """Share kappa of a ring's area that carries shear (-); 0 is a full section.
+    """Return the shear coefficient kappa of a ring (-); bore_over_outer 0 is a full section.
 
     Source: G. R. Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966).
     """
@@ -108,15 +121,17 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
         "tungsten alloy": _isotropic_material(340e9, 17600.0, 0.28),
     }
 )
-"""Room-temperature handbook values by name: AISI 304, Ti-6Al-4V, cemented carbide with 10 % cobalt, 93 % W alloy."""
+"""Handbook values at room temperature by name: AISI 304, Ti-6Al-4V, cemented carbide with 10 % cobalt, 93 % W alloy."""
 
 STEEL = MATERIALS["steel"]
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A round piece of the shaft, uniform or conical; checked where it becomes part of a Spindle.
+    """Round piece of the shaft, uniform or conical; checked as part of a Spindle.
 
+    Examples
+    --------
     >>> Segment(0.3, 0.06, bore_diameter=0.02).second_moment  # m^4; pi (D^4 - d^4) / 64
     6.283185307179585e-07
     >>> cone = Segment(0.1, 0.03, end_outer_diameter=0.05)  # 30 mm towards the tool tip
@@ -127,19 +142,19 @@ class Segment:
     length: float
     """Length along the shaft (m)."""
     outer_diameter: float
-    """Outer diameter (m); of a cone, that of its end towards the tool tip."""
+    """Outer diameter (m); for a cone at its end towards the tool tip."""
     bore_diameter: float = 0.0
-    """Diameter of the bore (m), 0 where solid; of a cone, that of its end towards the tool tip."""
+    """Bore diameter (m), 0 if solid; for a cone at its end towards the tool tip."""
     material: Material | None = field(default=None, kw_only=True)
-    """Material; None: that of the spindle."""
+    """Material. Default: that of the spindle."""
     end_outer_diameter: float | None = field(default=None, kw_only=True)
-    """Outer diameter of the end away from the tool tip (m); None: no cone outside."""
+    """Outer diameter at the end away from the tool tip (m); None: no cone outside."""
     end_bore_diameter: float | None = field(default=None, kw_only=True)
-    """Diameter of the bore at the end away from the tool tip (m); None: no cone inside."""
+    """Bore diameter at the end away from the tool tip (m); None: no cone inside."""
     mass_diameter: float | None = field(default=None, kw_only=True)
-    """Outer diameter up to which there is mass (m); None: outer_diameter, which counts for the stiffness alone then.
+    """Outer diameter of the mass (m). Default: outer_diameter, which otherwise counts for the stiffness only.
 
-    Larger than outer_diameter where a part turns with the shaft and does not stiffen it: a rotor stack, a nut, flutes.
+    Larger than outer_diameter for parts that rotate with the shaft without stiffening it: rotor stack, nut, flutes.
     """
 
     @property
@@ -149,16 +164,22 @@ class Segment:
 
     @property
     def area(self) -> float:
-        """Area of the cross-section (m^2); of a cone, at its end towards the tool tip."""
+        """Area of the cross-section (m^2); for a cone at its end towards the tool tip."""
         return ring_area(self.outer_diameter, self.bore_diameter)
 
     @property
     def second_moment(self) -> float:
-        """Second moment of area about a diameter (m^4); of a cone, at its end towards the tool tip."""
+        """Second moment of area about a diameter (m^4); for a cone at its end towards the tool tip."""
         return ring_second_moment(self.outer_diameter, self.bore_diameter)
 
     def diameters_at(self, share: float) -> tuple[float, float]:
-        """Outer and bore diameter (m) at a share of the length, 0 towards the tool tip."""
+        """Return outer and bore diameter (m).
+
+        Parameters
+        ----------
+        share : float
+            Share of the length, 0 towards the tool tip (-).
+        """
         outer_end = self.outer_diameter if self.end_outer_diameter is None else self.end_outer_diameter
         bore_end = self.bore_diameter if self.end_bore_diameter is None else self.end_bore_diameter
         return (
@@ -167,7 +188,13 @@ class Segment:
         )
 
     def check(self, where: str) -> None:
-        """Raise ValueError, beginning with `where`, for what is no piece of a shaft."""
+        """Raise ValueError, beginning with `where`, for an invalid segment.
+
+        Parameters
+        ----------
+        where : str
+            Beginning of the message.
+        """
         require_positive(where, "length", self.length, "m")
         require_positive(where, "outer_diameter", self.outer_diameter, "m")
         _check_bore(where, "", self.bore_diameter, self.outer_diameter)
@@ -187,12 +214,12 @@ class Segment:
 
 
 def ring_area(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray) -> FloatOrArray:
-    """Area of a ring (m^2), diameters in m."""
+    """Return the area of a ring (m^2), diameters in m."""
     return math.pi * (outer_diameter**2 - bore_diameter**2) / 4
 
 
 def ring_second_moment(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray) -> FloatOrArray:
-    """Second moment of area of a ring about a diameter (m^4), diameters in m."""
+    """Return the second moment of area of a ring about a diameter (m^4), diameters in m."""
     return math.pi * (outer_diameter**4 - bore_diameter**4) / 64
 
 

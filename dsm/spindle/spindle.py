@@ -17,15 +17,20 @@ Theory = Literal["euler-bernoulli", "timoshenko"]
 """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
 
 MAX_SEGMENTS = 500
-"""More are refused: the work grows with their third power."""
+"""Most segments: the work grows with their third power."""
 
 
 @dataclass(frozen=True)
 class Spindle:
-    """A spindle with holder and tool, segment after segment from the tool tip (z = 0) on.
+    """Spindle with holder and tool, segment after segment from the tool tip (z = 0) on.
 
-    Raises ValueError, naming the part (1 is the first of its kind), for what is no shaft or does not fit it.
+    Raises
+    ------
+    ValueError
+        For an invalid shaft or part; the message names the part (1 is the first of its kind).
 
+    Examples
+    --------
     >>> spindle = Spindle(
     ...     segments=[Segment(0.1, 0.02), Segment(0.3, 0.06, bore_diameter=0.02)],
     ...     bearings=[Bearing(0.15, 2e8), Bearing(0.35, 1e8)],
@@ -39,17 +44,17 @@ class Spindle:
     """
 
     segments: Sequence[Segment]
-    """Segments in order from the tool tip; kept as a tuple."""
+    """Segments from the tool tip on; kept as a tuple."""
     bearings: Sequence[Bearing]
-    """Bearings in any order, at segment ends or between them; kept as a tuple. None: a free shaft."""
+    """Bearings in any order; kept as a tuple. Without bearings the shaft is free."""
     youngs_modulus: float = STEEL.youngs_modulus
-    """Young's modulus E (Pa) of segments without a material of their own."""
+    """Young's modulus E (Pa) of segments without a material."""
     density: float = STEEL.density
-    """Density rho (kg/m^3) of the same."""
+    """Density rho (kg/m^3) of segments without a material."""
     theory: Theory = "euler-bernoulli"
     """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments of the shaft."""
     shear_modulus: float | None = None
-    """Shear modulus G (Pa) of segments without a material of their own; None: E/2.6, of Poisson's ratio 0.3."""
+    """Shear modulus G (Pa) of segments without a material. Default: E/2.6, for Poisson's ratio 0.3."""
     masses: Sequence[LumpedMass] = ()
     """Rigid bodies on the shaft; kept as a tuple."""
     joints: Sequence[Joint] = ()
@@ -75,7 +80,7 @@ class Spindle:
         self._check_joints()
 
     def __hash__(self) -> int:
-        """Worked out once: matrices are kept by their spindle."""
+        """Return a cached hash, as matrices are cached by their spindle."""
         return self._hash
 
     @cached_property
@@ -84,7 +89,7 @@ class Spindle:
 
     @cached_property
     def material(self) -> Material:
-        """Material of segments without one of their own."""
+        """Material of segments without a material."""
         shear = self.youngs_modulus / 2.6 if self.shear_modulus is None else self.shear_modulus
         return Material(self.youngs_modulus, self.density, shear)
 
@@ -95,11 +100,11 @@ class Spindle:
 
     @property
     def mass(self) -> float:
-        """Mass of the shaft with all that sits on it (kg)."""
+        """Mass of the shaft and of the rigid bodies (kg)."""
         return math.fsum([*map(self._segment_mass, self.segments), *(part.mass for part in self.masses)])
 
     def _segment_mass(self, segment: Segment) -> float:
-        """Volume by Simpson's rule, exact for a cone."""
+        """Compute the mass by Simpson's rule, exact for a cone."""
         ends = [segment.diameters_at(share) for share in (0.0, 0.5, 1.0)]
         areas = [ring_area(segment.mass_diameter or outer, bore) for outer, bore in ends]
         density = segment.material.density if segment.material else self.density
@@ -120,7 +125,7 @@ class Spindle:
                     )
 
     def _check_joints(self) -> None:
-        """A joint stands inside the shaft, and nothing else at its place: it would not be known on which side."""
+        """Check that a joint is inside the shaft and alone at its place, as the side of a part would be unknown."""
         slack = SAME_PLACE * self.length
         others: list[tuple[str, Sequence[Bearing | LumpedMass]]] = [("bearing", self.bearings), ("mass", self.masses)]
         for number, joint in enumerate(self.joints, 1):
@@ -134,7 +139,7 @@ class Spindle:
 
 
 def require_support(spindle: Spindle) -> None:
-    """Raise ValueError where the shaft can move without bending: it needs two bearings, or one that resists tilting."""
+    """Raise ValueError unless the shaft is supported by two bearings, or by one that resists tilting."""
     tilting = any(bearing.rotational_stiffness > 0 for bearing in spindle.bearings)
     if len(spindle.bearings) + tilting < 2:
         raise ValueError(
@@ -147,9 +152,10 @@ Part = TypeVar("Part", Bearing, LumpedMass, Joint)
 
 
 def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | None]:
-    """What lies beyond `position` from the tool tip (m), its own positions counted from the cut; the joint at the cut.
+    """Return the spindle beyond `position` from the tool tip (m), with positions from the cut, and the joint there.
 
-    A segment there is cut in two. Bearings, masses and joints nearer to the tool tip fall away; a bearing or a mass at
+    A segment at the cut is divided. Bearings, masses and joints nearer to the tool tip are removed; a bearing or a mass
+    at
     the cut stays. Raises ValueError for a cut off the shaft or at its far end.
     """
     slack = SAME_PLACE * spindle.length
@@ -174,24 +180,44 @@ def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | Non
 
 
 def shift_parts(parts: Iterable[Part], shift: float) -> list[Part]:
-    """The same parts, further from the tool tip by `shift` (m); none before it."""
+    """Return the parts moved away from the tool tip by `shift` (m); none before it."""
     return [replace(part, position=max(part.position + shift, 0.0)) for part in parts]
 
 
 def _rest_of_segment(segment: Segment, removed: float) -> Segment:
-    """What is left of a segment without its first part, of length `removed` (m)."""
+    """Return a segment without its first part of length `removed` (m)."""
     outer, bore = segment.diameters_at(removed / segment.length)
     return replace(segment, length=segment.length - removed, outer_diameter=outer, bore_diameter=bore)
 
 
 def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
-    """The spindle beyond `position` from its tool tip (m) with `tool` in front of it.
+    """Replace the tool of a spindle.
 
-    tool: a free shaft, its first segment the new tool tip, its last one fast to the spindle. A bearing, a mass or a
-    joint where the spindle is cut stays with it; all that is nearer to the old tip falls away. Segments of the tool
-    without a material of their own keep that of the tool. Raises ValueError for a cut off the shaft, a tool with
-    bearings, and one of another beam theory.
+    A bearing, a mass or a joint at the cut stays with the spindle; everything nearer to the old tip is removed.
+    Segments
+    of the tool without a material keep that of the tool.
 
+    Parameters
+    ----------
+    spindle : Spindle
+        Spindle with the old tool.
+    position : float
+        Distance of the cut from the old tool tip (m).
+    tool : Spindle
+        New tool as a free shaft: its first segment is the tip, its last one is fixed to the spindle.
+
+    Returns
+    -------
+    Spindle
+        Spindle with the new tool.
+
+    Raises
+    ------
+    ValueError
+        For a cut off the shaft, a tool with bearings, and one of another beam theory.
+
+    Examples
+    --------
     >>> long_tool = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
     >>> short_tool = change_tool(long_tool, 0.1, Spindle([Segment(0.06, 0.02)], []))
     >>> round(short_tool.length, 2), [round(bearing.position, 2) for bearing in short_tool.bearings]  # m
@@ -213,7 +239,7 @@ def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
 
 
 def check_tool(tool: Spindle, theory: str) -> None:
-    """Raise ValueError for what cannot be put into a spindle of a beam theory."""
+    """Raise ValueError for a tool that does not fit into a spindle of a beam theory."""
     if tool.bearings:
         raise ValueError(f"the tool has {len(tool.bearings)} bearing(s); give it without, as a free shaft")
     if tool.theory != theory:

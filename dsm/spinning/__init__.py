@@ -1,1 +1,1 @@
-"""Spinning beams that need not be round."""
+"""Spinning beams of any cross-section."""

@@ -1,4 +1,4 @@
-"""Spinning beam that need not be round, its elements and its dynamic stiffness."""
+"""Spinning beam of any cross-section, its elements and its dynamic stiffness."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SpinningDof = Literal["u", "v", "u'", "v'"]
 
 @dataclass(frozen=True)
 class SpinningSegment:
-    """A uniform piece of the beam, its principal axes x and y along those of all others."""
+    """Uniform piece of the beam, with principal axes x and y parallel to those of all others."""
 
     length: float
     """Length along the beam (m)."""
@@ -34,22 +34,27 @@ class SpinningSegment:
 
 @dataclass(frozen=True)
 class SpinningSpring:
-    """A spring to the axis of spin that turns with the beam; with equal stiffnesses it may as well stand still."""
+    """Spring to the axis of spin that rotates with the beam; with equal stiffnesses it may as well be fixed."""
 
     position: float
     """Distance from the first end (m)."""
     stiffness_x: float
-    """Stiffness against u (N/m); 0 where there is none."""
+    """Stiffness against u (N/m)."""
     stiffness_y: float | None = None
     """Stiffness against v (N/m); None: the same."""
 
 
 @dataclass(frozen=True)
 class SpinningBeam:
-    """Segments in a row from z = 0 on, springs, and dofs that are held; free where nothing is said.
+    """Segments from z = 0 on, springs, and held dofs; all other dofs are free.
 
-    Raises ValueError, naming the segment or spring (1 is the first), for numbers out of range or places off the beam.
+    Raises
+    ------
+    ValueError
+        For numbers out of range or places off the beam; the message names the segment or spring (1 is the first).
 
+    Examples
+    --------
     >>> clamp = [(0.0, dof) for dof in ("u", "v", "u'", "v'")]
     >>> cantilever = SpinningBeam([SpinningSegment(0.5, 1e4, 1e4, 15.0)], held=clamp)
     >>> spinning_frequencies(cantilever, 1, 0.0).round(2).tolist()  # Hz
@@ -63,7 +68,7 @@ class SpinningBeam:
     springs: Sequence[SpinningSpring] = ()
     """Springs in any order; those at one place add up; kept as a tuple."""
     held: Sequence[tuple[float, SpinningDof]] = ()
-    """Position (m) and name of each dof that is held: "u" and "v" are a pin, all four a clamp; kept as a tuple."""
+    """Position (m) and name of each held dof: "u" and "v" are a pin, all four a clamp; kept as a tuple."""
 
     def __post_init__(self) -> None:
         """Check numbers and geometry."""
@@ -88,7 +93,7 @@ class SpinningBeam:
 
     @property
     def is_round(self) -> bool:
-        """True where x and y are alike: any two perpendicular axes would do."""
+        """True if x and y are equivalent: any two perpendicular axes would do."""
         return (
             all(segment.rigidity_xx == segment.rigidity_yy for segment in self.segments)
             and all(spring.stiffness_y in (None, spring.stiffness_x) for spring in self.springs)
@@ -97,7 +102,7 @@ class SpinningBeam:
 
     @property
     def is_supported(self) -> bool:
-        """True where nothing moves without bending or straining a spring, in either plane."""
+        """True if nothing moves without bending or straining a spring, in either plane."""
         for axis in ("u", "v"):
             supports = self._supports(axis)
             pins = {position for position, is_slope in supports if not is_slope}
@@ -106,12 +111,18 @@ class SpinningBeam:
         return True
 
     def stiffness(self, spring: SpinningSpring) -> Iterator[tuple[SpinningDof, float]]:
-        """What a spring adds to u and to v (N/m)."""
+        """Yield the stiffness that a spring adds to u and to v (N/m).
+
+        Parameters
+        ----------
+        spring : SpinningSpring
+            Spring of the beam.
+        """
         yield "u", spring.stiffness_x
         yield "v", spring.stiffness_x if spring.stiffness_y is None else spring.stiffness_y
 
     def _supports(self, axis: str) -> set[tuple[float, bool]]:
-        """Where u or v is held or sprung (False) and where its slope is held (True)."""
+        """Return where u or v is held or sprung (False) and where its slope is held (True)."""
         held = {(position, dof.endswith("'")) for position, dof in self.held if dof[0] == axis}
         sprung = (s.position for s in self.springs for dof, k in self.stiffness(s) if dof == axis and k > 0)
         return held | {(position, False) for position in sprung}
@@ -129,35 +140,35 @@ class SpinningBeam:
 
 
 def check_positive(name: str, value: float) -> None:
-    """Raise ValueError for what is no finite number > 0."""
+    """Raise ValueError unless the value is a finite number > 0."""
     if not (math.isfinite(value) and value > 0):
         raise ValueError(f"{name}={value} is not a finite number > 0")
 
 
 @dataclass(frozen=True, eq=False)
 class SpinningChain:
-    """Stiffness matrix K(w) of uniform elements in a row, on springs, in the frame that turns with them at W (rad/s).
+    """Stiffness matrix K(w) of uniform elements in a row, on springs, in the frame that rotates with them at W (rad/s).
 
     Every node has the dofs u, v, u' = du/dz, v' = dv/dz, in this order, with u = U cos wt and v = V sin wt: then
     E d'''' = M2 d for d = (U, V), E = diag(EIyy, EIxx), M2 = m [[w^2 + W^2, 2 w W], [2 w W, w^2 + W^2]]. The planar
     element of EI = 1, u'''' = q u, is a power series in q without poles below q L^4 = 500 (see element_series),
     sum c_n q^n; so the spinning one is sum c_n (x) E (E^-1 M2)^n: no eigenvectors of the pencil (M2, E) are needed,
-    and as all its entries are >= 0 nothing cancels. It holds up to x = L (m (w + W)^2 / min EI)^(1/4) = MAX_X.
+    and as all its entries are >= 0 nothing cancels. It holds up to x = L (m (w + W)^2 / min EI)^(1/4) = MAX_ELEMENT_X.
     """
 
     length: Floats
     """Length of the elements (m), shape (n,)."""
     rigidity: Floats
-    """EIyy, which resists u, and EIxx, which resists v, of each element (N m^2), shape (n, 2)."""
+    """Rigidities EIyy, which resists u, and EIxx, which resists v, of each element (N m^2), shape (n, 2)."""
     mass_per_length: Floats
     """Mass per length (kg/m), shape (n,)."""
     spring: Floats
-    """Stiffness of the springs against each dof (N/m), shape (4 n + 4,)."""
+    """Spring stiffness against each dof (N/m), shape (4 n + 4,)."""
     free: Indices
     """Indices of the dofs that are not held, shape (n_free,)."""
 
     def matrices(self, w: Floats, spin: float) -> tuple[Floats, Floats]:
-        """K and dK/dw at w and W = spin (rad/s), both >= 0, shape (n_w, n_free, n_free) each."""
+        """Return K and dK/dw at w and W = spin (rad/s), both >= 0, shape (n_w, n_free, n_free) each."""
         mass = self.mass_per_length[:, np.newaxis, np.newaxis] / self.rigidity[..., np.newaxis]
         constant = np.full_like(w, spin)
         same, other = w**2 + spin**2, 2 * w * spin
@@ -172,17 +183,17 @@ class SpinningChain:
         return self._joined(value) + self._springs, self._joined(derivative)
 
     def count(self, w: Floats, spin: float) -> Indices:
-        """Number of negative eigenvalues of K at w and W = spin (rad/s), shape (n_w,)."""
+        """Return the number of negative eigenvalues of K at w and W = spin (rad/s), shape (n_w,)."""
         scale = 1 / np.sqrt(np.diagonal(self.hermite()[0]))
         scaled = self.matrices(w, spin)[0] * np.outer(scale, scale)
         return np.asarray(np.sum(np.linalg.eigvalsh(scaled) < 0, axis=-1), dtype=int)
 
     def in_plane(self, axis: Literal[0, 1]) -> SpinningChain:
-        """The same that moves along u (0) or v (1) only."""
+        """Return the chain that moves along u (0) or v (1) only."""
         return replace(self, free=self.free[self.free % 2 == axis])
 
     def hermite(self) -> tuple[Floats, Floats, Floats]:
-        """Static stiffness S, consistent mass M and coupling C: K is nearly S - (w^2 + W^2) M - 2 w W C."""
+        """Return static stiffness S, consistent mass M and coupling C: K is nearly S - (w^2 + W^2) M - 2 w W C."""
         mass = self.mass_per_length[:, np.newaxis, np.newaxis]
         inner = (
             (self._planar[0], self._rigidity_matrix),
@@ -204,14 +215,14 @@ class SpinningChain:
 
     @cached_property
     def _planar(self) -> Floats:
-        """Coefficients of q^n of the planar elements of EI = 1, dofs u, u' at both ends, shape (TERMS, n, 4, 4)."""
+        """Coefficients of q^n of the planar elements of EI = 1, dofs u, u' at both ends, (SERIES_TERMS, n, 4, 4)."""
         one = np.ones_like(self.length)
         a, b, c, d, e, f = element_series(one, one, self.length)
         rows = np.array([[a, b, d, e], [b, c, -e, f], [d, -e, a, -b], [e, f, -b, c]])
         return np.asarray(rows.transpose(3, 2, 0, 1)).reshape(SERIES_TERMS, -1, 4, 4)
 
     def _joined(self, elements: Floats) -> Floats:
-        """The matrix of the chain from those of its elements, shape (n_w, n, 4, 2, 4, 2): planar dof, axis."""
+        """Join the matrices of the elements, shape (n_w, n, 4, 2, 4, 2): planar dof, axis."""
         n_w, n = elements.shape[:2]
         matrix = np.zeros((n_w, 4 * n + 4, 4 * n + 4))
         for first, element in enumerate(elements.reshape(n_w, n, 8, 8).swapaxes(0, 1)):
@@ -228,21 +239,46 @@ def spinning_element(
     frequency: ArrayLike,
     speed_rpm: float,
 ) -> Floats:
-    """Stiffness matrix of a uniform beam spinning about its axis z, in the frame that turns with it, (n, 8, 8).
-
-    rigidity_xx: EIxx, against v (N m^2); rigidity_yy: EIyy, against u (N m^2); mass_per_length (kg/m); length (m);
-    frequency: (n,) Hz, >= 0, seen in the turning frame; speed_rpm: speed of spin (rpm), >= 0.
+    """Compute the stiffness matrix of a uniform spinning beam in the frame that rotates with it.
 
     Rows and columns are u, v, du/dz, dv/dz at z = 0, then the same at z = length; the matrix gives the forces (N) and
     moments (N m) that do work on them, along the same axes at both ends, and is symmetric. The motion is
     u = U cos wt, v = V sin wt; for u = U sin wt, v = V cos wt the coupling of u and v changes its sign. A rotation
-    about x is -dv/dz.
+    about x is -dv/dz. Beams longer than the series allows are divided into equal parts whose inner dofs are eliminated;
+    infinite only at the natural frequencies of the beam clamped at both ends.
 
-    Equal to A B^-1 of Gaber & Hashemi, Shock and Vibration, 2015, eqs. (1)-(27), with the signs put right
-    (docs/paper.md), but also defined at speed 0, at frequency 0 and where the two are equal. Beams longer than the
-    series allows are taken in equal parts whose inner dofs are eliminated; infinite only at the natural frequencies
-    of the beam clamped at both ends. Raises ValueError for numbers out of range.
+    Parameters
+    ----------
+    rigidity_xx : float
+        Bending stiffness EIxx against v (N m^2).
+    rigidity_yy : float
+        Bending stiffness EIyy against u (N m^2).
+    mass_per_length : float
+        Mass per length (kg/m).
+    length : float
+        Length (m).
+    frequency : array_like, shape (n,)
+        Frequencies in the rotating frame (Hz), >= 0.
+    speed_rpm : float
+        Speed of spin (rpm), >= 0.
 
+    Returns
+    -------
+    ndarray, shape (n, 8, 8)
+        Dynamic stiffness.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range.
+
+    References
+    ----------
+    Equal to A B^-1 of Gaber & Hashemi, Shock and Vibration, 2015, eqs. (1)-(27), with corrected signs
+    (docs/paper.md), but also defined at speed 0, at frequency 0 and if the two are equal.
+
+    Examples
+    --------
     At rest, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
 
     >>> element = spinning_element(1e4, 1e4, mass_per_length=15.0, length=0.5, frequency=[0.0], speed_rpm=0.0)
@@ -270,7 +306,7 @@ def spinning_element(
 
 
 def angular_speed(speed_rpm: float) -> float:
-    """Speed of spin (rad/s). Raises ValueError for a negative speed."""
+    """Return the speed of spin (rad/s). Raises ValueError for a negative speed."""
     if not (math.isfinite(speed_rpm) and speed_rpm >= 0):
         raise ValueError(f"speed_rpm={speed_rpm} is not a finite number >= 0")
     return speed_rpm * math.pi / 30

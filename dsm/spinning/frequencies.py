@@ -14,31 +14,33 @@ from dsm.spinning.beam import SpinningBeam, SpinningChain, SpinningDof, angular_
 SPINNING_INTERVAL_WIDTH = 1e-10
 """Relative half-width, in w, of the interval in which each mode is proved to lie."""
 SPINNING_ROUNDING = 16 * np.finfo(np.float64).eps
-"""The same from rounding, relative to |phi|^T |K| |phi| of a mode with |phi^T (dK/dw) phi| = 1."""
+"""Half-width from rounding, relative to |phi|^T |K| |phi| of a mode with |phi^T (dK/dw) phi| = 1."""
 TRIAL_ELEMENT_X = (MAX_ELEMENT_X, 1.0, 0.5)
-"""Longest x of an element (see SpinningChain), tried in turn; the Hermite elements of the start err by w x^4/1440."""
+"""Longest x of an element (see SpinningChain), tried in turn; Hermite elements have an error of w x^4/1440."""
 MAX_SPINNING_INTERVAL = 1e-3
-"""Half-width, relative to w + W, beyond which a mode counts as not proved."""
+"""Half-width, relative to w + W, beyond which a mode is not proved."""
 SAME_BEAM_PLACE = 1e-6
-"""Places nearer to each other than this part of the length are one."""
+"""Largest distance of equal places, over the length."""
 DOF_OFFSETS: dict[SpinningDof, int] = {"u": 0, "v": 1, "u'": 2, "v'": 3}
 
 
 def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats, int, int]:
-    """The `count` lowest w (rad/s) that last, seen in the frame turning at `spin` (rad/s), ascending.
+    """Return the `count` lowest steady w (rad/s) in the rotating frame, and the numbers of growing modes.
 
-    With them how many other modes grow instead: surely, and all in all. Where the two numbers are equal, no mode is
-    missed. Let n(w) be the number of negative eigenvalues of K(w). A mode phi steps it by +1 where its energy,
-    -phi^T (dK/dw) phi, is positive, and by -1 where it is negative, which needs w < W. n(0) = n_u + n_v, the numbers
-    of planar natural frequencies of the two planes below W. Of these n(0) negative squares of the energy each mode of
-    negative energy takes two and each growing mode one, and |n_u - n_v| modes at least do grow (with u = U exp(st),
+    The growing modes are counted twice: proved, and all. If the two numbers are equal, no mode is
+    missed. Let n(w) be the number of negative eigenvalues of K(w). A mode phi steps it by +1 if its energy,
+    -phi^T (dK/dw) phi, is positive, and by -1 if it is negative, which needs w < W (`spin`, rad/s). n(0) = n_u + n_v,
+    the
+    numbers of planar natural frequencies of the two planes below W. Of these n(0) negative squares of the energy each
+    mode
+    of negative energy takes two and each growing mode one, and at least |n_u - n_v| modes grow (with u = U exp(st),
     v = V exp(st) the count goes from that of the one plane to that of the other as s rises from 0). So min(n_u, n_v)
     modes of negative energy, each proved by its step, are all there are, and nothing is missed between the steps.
     Below all critical speeds n(w) simply is the number of modes below w (Wittrick and Williams). With fewer modes of
-    negative energy the others have met modes of positive energy, and the pairs grow (flutter): that these are not
-    merely overlooked is what the Hermite elements of the start say, not a proof.
+    negative energy the others have met modes of positive energy, and the pairs grow (flutter). That they were not
+    merely overlooked follows from the Hermite start values, not from a proof.
 
-    Raises ArithmeticError at a critical speed and where the steps do not prove the modes.
+    Raises ArithmeticError at a critical speed and if the steps do not prove the modes.
     """
     modes = None
     for fineness in TRIAL_ELEMENT_X:
@@ -61,7 +63,7 @@ def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats,
 
 
 def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) -> tuple[SpinningChain, Floats, Floats]:
-    """A matrix exact up to the last mode wanted, and the modes of its Hermite elements."""
+    """Return a matrix exact up to the last wanted mode, and the modes of its Hermite elements."""
     waves = sum(s.length * (s.mass_per_length / max(s.rigidity_xx, s.rigidity_yy)) ** 0.25 for s in beam.segments)
     top = (np.pi * (count / 2 + 1) / waves) ** 2
     for _ in range(8):
@@ -74,7 +76,7 @@ def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) 
 
 
 def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> SpinningChain:
-    """Nodes at segment ends, springs and held dofs, elements short enough for w + W up to `top` (rad/s)."""
+    """Place nodes at segment ends, springs and held dofs, with elements short enough for w + W up to `top` (rad/s)."""
     ends = np.cumsum([0.0] + [segment.length for segment in beam.segments])
     node = ends
     for place in [spring.position for spring in beam.springs] + [position for position, _ in beam.held]:
@@ -100,7 +102,7 @@ def _dof_index(position: Floats, place: float, dof: SpinningDof) -> int:
 
 
 def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[Floats, Floats]:
-    """w and shapes of (S - (w^2 + W^2) M - 2 w W C) phi = 0: the lowest, and all that may have negative energy.
+    """Return w and shapes of (S - (w^2 + W^2) M - 2 w W C) phi = 0: the lowest, and all with possibly negative energy.
 
     With y = (phi, w phi / T), T = `top`: [[2 W T C, T^2 M], [T^2 M, 0]] y = (T/w) [[S - W^2 M, 0], [0, T^2 M]] y.
     """
@@ -123,7 +125,7 @@ def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) ->
 
 
 def _count_planar_below(chain: SpinningChain, spin: float) -> tuple[int, int]:
-    """Number of planar natural frequencies below W, in the planes of u and of v."""
+    """Count the planar natural frequencies below W, in the planes of u and of v."""
     at = np.zeros(1)
     planes = [chain.in_plane(0), chain.in_plane(1)]
     below = [int(plane.count(at, spin * (1 - SPINNING_INTERVAL_WIDTH))[0]) for plane in planes]
@@ -136,7 +138,7 @@ def _count_planar_below(chain: SpinningChain, spin: float) -> tuple[int, int]:
 
 
 def _refine_modes(chain: SpinningChain, w: Floats, shape: Floats, spin: float) -> tuple[Floats, Floats, Floats]:
-    """Inverse iteration with a Newton step each, all modes at once: w, sign of the energy, and half-width; sorted."""
+    """Refine all modes at once by inverse iteration: w, sign of the energy, and half-width; sorted."""
     width = SPINNING_INTERVAL_WIDTH * w
     for _ in range(8):
         previous, trial = w, w + width
@@ -152,7 +154,7 @@ def _refine_modes(chain: SpinningChain, w: Floats, shape: Floats, spin: float) -
 
 
 def _has_expected_counts(chain: SpinningChain, w: Floats, sign: Floats, width: Floats, spin: float, at_0: int) -> bool:
-    """Whether the count steps by the sign of each mode in its own interval and nowhere else."""
+    """Return whether the count steps by the sign of each mode in its own interval and nowhere else."""
     close = np.abs(np.subtract.outer(w, w)) <= width + width[:, np.newaxis]
     if np.any(close & (np.multiply.outer(sign, sign) < 0)) or np.any(width > MAX_SPINNING_INTERVAL * (w + spin)):
         return False
@@ -163,8 +165,21 @@ def _has_expected_counts(chain: SpinningChain, w: Floats, sign: Floats, width: F
 
 
 class UnstableSpinError(ArithmeticError):
-    """Modes that grow at this speed instead of lasting: mostly between the critical speeds of the two planes.
+    """Raised if modes grow at this speed: mostly between the critical speeds of the two planes.
 
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+    frequency : ndarray
+        Lowest frequencies of the other modes, as many as requested (Hz).
+    unstable : int
+        Number of growing modes.
+    proved : int
+        Number of proved ones. Each frequency is proved; completeness only if all growing modes are.
+
+    Examples
+    --------
     >>> pins = [(place, dof) for place in (0.0, 0.5) for dof in ("u", "v")]
     >>> flat = SpinningBeam([SpinningSegment(0.5, 1e4, 2e4, 15.0)], held=pins)
     >>> f_x, f_y = (np.pi / (2 * 0.5**2) * np.sqrt(rigidity / 15.0) for rigidity in (2e4, 1e4))
@@ -175,28 +190,45 @@ class UnstableSpinError(ArithmeticError):
     """
 
     def __init__(self, message: str, frequency: Floats, unstable: int, proved: int) -> None:
-        """Keep what is known beside the message."""
         super().__init__(message)
         self.frequency = frequency
-        """The lowest frequencies of the other modes, as many as were asked for (Hz)."""
         self.unstable = unstable
-        """Number of modes that grow."""
         self.proved = proved
-        """How many of them are proved to. Each frequency is proved; that none is missed only if all these are."""
 
 
 def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Floats:
-    """The `count` lowest natural frequencies (Hz) seen in the frame that turns with the beam, (count,), ascending.
+    """Compute the lowest natural frequencies of a spinning beam in the frame that rotates with it.
 
-    speed_rpm: speed of spin (rpm), >= 0. Euler-Bernoulli theory: no rotary inertia, no gyroscopic moments. A round
+    Euler-Bernoulli theory: no rotary inertia, no gyroscopic moments. A round
     beam is solved as two planar ones, of frequencies f_n: |f_n -+ speed_rpm/60|. Otherwise each mode is proved by
-    its step of the number of negative eigenvalues of the stiffness matrix, and by their sum that none is missed
+    its step of the number of negative eigenvalues of the stiffness matrix, and completeness by their sum
     (see spinning_modes).
 
-    Raises ValueError for a count below 1, a negative speed or a beam that can move without bending;
-    UnstableSpinError where modes grow; ArithmeticError at a critical speed of a beam that is not round, and where
-    modes cannot be proved.
+    Parameters
+    ----------
+    beam : SpinningBeam
+        Supported beam.
+    count : int
+        Number of frequencies.
+    speed_rpm : float
+        Speed of spin (rpm), >= 0.
 
+    Returns
+    -------
+    ndarray, shape (count,)
+        Natural frequencies (Hz), ascending.
+
+    Raises
+    ------
+    ValueError
+        For a count below 1, a negative speed or a beam that can move without bending.
+    UnstableSpinError
+        If modes grow.
+    ArithmeticError
+        At a critical speed of a beam that is not round, and if modes cannot be proved.
+
+    Examples
+    --------
     A round pinned beam, of f_1 = 162.2 Hz at rest, seen from the shaft at 3000 rpm: f_1 -+ 50 Hz.
 
     >>> pins = [(place, dof) for place in (0.0, 0.5) for dof in ("u", "v")]
@@ -227,7 +259,7 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Fl
 
 
 def _round_beam_frequencies(beam: SpinningBeam, count: int, spin: float) -> Floats:
-    """|w_n - W| and w_n + W (rad/s) of so many planar modes that no later one can come lower."""
+    """Return |w_n - W| and w_n + W (rad/s) of so many planar modes that no later one can be lower."""
     n = count
     while True:
         planar = spinning_modes(beam, 2 * n, 0.0)[0][::2]

@@ -1,4 +1,4 @@
-"""Semi-discretisation of high order: milling over one tooth period, its largest multiplier, and the limits from it."""
+"""High-order semi-discretization: milling over one tooth period, its largest multiplier, and stability limits."""
 
 import lazy_loader
 

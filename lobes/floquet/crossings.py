@@ -12,28 +12,30 @@ from lobes.floquet.milling_rows import MillingRows, count_pieces
 from lobes.floquet.multipliers import growth_rate, largest_multipliers
 
 SCAN_DEPTHS = 24
-"""Depths looked at before anything is refined ..."""
+"""Depths that are evaluated before anything is refined."""
 SCAN_EXPONENT = 1.5
-"""... the j-th of them at (j / SCAN) ^ SPREAD of the deepest: limits lie low."""
+"""Exponent of the scan: the j-th depth is (j / SCAN_DEPTHS) ^ SCAN_EXPONENT of the deepest, as limits lie low."""
 MAX_STEP_HALVINGS = 6
-"""Halvings of a step that may hide a pair of crossings."""
+"""Most halvings of a step that may hide a pair of crossings."""
 HIDDEN_CROSSING_SHARE = 0.5
-"""It may where growth, as steep as in a step beside it, goes this share of the way to zero and back."""
+"""Share of the way to zero and back that growth must be able to go for a step to hide a pair of crossings."""
 GROWTH_SIGN_ACCURACY = 1e-4
-"""Accuracy of growth that is enough for its sign, unless it is smaller than that."""
+"""Accuracy of growth that is sufficient for its sign."""
 CROSSING_ACCURACY = 1e-6
 """Relative accuracy of a crossing."""
 MAX_CROSSING_STEPS = 60
+"""Most steps of the refinement."""
 
 GrowthFunction = Callable[[Indices, Floats, float], Floats]
-"""From rows (s,), depths (s, d) and an accuracy to a value (s, d) that is negative where the cut is stable."""
+"""Function from rows (s,), depths (s, d) and an accuracy to growth (s, d), which is negative for a stable cut."""
 
 
 def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Floats:
-    """Depths up to `deepest` where growth changes its sign, rising in each row, filled up with inf, shape (n_rows, k).
+    """Find the depths up to `deepest` where growth changes its sign, rising and padded with inf, shape (n_rows, k).
 
-    A scan finds the changes between its depths. A step of it is halved as long as growth, were it as steep in it as in
-    the steps beside it, could reach zero and come back: so short excursions and islands inside a step are seen. Growth
+    A scan finds the changes between its depths. A step is halved as long as growth, as steep as in the neighbouring
+    steps,
+    could reach zero and come back: so short excursions and islands inside a step are found. Growth
     is negative at depth 0. k is at least 1.
     """
     rows = np.arange(n_rows)
@@ -82,7 +84,7 @@ class _DepthSteps:
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 
     def halves(self, middle: Floats) -> _DepthSteps:
-        """Both halves, given growth at the middles."""
+        """Return both halves, given growth at the middles."""
         half = (self.low + self.high) / 2
         left, right = (np.abs(middle - end) / (half - self.low) for end in (self.at_low, self.at_high))
         return _join_steps(
@@ -98,7 +100,7 @@ def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
 
 
 def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:
-    """The steps of a scan; depth 0 has the value at the first depth, made stable."""
+    """Return the steps of a scan; depth 0 has the value at the first depth, made stable."""
     at = np.hstack((np.zeros((len(depth), 1)), depth))
     values = np.hstack((-np.abs(value[:, :1]), value))
     steep = np.pad(np.abs(np.diff(values) / np.diff(at)), ((0, 0), (1, 1)))
@@ -108,12 +110,12 @@ def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:
 
 
 def _bracket_crossings(growth: GrowthFunction, steps: _DepthSteps) -> _DepthSteps:
-    """The steps that hold a crossing, halved where there may be more."""
+    """Return the steps that hold a crossing, halved if there may be more."""
     done = []
     for _ in range(MAX_STEP_HALVINGS):
-        doubtful = steps.may_hide
-        done.append(steps[~doubtful & steps.crosses])
-        steps = steps[doubtful]
+        may_hide = steps.may_hide
+        done.append(steps[~may_hide & steps.crosses])
+        steps = steps[may_hide]
         if not steps.row.size:
             break
         middle = (steps.low + steps.high)[:, np.newaxis] / 2
@@ -122,7 +124,7 @@ def _bracket_crossings(growth: GrowthFunction, steps: _DepthSteps) -> _DepthStep
 
 
 def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps) -> Floats:
-    """The zero in each step by the false position, with the weight of an end that stays put twice halved (Illinois)."""
+    """Find the zero in each step by the false position; the weight of an end that stays twice is halved (Illinois)."""
     row, low, high = brackets.row, brackets.low.copy(), brackets.high.copy()
     at_low, at_high = brackets.at_low.copy(), brackets.at_high.copy()
     zero, was_lower = (low + high) / 2, np.full(row.size, -1)
@@ -145,17 +147,20 @@ def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps) -> Floats:
 
 
 REAL_MULTIPLIER_ANGLE = 1e-4
-"""A multiplier whose angle is this near to pi (rad) is real."""
+"""Largest angle from pi (rad) of a real multiplier."""
 LIMIT_TOLERANCE = 0.0025
-"""A limit has settled where twice as many pieces find the cut stable this much below it, and unstable above."""
+"""Relative tolerance of a limit: twice as many pieces find the cut stable below and unstable above."""
 MAX_PIECE_DOUBLINGS = 4
-"""Of the pieces, at most. A kind that is open then stays so: at crawling speeds multipliers of all angles crowd."""
+"""Most doublings of the number of pieces.
+
+A kind that is open then stays so: at very low speeds multipliers of all angles crowd.
+"""
 
 
 def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Integers]:
-    """All crossings up to max_depth (m), rising, filled up with inf, shape (r, k), and the pieces (r,) of each row.
+    """Return all crossings up to max_depth (m), rising and padded with inf, shape (r, k), and the pieces (r,).
 
-    Raises ArithmeticError where a limit does not settle.
+    Raises ArithmeticError if a limit does not converge.
     """
     number = count_pieces(rows, max_depth)
     crossings = find_crossings(_growth_function(rows, number), len(rows), max_depth)
@@ -177,7 +182,7 @@ def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, In
 
 
 def _has_converged(rows: MillingRows, depth: Floats, number: Integers) -> tuple[Flags, Flags]:
-    """Whether twice as many pieces leave the limit where it is, and its kind, each of shape (r,)."""
+    """Return whether twice as many pieces keep the limit, and its kind, each of shape (r,)."""
     limit, kind = np.ones((2, depth.size), dtype=bool)
     limited = np.flatnonzero(np.isfinite(depth))
     if limited.size:
@@ -194,7 +199,7 @@ def _pad_columns(table: Floats, width: int) -> Floats:
 
 
 def is_flip(multiplier: Complexes) -> Flags:
-    """Whether each is -1 in its direction: period two."""
+    """Return whether each multiplier is -1 in its direction: period two."""
     return np.asarray(np.abs(np.abs(np.angle(multiplier)) - np.pi) < REAL_MULTIPLIER_ANGLE)
 
 

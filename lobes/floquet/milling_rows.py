@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,14 @@ from lobes.milling_system import MillingSystem, tip_participation
 
 @dataclass(frozen=True, eq=False)
 class MillingRows:
-    """r systems of n modes in the same p directions, each with its own speed, coefficients and feed direction."""
+    """Batch of r systems of n modes in the same p directions, each with its own speed, coefficients and feed angle."""
 
     cut: Cut
-    """Teeth, immersion, direction of milling and helix of all rows; its coefficients and feed angle do not count."""
+    """Teeth, immersion, direction of milling and helix of all rows; its coefficients and feed angle are ignored."""
     direction: Integers
-    """Row of `axes` in which each mode was tapped, shape (n,)."""
+    """Row of `axes` in which each mode was measured, shape (n,)."""
     axes: Integers
-    """Directions that give way, 0 for x and 1 for y, shape (p,)."""
+    """Compliant directions, 0 for x and 1 for y, shape (p,)."""
     frequency: Floats
     """Natural frequencies (rad/s), shape (r, n)."""
     damping_ratio: Floats
@@ -31,7 +31,7 @@ class MillingRows:
     phase: Floats
     """Phases of the modal constants (rad), shape (r, n); 0 for real modes."""
     vector: Floats
-    """Directions of the modes in `axes`, shape (r, n, p): what each takes of a force, and shows. 1 and 0 along one."""
+    """Directions of the modes in `axes`, shape (r, n, p): share of force and response. 1 and 0 along an axis."""
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (r,)."""
     tangential: Floats
@@ -42,24 +42,36 @@ class MillingRows:
     """Angles from x to the feed (rad), shape (r,)."""
 
     def __len__(self) -> int:
-        """Number of rows."""
+        """Return the number of rows."""
         return self.speed_rpm.size
 
     def __getitem__(self, which: Any) -> MillingRows:
-        """Some of the rows, by an index array or a mask."""
+        """Select rows by an index array or a mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in _VARYING_FIELDS})
 
     def with_feed_angle(self, angle: float) -> MillingRows:
-        """All rows with the feed at an angle from x (rad)."""
+        """Return all rows with one feed angle.
+
+        Parameters
+        ----------
+        angle : float
+            Angle from x to the feed (rad).
+        """
         return replace(self, feed_angle=np.full(len(self), angle))
 
     def with_cut(self, cut: Cut) -> MillingRows:
-        """All rows with the teeth, immersion and feed of a cut; their coefficients stay."""
+        """Return all rows with the teeth, immersion and feed of a cut; their coefficients stay.
+
+        Parameters
+        ----------
+        cut : Cut
+            New cut.
+        """
         return replace(self, cut=cut).with_feed_angle(cut.feed_angle)
 
     @property
     def tip_participation(self) -> tuple[Floats, Floats]:
-        """What the tip shows of each mode's coordinate q and of its velocity q' / w, each of shape (r, n)."""
+        """Shares of each mode's coordinate q and velocity q' / w in the tip displacement, each of shape (r, n)."""
         return tip_participation(self.damping_ratio, self.phase)
 
     @property
@@ -74,25 +86,26 @@ class MillingRows:
 
     @property
     def force(self) -> Floats:
-        """Largest entry that the force matrix of a tooth can have, Ks (Pa), shape (r,)."""
+        """Largest possible entry of the force matrix of a tooth, Ks (Pa), shape (r,)."""
         return np.asarray(np.hypot(self.tangential, self.radial))
 
 
-_VARYING_FIELDS = (
-    "frequency",
-    "damping_ratio",
-    "stiffness",
-    "phase",
-    "vector",
-    "speed_rpm",
-    "tangential",
-    "radial",
-    "feed_angle",
-)
+_VARYING_FIELDS = [field.name for field in fields(MillingRows) if field.name not in ("cut", "direction", "axes")]
 
 
 def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:
-    """The rows of both, of the same cut and make."""
+    """Join two batches of the same cut and modes.
+
+    Parameters
+    ----------
+    first, second : MillingRows
+        Batches.
+
+    Returns
+    -------
+    MillingRows
+        Rows of both.
+    """
     columns: dict[str, Any] = {
         name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING_FIELDS
     }
@@ -100,8 +113,24 @@ def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:
 
 
 def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
-    """One system and cut at many speeds (rpm), shape (r,).
+    """Return one system and cut at many speeds.
 
+    Parameters
+    ----------
+    system : MillingSystem
+        Modes of the tool tip.
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : ndarray, shape (r,)
+        Spindle speeds (rpm).
+
+    Returns
+    -------
+    MillingRows
+        One row per speed.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> rows = rows_at_speeds(build_milling_system([mode], None), slot, np.array([6000.0, 12000.0]))
@@ -126,22 +155,25 @@ def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> Millin
 
 
 MAX_CYCLES_PER_PIECE = 0.75
-"""Cycles of the fastest mode that counts in one piece, at most: multipliers within 1e-6 of the exact ones."""
+"""Most cycles of the fastest significant mode per piece: multipliers within 1e-6 of the exact ones."""
 COARSE_CYCLES_PER_PIECE = 1.0
-"""The same where growth within 1e-4 is enough: that of draws."""
+"""Most cycles per piece if growth within 1e-4 is enough, as for Monte Carlo samples."""
 PIECE_NUMBER_RATIO = 1.3
-"""Larger numbers are rounded up to powers of this, so that neighbouring speeds share theirs."""
+"""Ratio of large numbers of pieces, so that neighbouring speeds share theirs."""
 MIN_LOOP_GAIN = 0.1
-"""A mode counts where depth times force times its largest flexibility, 1 / (2 K zeta) of a real one, is more: a loop of
-less cannot sustain itself, whatever the speed."""
+"""Least depth times force times largest flexibility of a significant mode, 1 / (2 K zeta) of a real one.
+
+A loop with less gain cannot sustain itself at any speed.
+"""
 MIN_SEGMENT_SHARE = 1e-12
-"""Segments shorter than this share of the pattern are left out."""
+"""Least length of a segment over the pattern."""
 
 
 def segment_ends(cut: Cut, depth: Floats) -> Floats:
-    """Angles where the force begins, ends or bends, from a tooth's entry to where the pattern repeats, rising (rad).
+    """Return the angles where the force begins, ends or bends over one pitch pattern, rising (rad).
 
-    depth (c,) in m counts for helical teeth alone: they leave later at the tip's other end. Shape (c, k + 1).
+    They start at a tooth's entry. depth (c,) in m matters for helical teeth only: they leave later at the other end of
+    the tip. Shape (c, k + 1).
     """
     turn = sum(cut.pitch_pattern)
     entries = -cut.lead_angles[: len(cut.pitch_pattern)]
@@ -155,16 +187,28 @@ def segment_ends(cut: Cut, depth: Floats) -> Floats:
 
 
 def is_out_of_cut(cut: Cut, ends: Floats, depth: Floats) -> Flags:
-    """Whether no tooth cuts in the segments between these ends (c, k + 1), shape (c, k)."""
+    """Return whether no tooth cuts in the segments between these ends (c, k + 1), shape (c, k)."""
     reach = cut.exit_angle - cut.entry_angle + cut.helix_lag * depth[:, np.newaxis, np.newaxis]
     middle = (ends[:, :-1, np.newaxis] + ends[:, 1:, np.newaxis]) / 2
     return np.asarray(np.all(np.mod(middle + cut.lead_angles, 2 * np.pi) > reach, axis=-1))
 
 
 def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER_PIECE) -> Integers:
-    """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,).
+    """Return the number of pieces of the pitch pattern that each row needs.
 
-    most: cycles of the fastest mode that counts in one.
+    Parameters
+    ----------
+    rows : MillingRows
+        Batch of systems.
+    deepest : float
+        Largest axial depth (m).
+    most : float
+        Most cycles of the fastest significant mode per piece (-).
+
+    Returns
+    -------
+    ndarray of int, shape (r,)
+        Numbers of pieces.
     """
     loop = (
         deepest
@@ -181,9 +225,9 @@ def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER
 
 
 def divide_segments(cut: Cut, number: Integers, ends: Floats) -> Integers:
-    """Pieces of each segment (c, k) where the whole pattern is to have these numbers (c,); 0 for an empty one.
+    """Return the pieces of each segment (c, k) for the pieces of the whole pattern (c,); 0 for an empty one.
 
-    None is longer than the shortest delay: what was cut before must be known.
+    None is longer than the shortest delay: the surface that a tooth meets must be known.
     """
     share = np.diff(ends, axis=1) / ends[:, -1:]
     wanted = np.maximum(number[:, np.newaxis] * share, np.maximum(share * sum(cut.pitch_pattern) / cut.delays[0], 1.0))

@@ -15,36 +15,58 @@ from lobes.floquet.period_map import PeriodMap, UnevenMap, build_period_map
 from lobes.floquet.piece_response import gauss_nodes
 
 ARNOLDI_ATTEMPTS = ((10, 8), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
-"""Power steps and Arnoldi vectors of each attempt; what is left in doubt goes on to the next, with the vectors that it
-has where that takes no power steps."""
-MULTIPLIER_TOLERANCE = 1e-8
-"""Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
-MAX_RESOLVED_MULTIPLIER = 1e6
-"""Of larger multipliers only the order of magnitude is found."""
-SQUARINGS_BEFORE_CHECK = 4
-"""Squarings of a matrix after which what is still seen of smaller Ritz values counts as doubt: 0.5 of the largest has
-become 1.5e-5 by then."""
-EXTRA_SQUARINGS = 6
-"""Squarings beyond those that bring the share of a number near 1 below the tolerance: sizes of powers are off by some.
+"""Power steps and Arnoldi vectors of each attempt for cases that have not converged.
+
+An attempt without power steps keeps the vectors of the one before.
 """
+MULTIPLIER_TOLERANCE = 1e-8
+"""Default of the largest residual of a multiplier, relative to it."""
+MAX_RESOLVED_MULTIPLIER = 1e6
+"""Largest multiplier that is computed accurately; of larger ones only the order of magnitude counts."""
+SQUARINGS_BEFORE_CHECK = 4
+"""Squarings of a matrix after which smaller Ritz values count as error: 0.5 of the largest has become 1.5e-5."""
+EXTRA_SQUARINGS = 6
+"""Squarings beyond those that bring the share of a number near 1 below the tolerance."""
 SQUARINGS_PER_SCALING = 4
-"""Squarings without a look at the size: powers of 16 of what is scaled to 1 still are numbers."""
+"""Squarings between scalings: the power 16 of a scaled matrix does not overflow."""
 MAX_BATCH_NUMBERS = 800_000
-"""Numbers in the matrices of the cases that are solved at once: as much as a processor keeps near."""
+"""Most matrix entries of the cases solved at once, for the processor cache."""
 
 RitzFunction = Callable[[Floats], tuple[Complexes, Floats]]
-"""From Hessenberg matrices (..., k + 1, k) to what is wanted of the largest Ritz value, and its residual over its size:
-that of any that may be larger by as much, since two that are nearly one look smaller until they part. A period that
-grows beyond what a number can hold has the multiplier inf."""
+"""Function from Hessenberg matrices (..., k + 1, k) to the largest Ritz value, and its relative residual.
+
+The residual is that of any value that may be larger by as much, since two that are nearly equal look smaller until
+they separate. A period that grows beyond the number range has the multiplier inf.
+"""
 
 
 def largest_multipliers(
     rows: MillingRows, depth: Floats, numbers: Integers, tolerance: float = MULTIPLIER_TOLERANCE
 ) -> Complexes:
-    """Multiplier of largest magnitude over one tooth period, of uneven teeth over their pattern, shape (r, d).
+    """Return the multiplier of largest magnitude over one tooth period, or one pitch pattern.
 
-    depth (r, d) in m, numbers (r,): pieces of that time (`count_pieces`). Power steps, then Arnoldi, until the
-    residual is below `tolerance` times the multiplier. Raises ArithmeticError for one that stays in doubt.
+    Power steps, then Arnoldi, until the residual is below `tolerance` times the multiplier.
+
+    Parameters
+    ----------
+    rows : MillingRows
+        Batch of r systems.
+    depth : ndarray, shape (r, d)
+        Axial depths (m).
+    numbers : ndarray of int, shape (r,)
+        Pieces of the period (`count_pieces`).
+    tolerance : float
+        Largest relative residual (-).
+
+    Returns
+    -------
+    ndarray of complex, shape (r, d)
+        Multipliers; stable below magnitude 1.
+
+    Raises
+    ------
+    ArithmeticError
+        If a multiplier does not converge.
     """
     return _largest_in_batches(rows, depth, numbers, tolerance, np.float64, _ritz_value)
 
@@ -56,7 +78,10 @@ def spectral_radii(
     tolerance: float = MULTIPLIER_TOLERANCE,
     kind: type[np.floating[Any]] = np.float64,
 ) -> Floats:
-    """Magnitude of it, in less time: eigenvalues are taken where powers leave it in doubt. kind: precision."""
+    """Return the magnitude of the largest multipliers, faster: eigenvalues only if powers do not converge.
+
+    kind: precision.
+    """
 
     def radius(matrices: Floats) -> tuple[Complexes, Floats]:
         value, doubt = _ritz_radius(matrices, math.ceil(-math.log2(tolerance)) + EXTRA_SQUARINGS)
@@ -75,7 +100,7 @@ def _largest_in_batches(
     kind: type[np.floating[Any]],
     ritz: RitzFunction,
 ) -> Complexes:
-    """What is wanted of the largest multipliers (r, d)."""
+    """Compute values of the largest multipliers (r, d) in batches."""
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
         flat = np.repeat(np.arange(len(rows)), depth.shape[1])
         found = _largest_in_batches(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance, kind, ritz)
@@ -88,7 +113,7 @@ def _largest_in_batches(
 
 
 def _equal_division_groups(rows: MillingRows, depth: Floats, numbers: Integers) -> Iterator[tuple[Indices, Integers]]:
-    """Rows that are divided alike, few enough to be solved at once, and the pieces of each segment (k,)."""
+    """Yield rows with equal divisions, few enough to be solved at once, and the pieces of each segment (k,)."""
     ends = segment_ends(rows.cut, depth[:, 0])
     pieces = divide_segments(rows.cut, numbers, ends)
     free = is_out_of_cut(rows.cut, ends, depth[:, 0])
@@ -105,7 +130,7 @@ def _equal_division_groups(rows: MillingRows, depth: Floats, numbers: Integers) 
 def _arnoldi_multipliers(
     rows: MillingRows, depth: Floats, over_period: PeriodMap | UnevenMap, tolerance: float, ritz: RitzFunction
 ) -> Complexes:
-    """Multipliers (r, d) of rows whose tooth periods are divided alike."""
+    """Return the multipliers (r, d) of rows with equal divisions."""
     space = _KrylovSpace.of(over_period, depth.shape, ARNOLDI_ATTEMPTS[0][0]).grown(ARNOLDI_ATTEMPTS[0][1])
     value, doubt = ritz(space.matrix)
     place = np.indices(depth.shape)
@@ -129,18 +154,18 @@ def _arnoldi_multipliers(
 
 @dataclass(frozen=True, eq=False)
 class _KrylovSpace:
-    """Krylov spaces of cases (r, d), as Arnoldi spans them."""
+    """Krylov spaces of cases (r, d) by Arnoldi."""
 
     over_period: PeriodMap | UnevenMap
-    """Map of each."""
+    """Period map of each case."""
     basis: Floats
-    """Vectors of norm 1 at right angles, shape (r, d, k + 1, states)."""
+    """Orthonormal vectors, shape (r, d, k + 1, states)."""
     matrix: Floats
     """Hessenberg matrices, shape (r, d, k + 1, k); zeros from where a space is exhausted."""
 
     @classmethod
     def of(cls, over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], steps: int) -> _KrylovSpace:
-        """The first vectors (k = 0): a random one after some power steps."""
+        """Return the first vectors (k = 0): a random one after some power steps."""
         start = np.random.default_rng(0).normal(size=over_period.states).astype(over_period.kind)
         state = np.broadcast_to(start / np.linalg.norm(start), (*shape, start.size))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -150,14 +175,14 @@ class _KrylovSpace:
         return cls(over_period, state[..., np.newaxis, :], np.zeros((*shape, 1, 0), start.dtype))
 
     def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
-        """Some of the cases, c of them, as (c, 1)."""
+        """Select c of the cases, as (c, 1)."""
         row, column = which
         return _KrylovSpace(
             self.over_period[row, column], self.basis[which][:, np.newaxis], self.matrix[which][:, np.newaxis]
         )
 
     def grown(self, vectors: int) -> _KrylovSpace:
-        """The spaces of so many vectors, of as many as there are numbers in a state at most."""
+        """Return the spaces with so many vectors, at most the number of states."""
         more = min(vectors, self.basis.shape[-1]) - self.matrix.shape[-1]
         beside = ((0, 0),) * (self.matrix.ndim - 2)
         basis = np.pad(self.basis, (*beside, (0, more), (0, 0)))
@@ -168,7 +193,7 @@ class _KrylovSpace:
         return replace(self, basis=basis, matrix=matrix)
 
     def _add(self, basis: Floats, matrix: Floats, k: int) -> None:
-        """Vector k + 1 and column k, in place."""
+        """Add vector k + 1 and column k in place."""
         new, earlier = self.over_period(basis[..., k, :]), basis[..., : k + 1, :]
         for _ in range(2):
             overlap = (earlier @ new[..., np.newaxis])[..., 0]
@@ -180,7 +205,7 @@ class _KrylovSpace:
 
 
 def _ritz_value(matrices: Floats) -> tuple[Complexes, Floats]:
-    """The Ritz value itself."""
+    """Return the largest Ritz value and its residual."""
     matrices, finite = _zero_non_finite(matrices)
     values, vectors = np.linalg.eig(matrices[..., :-1, :])
     values = values.astype(np.complex128)
@@ -193,10 +218,11 @@ def _ritz_value(matrices: Floats) -> tuple[Complexes, Floats]:
 
 
 def _ritz_radius(matrices: Floats, squarings: int) -> tuple[Complexes, Floats]:
-    """Its magnitude, from the size of the matrix's power 2^squarings.
+    """Return the magnitude of the largest Ritz value, from the size of the matrix's power 2^squarings.
 
-    The last row of the power 2^LOOK over all of it is the last component of the vectors that are largest by then:
-    theirs is the residual.
+    The last row of the power 2^SQUARINGS_BEFORE_CHECK over all of it is the last component of the dominant vectors,
+    which
+    gives the residual.
     Source: Gelfand's formula, Horn & Johnson, Matrix Analysis, 2nd ed., corollary 5.6.14.
     """
     matrices, finite = _zero_non_finite(matrices)
@@ -217,7 +243,7 @@ def _ritz_radius(matrices: Floats, squarings: int) -> tuple[Complexes, Floats]:
 
 
 def _zero_non_finite(matrices: Floats) -> tuple[Floats, Flags]:
-    """The matrices with 0 for those that are not finite, and which are."""
+    """Replace matrices that are not finite by 0, and return which are finite."""
     finite = np.all(np.isfinite(matrices), axis=(-1, -2))
     return np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0), finite
 
@@ -227,21 +253,41 @@ def _tiny_value(matrices: Floats) -> float:
 
 
 MULTIPLIER_RANGE = (1e-300, 1e300)
-"""Magnitudes of multipliers that are told apart."""
+"""Smallest and largest resolved magnitude of multipliers."""
 SINGLE_PRECISION_ACCURACY = 1e-5
-"""Accuracy from which on numbers of single precision will do."""
+"""Accuracy from which single precision is sufficient."""
 RESIDUAL_PER_ACCURACY = 0.1
-"""Residual of a multiplier over the accuracy that is asked for: that of a map that is not normal is off by several."""
+"""Residual of a multiplier over the requested accuracy: the error of a non-normal map is several residuals."""
 
 
 def growth_rate(rows: MillingRows, depth: Floats, numbers: Integers, tolerance: float = 1e-4) -> Floats:
-    """Logarithm of the largest multiplier's magnitude at depths (r, d) in m, shape (r, d); negative where stable.
+    """Return the logarithm of the largest multiplier's magnitude; negative for a stable cut.
 
-    numbers (r,): pieces of the tooth period (`count_pieces`); tolerance: accuracy of the result near zero. With 1e-4
-    it was off by 2.2e-5 at most where it is within 0.2 of zero, with `COARSE_CYCLES_PER_PIECE` pieces by 6.9e-5: 12 906 depths of 1500
-    random programs, up to twelve modes, helical ones and radial depths of 0.03 diameters among them.
-    Source: as `spectral_radius`, whose logarithm it is.
+    With tolerance 1e-4 the error was 2.2e-5 at most within 0.2 of zero, with `COARSE_CYCLES_PER_PIECE` 6.9e-5: 12 906
+    depths of 1500 random programs with up to twelve modes, including helical teeth and immersions down to 0.03.
 
+    Parameters
+    ----------
+    rows : MillingRows
+        Batch of r systems.
+    depth : ndarray, shape (r, d)
+        Axial depths (m).
+    numbers : ndarray of int, shape (r,)
+        Pieces of the tooth period (`count_pieces`).
+    tolerance : float
+        Accuracy of the result near zero (-).
+
+    Returns
+    -------
+    ndarray, shape (r, d)
+        Growth over one tooth period (-).
+
+    References
+    ----------
+    As `spectral_radius`, whose logarithm it is.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> rows = rows_at_speeds(build_milling_system([mode], [mode]), slot, np.array([12000.0]))

@@ -1,22 +1,22 @@
 """Map of milling over one tooth period, or over the pattern of unequal pitches.
 
-As `lobes.floquet.build_period_map`, but each tooth meets what the one before it left, a delay of its own ago:
+The state is z, for each mode its coordinate q and its velocity over its frequency, and the displacements w of the tool
+tip one period ago at the Gauss nodes of each piece in which teeth cut. Within a piece q is a polynomial through its
+nodes: w is known there, since the pieces of every period are the same, so nothing is interpolated. Without teeth in
+the cut the modes vibrate freely, exactly. For r rows and d depths:
+
+    z (r, d, 2n), w (r, d, nodes p), p directions      theta = w_n times the length of a piece
+    D = (1 + 2 zeta theta A + theta^2 A^2)^-1          A integrates from the begin of the piece to its nodes
+    velocity = D (p_0 - theta c q_0 + theta/K A force),  q = q_0 + theta A velocity
+    displacement = vector q, of a complex mode vector times its shares of q and velocity
+    (`MillingRows.tip_participation`);  force = vector . F
+
+With unequal pitches each tooth meets the surface that the previous tooth left a delay of its own ago:
 
     F(t) = -b sum_j H_j(t) (d(t) - d(t - tau_j))
 
 The state is z and the displacements at the nodes of each piece of the last pattern in which teeth cut. No delay is
 longer than the pattern, none shorter than a piece; within a piece the displacement is the polynomial through its nodes.
-
-The state is z, for each mode its coordinate q and its velocity over its frequency, and the displacements w of the tool
-tip one period ago at the Gauss nodes of each piece in which teeth cut. Within a piece q is a polynomial through its
-nodes: w is known there, since the pieces of every period are the same, so nothing is interpolated. Without teeth in
-the cut the modes ring freely, exactly. For r rows and d depths:
-
-    z (r, d, 2n), w (r, d, nodes p), p directions      theta = w_n times the length of a piece
-    D = (1 + 2 zeta theta A + theta^2 A^2)^-1          A integrates from the begin of the piece to its nodes
-    velocity = D (p_0 - theta c q_0 + theta/K A force),  q = q_0 + theta A velocity
-    displacement = vector q, of a complex mode vector times its shares of q and velocity (`MillingRows.seen`);
-    force = vector . F
 
 Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, ch. 3, with polynomials of degree
 7 instead of 1 for the delayed term; Hairer & Wanner, Solving Ordinary Differential Equations II, ch. IV.5.
@@ -39,19 +39,19 @@ from lobes.tooth_force import feed_rotation, force_shares
 
 @dataclass(frozen=True, eq=False)
 class RegeneratedSurface:
-    """What teeth of one delay meet in a piece."""
+    """Surface that teeth of one delay meet in a piece."""
 
     first: int
-    """First piece of the pattern in which it was cut ..."""
+    """First piece of the pattern in which it was cut."""
     last: int
-    """... and the one after the last."""
+    """Piece after the last one in which it was cut."""
     weights: Floats
-    """Displacements at the piece's nodes from those at the nodes of these pieces, shape (r or 1, 1, nodes, s)."""
+    """Weights from the displacements at their nodes to the nodes of this piece, shape (r or 1, 1, nodes, s)."""
     force: Floats
     """Depth times force matrix of these teeth at the nodes (N/m), shape (r, d, p, p, s)."""
 
     def load(self, past: Floats) -> Floats:
-        """Forces at the nodes (r, d, p, s) from the displacements of the pattern (r, d, p, pieces, s)."""
+        """Return forces at the nodes (r, d, p, s) from the displacements of the pattern (r, d, p, pieces, s)."""
         met = past[..., self.first : self.last, :]
         *cases, pieces, nodes = met.shape
         if len(self.weights) > 1:
@@ -61,21 +61,21 @@ class RegeneratedSurface:
         return np.asarray((self.force * left[:, :, np.newaxis]).sum(axis=3))
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> RegeneratedSurface:
-        """For some of the cases, c of them, as rows of one depth each."""
+        """Select c of the cases as rows of one depth each."""
         weights = self.weights[which[0]] if len(self.weights) > 1 else self.weights
         return RegeneratedSurface(self.first, self.last, weights, self.force[which][:, np.newaxis])
 
 
 @dataclass(frozen=True, eq=False)
 class UnevenPiece:
-    """One piece of the pattern; without teeth in the cut it meets no surface."""
+    """Piece of the pattern; it meets no surface if no tooth cuts."""
 
     matrix: Floats
-    """From z and the forces of what was left to z and the displacements, shape (r, d, m, m); without of z alone."""
+    """Map from z and surface forces to z and displacements, shape (r, d, m, m); of z alone without a cut."""
     surfaces: tuple[RegeneratedSurface, ...] = ()
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenPiece:
-        """For some of the cases, c of them, as rows of one depth each."""
+        """Select c of the cases as rows of one depth each."""
         row, column = which
         matrix = self.matrix[row, column if self.matrix.shape[1] > 1 else 0][:, np.newaxis]
         return UnevenPiece(matrix, tuple(surface[which] for surface in self.surfaces))
@@ -83,7 +83,7 @@ class UnevenPiece:
 
 @dataclass(frozen=True, eq=False)
 class UnevenMap:
-    """Applied, never multiplied out."""
+    """Map over the pattern of unequal pitches, applied piece by piece."""
 
     pieces: tuple[UnevenPiece, ...]
     modes: int
@@ -93,7 +93,7 @@ class UnevenMap:
 
     @property
     def kind(self) -> np.dtype[Any]:
-        """Precision of its numbers."""
+        """Precision of the numbers."""
         return self.pieces[0].matrix.dtype
 
     @property
@@ -103,15 +103,15 @@ class UnevenMap:
 
     @property
     def states(self) -> int:
-        """Numbers in a state."""
+        """Number of values of a state."""
         return 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenMap:
-        """Some of the cases, c of them, as rows of one depth each."""
+        """Select c of the cases as rows of one depth each."""
         return UnevenMap(tuple(piece[which] for piece in self.pieces), self.modes, self.directions)
 
     def __call__(self, state: Floats) -> Floats:
-        """The states (r, d, states) one pattern on."""
+        """Return the states (r, d, states) one pattern later."""
         cases, z = state.shape[:-1], state[..., : 2 * self.modes]
         past = state[..., 2 * self.modes :].reshape(*cases, self.directions, self.cutting, -1).copy()
         at = 0
@@ -131,9 +131,10 @@ class UnevenMap:
 def regenerated_surfaces(
     delays: tuple[float, ...], turn: float, starts: Floats, lengths: Floats, forces: Floats
 ) -> Iterator[tuple[RegeneratedSurface, ...]]:
-    """What the teeth of each delay (rad) meet in each piece in which any cut.
+    """Yield the surfaces that the teeth of each delay (rad) meet in each piece with a cut.
 
-    The pieces start at angles (r or 1, k) and are as long (rad) in a pattern of `turn` (rad); forces: depth times force
+    The pieces start at angles (r or 1, k) and have lengths (rad) in a pattern of `turn` (rad); forces: depth times
+    force
     matrix of the teeth of each delay at the nodes (N/m), shape (delays, p, p, s, k, r, d).
     """
     node = starts[..., np.newaxis] + lengths[..., np.newaxis] * gauss_nodes().node
@@ -145,7 +146,7 @@ def regenerated_surfaces(
 
 
 def _locate_angles(angle: Floats, starts: Floats, lengths: Floats) -> list[tuple[int, int, Floats]]:
-    """For each piece that pieces its nodes' angles (r or 1, k, s) lie in, first and one after the last, and weights."""
+    """Return first piece, one after the last, and weights, for each piece of node angles (r or 1, k, s)."""
     rows = np.arange(len(starts))[:, np.newaxis, np.newaxis]
     piece = np.maximum(np.sum(starts[:, np.newaxis, np.newaxis] <= angle[..., np.newaxis], axis=-1) - 1, 0)
     within = np.clip((angle - starts[rows, piece]) / lengths[rows, piece], 0.0, 1.0)
@@ -158,40 +159,40 @@ def _locate_angles(angle: Floats, starts: Floats, lengths: Floats) -> list[tuple
 
 
 def _spread_weights(own: Floats, piece: Indices, number: int) -> Floats:
-    """Weights (r, m, s) of the nodes of one piece for each of s angles, among those of `number` pieces (r, 1, ., s)."""
+    """Place the node weights (r, m, s) of single pieces among those of `number` pieces, shape (r, 1, ., s)."""
     is_own = np.arange(number)[:, np.newaxis, np.newaxis] == piece[:, np.newaxis, np.newaxis]
     return np.where(is_own, own[:, np.newaxis], 0.0).reshape(len(own), 1, -1, piece.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodMap:
-    """Applied, never multiplied out: each piece maps z and its own w to the new ones."""
+    """Map over one tooth period, applied piece by piece: each piece maps z and its own w to the new ones."""
 
     pieces: tuple[tuple[bool, Floats], ...]
     """Whether teeth cut, and the matrix, shape (r, d, m, m): m = 2n + nodes p in the cut, 2n else."""
     modes: int
     """Number of modes n."""
     nodes: int
-    """Displacements in each piece in which teeth cut, stages times p."""
+    """Displacements in each piece with a cut, nodes times p."""
 
     @property
     def kind(self) -> np.dtype[Any]:
-        """Precision of its numbers."""
+        """Precision of the numbers."""
         return self.pieces[0][1].dtype
 
     @property
     def states(self) -> int:
-        """Numbers in a state."""
+        """Number of values of a state."""
         return 2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces)
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> PeriodMap:
-        """Some of the cases, c of them, as rows of one depth each."""
+        """Select c of the cases as rows of one depth each."""
         row, column = which
         pieces = ((cuts, matrix[row, column if cuts else 0][:, np.newaxis]) for cuts, matrix in self.pieces)
         return PeriodMap(tuple(pieces), self.modes, self.nodes)
 
     def __call__(self, state: Floats) -> Floats:
-        """The states (r, d, states) one tooth period on."""
+        """Return the states (r, d, states) one tooth period later."""
         z, parts, at = state[..., : 2 * self.modes], list[Floats](), 2 * self.modes
         for cuts, matrix in self.pieces:
             if cuts:
@@ -207,9 +208,9 @@ class PeriodMap:
 def build_period_map(
     rows: MillingRows, depth: Floats, numbers: Integers, kind: type[np.floating[Any]] = np.float64
 ) -> PeriodMap | UnevenMap:
-    """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
+    """Build the map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, equal in all rows.
 
-    For helical teeth, whose segments depend on the depth, d is 1. kind: precision; that of uneven teeth is double.
+    For helical teeth, whose segments depend on the depth, d is 1. kind: precision; uneven teeth use double.
     """
     ends = segment_ends(rows.cut, depth[:, 0])
     free = is_out_of_cut(rows.cut, ends, depth[:, 0])
@@ -225,13 +226,13 @@ class _Segment:
     """Pieces of one length, all with the same teeth in the cut."""
 
     starts: Floats
-    """Angles at which they start (rad), shape (r, k)."""
+    """Start angles (rad), shape (r, k)."""
     angle: Floats
     """Angle of each (rad), shape (r,)."""
     time: Floats
     """Time of each (s), shape (r,)."""
     forces: Floats | None
-    """Depth times force matrix at their nodes (N/m), shape (delays, p, p, s, k, r, d); None where no tooth cuts."""
+    """Depth times force matrix at the nodes (N/m), shape (delays, p, p, s, k, r, d); None without a cut."""
 
     @classmethod
     def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> _Segment:
@@ -241,7 +242,7 @@ class _Segment:
         return cls(starts, angle, time, None if is_free else _force_matrices(rows, starts, angle, depth))
 
     def free_response(self, rows: MillingRows) -> Floats:
-        """Map of z over all pieces without a cut, shape (r, 1, 2n, 2n)."""
+        """Return the map of z over all pieces without a cut, shape (r, 1, 2n, 2n)."""
         return free_response(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
 
 
@@ -276,9 +277,9 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
 
 
 def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
-    """Depth times force matrix of the teeth of each delay at the nodes of pieces that start at angles (r, k) (N/m).
+    """Return depth times force matrix of the teeth of each delay at the nodes of pieces (N/m).
 
-    Shape (delays, p, p, s, k, r, d).
+    The pieces start at angles (r, k). Shape (delays, p, p, s, k, r, d).
     """
     is_alike = rows.cut.helix_lag == 0 or bool(np.all(depth[:, 0] == depth[0, 0]))
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row

@@ -15,14 +15,14 @@ from lobes.arrays import Complexes, Floats
 from lobes.floquet.milling_rows import MillingRows
 
 NODES_PER_PIECE = 8
-"""Nodes of one piece: a polynomial of degree 7 through the displacement, of order 16 at the end of the piece."""
+"""Nodes of one piece: a polynomial of degree 7 for the displacement, of order 16 at the end of the piece."""
 
 
 class GaussNodes(NamedTuple):
-    """For s nodes in a piece of length 1."""
+    """Gauss-Legendre nodes and integrals for s nodes in a piece of length 1."""
 
     node: Floats
-    """Places of the nodes, shape (s,)."""
+    """Positions of the nodes, shape (s,)."""
     weight: Floats
     """Integral over the whole piece, shape (s,)."""
     integral: Floats
@@ -30,11 +30,11 @@ class GaussNodes(NamedTuple):
     root: Complexes
     """Eigenvalues of the integrals, those above the real axis of each pair, shape (s/2,)."""
     share: Complexes
-    """What each adds: f(integral) is twice the real part of the sum of f(root) times these, shape (s/2, s, s)."""
+    """Weights of the roots: f(integral) is twice the real part of the sum of f(root) times these, shape (s/2, s, s)."""
 
 
 def interpolation_weights(place: Floats) -> Floats:
-    """Weights of the values at the nodes in the polynomial through them at places (...) in 0 to 1, shape (..., s)."""
+    """Return the weights of the node values in the polynomial at places (...) in 0 to 1, shape (..., s)."""
     node = gauss_nodes().node
     apart = place[..., np.newaxis, np.newaxis] - node
     own = np.eye(node.size, dtype=bool)
@@ -45,7 +45,7 @@ def interpolation_weights(place: Floats) -> Floats:
 
 @cache
 def gauss_nodes(count: int = NODES_PER_PIECE) -> GaussNodes:
-    """Nodes and integrals of the polynomial through them, of an even number of nodes.
+    """Return nodes and integrals of the polynomial through them, for an even number of nodes.
 
     Source: Hairer & Wanner, Solving Ordinary Differential Equations II, Springer 1996, ch. IV.5.
     """
@@ -60,11 +60,10 @@ def gauss_nodes(count: int = NODES_PER_PIECE) -> GaussNodes:
 
 
 def invert_matrices(matrices: NDArray[np.floating[Any]]) -> Floats:
-    """Inverses of matrices (m, m, ...) whose leading parts are far from singular: no rows are exchanged.
+    """Invert matrices (m, m, ...) whose leading parts are far from singular, without exchange of rows.
 
-    So are those of a piece of time in which a tip answers to its own displacement: 1 and what is integrated since the
-    piece began. By Gauss-Jordan elimination of all of them together. One that is singular gives numbers that are not
-    finite.
+    The loop matrix of a piece is such a matrix: 1 plus what is integrated since the piece began. By Gauss-Jordan
+    elimination of all of them together. A singular one gives numbers that are not finite.
     Source: Golub & Van Loan, Matrix Computations, 4th ed., ch. 3.2 and 3.4.
     """
     left = np.array(matrices)
@@ -81,7 +80,7 @@ def invert_matrices(matrices: NDArray[np.floating[Any]]) -> Floats:
 
 
 def free_response(rows: MillingRows, time: Floats) -> Floats:
-    """Map of (q, velocity / w) of all modes over a time (r,) in s without force, shape (r, 2n, 2n)."""
+    """Return the map of (q, velocity / w) of all modes over a time (r,) in s without force, shape (r, 2n, 2n)."""
     theta, zeta = rows.frequency * time[:, np.newaxis], rows.damping_ratio
     root = np.sqrt(np.where(zeta == 1, 1 - 1e-12, zeta) ** 2 - 1 + 0j)
     fast, slow = np.exp((-zeta - root) * theta), np.exp((-zeta + root) * theta)
@@ -91,7 +90,7 @@ def free_response(rows: MillingRows, time: Floats) -> Floats:
 
 
 def _block_matrix(qq: Floats, qv: Floats, vq: Floats, vv: Floats) -> Floats:
-    """A matrix (r, 2n, 2n) of four diagonals (r, n)."""
+    """Return a matrix (r, 2n, 2n) of four diagonals (r, n)."""
     n = qq.shape[1]
     matrix, i = np.zeros((len(qq), 2 * n, 2 * n)), np.arange(n)
     matrix[:, i, i], matrix[:, i, n + i], matrix[:, n + i, i], matrix[:, n + i, n + i] = qq, qv, vq, vv
@@ -100,7 +99,7 @@ def _block_matrix(qq: Floats, qv: Floats, vq: Floats, vv: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class PieceResponse:
-    """What a piece of some length does to modes, before the cut closes the loop."""
+    """Response of the modes over a piece, before the cut closes the loop."""
 
     end_state: Floats
     """z at the end from z at the begin, shape (r, 2n, 2n)."""
@@ -113,18 +112,19 @@ class PieceResponse:
 
     @classmethod
     def of(cls, rows: MillingRows, time: Floats) -> PieceResponse:
-        """For pieces of a length (r,) in s.
+        """Compute the response over pieces of a length (r,) in s.
 
-        With x = D at the roots of A (`build_period_map`, `GaussNodes.root`) and t = theta root, all of it is sums of x, t x and
-        t^2 x: velocity = D 1 - theta D c, displacement = 1 + theta A velocity, from forces theta/K D A and
+        With x = D at the roots of A (`lobes.floquet.period_map`, `GaussNodes.root`) and t = theta root, all of it is
+        sums of x, t x and t^2 x: velocity = D 1 - theta D c, displacement = 1 + theta A velocity, from forces theta/K D
+        A and
         (theta/K) theta A D A.
         """
-        stages = gauss_nodes()
+        nodes = gauss_nodes()
         theta, twice = rows.frequency * time[:, np.newaxis], 2 * rows.damping_ratio
-        t = theta[..., np.newaxis] * stages.root
+        t = theta[..., np.newaxis] * nodes.root
         x = 1 / (1 + twice[..., np.newaxis] * t + t**2)
         tx, both = t * x, t * x + twice[..., np.newaxis] * x
-        begin, ones, weights = stages.share @ stages.node, stages.share.sum(axis=-1), stages.weight @ stages.share
+        begin, ones, weights = nodes.share @ nodes.node, nodes.share.sum(axis=-1), nodes.weight @ nodes.share
         per_theta, give = theta[..., np.newaxis], theta / rows.stiffness
         place = np.stack((1 - per_theta * _weighted_sums(tx, begin), _weighted_sums(tx, ones)), axis=-1)
         forced = t * tx
@@ -134,7 +134,7 @@ class PieceResponse:
             place = of_place[..., np.newaxis] * place + of_velocity[..., np.newaxis] * velocity
             forced = of_place * forced + of_velocity * tx
         pushes = (give[..., np.newaxis] * _weighted_sums(of, weights) for of in (tx, x))
-        at_begin, at_ones = begin @ stages.weight, ones @ stages.weight
+        at_begin, at_ones = begin @ nodes.weight, ones @ nodes.weight
         return cls(
             end_state=_block_matrix(
                 1 - theta**2 * _weighted_sums(x, at_begin),
@@ -145,7 +145,7 @@ class PieceResponse:
             node_displacement=_tip_displacements(rows, place),
             node_flexibility=_weighted_sums(
                 np.einsum("rnk,rnp,rnq->rpqk", forced / rows.stiffness[..., np.newaxis], rows.vector, rows.vector),
-                stages.share,
+                nodes.share,
             ),
             end_state_per_force=np.concatenate(
                 [np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1
@@ -153,18 +153,14 @@ class PieceResponse:
         )
 
     def as_precision(self, kind: type[np.floating[Any]]) -> PieceResponse:
-        """The same in numbers of some precision."""
-        return PieceResponse(
-            *(
-                values.astype(kind)
-                for values in (self.end_state, self.node_displacement, self.node_flexibility, self.end_state_per_force)
-            )
-        )
+        """Return the response with numbers of another precision."""
+        parts = (self.end_state, self.node_displacement, self.node_flexibility, self.end_state_per_force)
+        return PieceResponse(*(values.astype(kind) for values in parts))
 
     def cutting(self, force: Floats) -> Floats:
-        """The maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes, force (p, p, s, k, r, d).
+        """Return the maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes.
 
-        From z and w at the begin to z at the end and d.
+        force (p, p, s, k, r, d). From z and w at the begin to z at the end and d.
         """
         inverse, push = self._closed(force)
         maps, i = self._maps(inverse, push, -inverse), np.arange(push.shape[-2], sum(push.shape[-2:]))
@@ -172,9 +168,9 @@ class PieceResponse:
         return maps
 
     def loaded(self, force: Floats) -> Floats:
-        """The maps (k, r, d, m, m) of k pieces with forces f - force d at their nodes, force (p, p, s, k, r, d).
+        """Return the maps (k, r, d, m, m) of k pieces with forces f - force d at their nodes.
 
-        From z at the begin and f to z at the end and d.
+        force (p, p, s, k, r, d). From z at the begin and f to z at the end and d.
         """
         inverse, push = self._closed(force)
         states, size = push.shape[-2:]
@@ -183,7 +179,7 @@ class PieceResponse:
         return maps
 
     def _maps(self, inverse: Floats, push: Floats, answer: Floats) -> Floats:
-        """Maps from z and what is given at the nodes, which is answered by d; that of z pushes back at its end."""
+        """Return maps from z and the given node values, whose response is d, to z at the end and d."""
         states, size = push.shape[-2:]
         maps = np.empty((*inverse.shape[:3], states + size, states + size), inverse.dtype)
         np.matmul(inverse, self.node_displacement.reshape(-1, 1, size, states), out=maps[..., states:, :states])
@@ -194,7 +190,7 @@ class PieceResponse:
         return maps
 
     def _closed(self, force: Floats) -> tuple[Floats, Floats]:
-        """Displacements of the closed loop from the open one's (k, r, d, ps, ps), z from them (k, r, d, 2n, ps)."""
+        """Return closed-loop over open-loop displacements (k, r, d, ps, ps), and z from them (k, r, d, 2n, ps)."""
         p, _, s, *cases = force.shape
         size, states, depths = p * s, self.end_state.shape[-1], cases[-1]
         forces = force.reshape(p, p, s, cases[0], -1)
@@ -213,19 +209,19 @@ class PieceResponse:
         )
 
     def _given(self) -> Floats:
-        """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
+        """Return the displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
         r, p, _, s, _ = self.node_flexibility.shape
         return np.moveaxis(self.node_flexibility, 2, 3).reshape(r, p * s, p * s)
 
 
 def _cases_first(matrices: Floats, cases: Sequence[int]) -> Floats:
-    """Matrices (m, n, ...) of some cases as (cases, m, n)."""
+    """Reorder matrices (m, n, ...) of some cases to (cases, m, n)."""
     flat = matrices.reshape(*matrices.shape[:2], -1)
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0)).reshape(*cases, *matrices.shape[:2])
 
 
 def _weighted_sums(values: Complexes, shares: Complexes) -> Floats:
-    """Twice the real parts of the sums of values (..., k) at the roots times shares (k, ...)."""
+    """Return twice the real parts of the sums of values (..., k) at the roots times shares (k, ...)."""
     parts = np.concatenate((values.real, values.imag), axis=-1)
     weights = 2 * np.concatenate((shares.real, -shares.imag))
     flat = parts.reshape(-1, parts.shape[-1]) @ weights.reshape(len(weights), -1)
@@ -233,6 +229,6 @@ def _weighted_sums(values: Complexes, shares: Complexes) -> Floats:
 
 
 def _tip_displacements(rows: MillingRows, place: Floats) -> Floats:
-    """Displacements from z: places (r, n, s, 2) of the modes, each along its vector, shape (r, p, s, 2n)."""
+    """Return displacements from z: places (r, n, s, 2) of the modes along their vectors, shape (r, p, s, 2n)."""
     shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
     return np.asarray(shown.reshape(*shown.shape[:3], -1))

@@ -1,4 +1,4 @@
-"""Whether a program is stable, and the deepest stable depth at its speed."""
+"""Stability of a program, and the largest stable depth at its speed."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
-"""Limits are looked for up to this many times the depth of the program."""
+"""Largest searched limit over the depth of the program."""
 
 
 @dataclass(frozen=True)
 class ProgramLimit:
-    """How one program stands on one spindle, in the engagement and direction of feed that are worst."""
+    """Stability of one program on one spindle, for its worst engagement and feed direction."""
 
     stable: bool
-    """Whether its depth lies below the limit at its speed, and the multipliers at its depth below 1."""
+    """Whether the depth is below the limit at its speed, and the multipliers at its depth below 1."""
     limit: float
-    """Deepest stable depth at its speed (m); inf where there is none up to 20 times its own depth."""
+    """Largest stable depth at its speed (m); inf if there is no limit up to 20 times its depth."""
     chatter_frequency: float
-    """Frequency that is heard at the limit (Hz); nan where there is none."""
+    """Dominant chatter frequency at the limit (Hz); nan if there is none."""
     kind: str
     """Kind of instability: "hopf", "flip" or ""."""
     method: MethodName
-    """Method it was found by."""
+    """Method of the limit."""
     detail: str
-    """Detail of the method: into how many pieces the tooth period was divided."""
+    """Detail of the method: number of pieces of the tooth period."""
     pieces: int
-    """The same as a number."""
+    """Number of pieces."""
     cut: Cut
-    """The cut that is worst of all that the program makes."""
+    """Worst of all cuts of the program."""
     limits: tuple[float, ...]
-    """The limits of each of them (m)."""
+    """Limits of all cuts (m)."""
 
     @property
     def feed_angle(self) -> float:
-        """Angle from x to the feed that is worst (rad)."""
+        """Angle from x to the worst feed direction (rad)."""
         return self.cut.feed_angle
 
 
@@ -57,11 +57,31 @@ def program_limit(
     cuts: Sequence[Cut] | None = None,
     vectors: ArrayLike | None = None,
 ) -> ProgramLimit:
-    """State and limit of a program by semi-discretisation, in the worst of the cuts that it makes on its way.
+    """Compute stability and limit of a program by semi-discretization, for the worst of its cuts.
 
-    cuts: differ in feed angle and immersion alone; None: its cut. vectors: directions (n, 2) of the modes of x, then of
-    y, where they lie askew (`build_milling_system`). Raises ValueError for bad modes or vectors.
+    Parameters
+    ----------
+    program : Program
+        Cut, speed and depth.
+    x, y : sequence of Mode, or None
+        Modes of each direction of the machine; None for a rigid direction.
+    cuts : sequence of Cut, optional
+        Cuts of the program, different in feed angle and immersion only. Default: its cut.
+    vectors : array_like, shape (n, 2), optional
+        Directions of the modes of x, then of y, with rotated principal directions (`build_milling_system`).
 
+    Returns
+    -------
+    ProgramLimit
+        Stability and limit.
+
+    Raises
+    ------
+    ValueError
+        For invalid modes or vectors.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> limit = program_limit(Program(slot, speed_rpm=9000.0, depth=1e-3), [mode], [mode])
@@ -98,7 +118,7 @@ def program_limit(
 
 
 def group_by_engagement(cuts: Sequence[Cut]) -> list[list[int]]:
-    """Places of the cuts that differ in their feed angle alone."""
+    """Group the indices of cuts that differ in their feed angle only."""
     places: dict[Cut, list[int]] = {}
     for place, cut in enumerate(cuts):
         places.setdefault(replace(cut, feed_angle=0.0), []).append(place)
@@ -106,12 +126,12 @@ def group_by_engagement(cuts: Sequence[Cut]) -> list[list[int]]:
 
 
 def _program_rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) -> MillingRows:
-    """A system at the speed of the program, with cuts that differ in their feed angle alone."""
+    """Return a system at the speed of the program, with cuts that differ in their feed angle only."""
     rows = rows_at_speeds(system, cuts[0], np.full(len(cuts), program.speed_rpm))
     return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
 
 
 def _is_unstable(rows: MillingRows, program: Program, number: Integers) -> Flags:
-    """Whether the program is unstable at its depth or a share of it, shape (r,)."""
+    """Return whether the program is unstable at its depth or a share of it, shape (r,)."""
     depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
     return np.asarray(np.any(growth_rate(rows, depths, number) >= 0, axis=1))

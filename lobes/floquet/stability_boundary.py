@@ -18,21 +18,21 @@ from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
 from modal import Mode
 
 MAX_CHATTER_FREQUENCY_RATIO = 2.0
-"""Frequencies are looked for up to this many times the highest natural frequency, and three tooth frequencies."""
+"""Highest searched frequency over the highest natural frequency, to which three tooth frequencies are added."""
 BALANCE_HARMONICS = 4
-"""Tooth frequencies on each side that count in the balance of harmonics."""
+"""Tooth frequencies on each side in the balance of harmonics."""
 FORCE_HARMONIC_SAMPLES = 128
-"""Intervals of a tooth period from which the harmonics of the cutting force are taken."""
+"""Intervals of a tooth period for the harmonics of the cutting force."""
 
 
 def loudest_chatter_frequency(
     system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
 ) -> Floats:
-    """The loudest frequency (Hz) at limits with these multipliers (|mu| = 1) and depths (m), each of shape (n,).
+    """Return the dominant frequency (Hz) at limits with multipliers |mu| = 1 and depths (m), each of shape (n,).
 
     base (n,): frequency at which the cut repeats (Hz), the tooth frequency of even teeth. A multiplier leaves
-    |+-arg(mu) / (2 pi) + j| times base, j whole. First that one is taken which comes nearest to closing the loop of the
-    mean force, then the loudest in the balance of harmonics around it, over the delays tau,
+    |+-arg(mu) / (2 pi) + j| times base, j whole. The first choice nearly closes the loop of the
+    mean force. The result is the largest in the balance of harmonics around it, over the delays tau,
     d_k = -b G_k sum_l sum_tau H_(tau, k-l) (1 - exp(-i w_l tau)) d_l.
     """
     waves = _nearest_to_mean_force_loop(system, cut, multiplier, depth, base)[:, np.newaxis]
@@ -54,7 +54,7 @@ def loudest_chatter_frequency(
 def _nearest_to_mean_force_loop(
     system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
 ) -> Floats:
-    """Multiple of base with the least |det(I + b s H0 G(w))|, s the mean of 1 - exp(-i w tau), shape (n,)."""
+    """Return the multiple of base with the least |det(I + b s H0 G(w))|, s the mean of 1 - exp(-i w tau), (n,)."""
     part = np.abs(np.angle(multiplier))[:, np.newaxis] / (2 * np.pi)
     highest = MAX_CHATTER_FREQUENCY_RATIO * float(np.max(system.frequency)) / (2 * np.pi)
     whole = np.arange(int(highest / np.min(base)) + 3 * len(cut.pitch_pattern))
@@ -68,12 +68,12 @@ def _nearest_to_mean_force_loop(
 
 
 def _relative_delays(cut: Cut) -> Floats:
-    """Delays over the time after which the cut repeats, shape (delays,)."""
+    """Return the delays over the time after which the cut repeats, shape (delays,)."""
     return np.array(cut.delays) / sum(cut.pitch_pattern)
 
 
 def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
-    """Harmonics H_(k-l) of the force matrix of the teeth of each delay, shape (delays, number, number, p, p)."""
+    """Return harmonics H_(k-l) of the force matrix of the teeth of each delay, (delays, number, number, p, p)."""
     samples = FORCE_HARMONIC_SAMPLES * len(cut.pitch_pattern)
     forces = interval_forces(cut, samples)[..., system.axes[:, np.newaxis], system.axes]
     harmonics = np.fft.fft(forces, axis=1) / samples
@@ -82,7 +82,7 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
 
 
 def check_depths(depth: ArrayLike) -> Floats:
-    """Axial depths (m) as a 1-D array; ValueError unless there is one at least and all are finite and >= 0."""
+    """Return axial depths (m) as a 1-D array; ValueError unless there is one and all are finite and >= 0."""
     depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
     if depths.ndim != 1 or depths.size == 0:
         raise ValueError(f"depth has shape {depths.shape}; a 1-D array of at least one depth (m) is needed")
@@ -100,17 +100,41 @@ def spectral_radius(
     depth: ArrayLike,
     vectors: ArrayLike | None = None,
 ) -> Floats:
-    """Largest magnitude of the Floquet multipliers over a tooth period at each speed (rpm) and depth (m); < 1: stable.
+    """Return the largest magnitude of the Floquet multipliers over a tooth period; < 1 is stable.
 
-    x and y are directions of the machine (`Cut.feed_angle` says how the feed lies in them); None stands for one that
-    is rigid. Any immersion, any number of modes, straight or helical teeth. The tooth period is divided finely enough
-    for all modes that count at the deepest depth. vectors: directions (n, 2) of the modes of x, then of y, where they
-    lie askew (`build_milling_system`). Returns shape (n_speed, n_depth).
+    Any immersion, any number of modes, straight or helical teeth. The tooth period is divided finely enough
+    for all significant modes at the largest depth.
 
-    Raises ValueError for bad speeds, depths, modes or vectors.
-    Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
-    (`lobes.floquet.build_period_map`).
+    Parameters
+    ----------
+    x, y : sequence of Mode, or None
+        Modes of each direction of the machine (`Cut.feed_angle` defines the feed); None for a rigid direction.
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : array_like, shape (n_speed,)
+        Spindle speeds (rpm).
+    depth : array_like, shape (n_depth,)
+        Axial depths (m).
+    vectors : array_like, shape (n, 2), optional
+        Directions of the modes of x, then of y, with rotated principal directions (`build_milling_system`).
 
+    Returns
+    -------
+    ndarray, shape (n_speed, n_depth)
+        Spectral radius (-).
+
+    Raises
+    ------
+    ValueError
+        For invalid speeds, depths, modes or vectors.
+
+    References
+    ----------
+    Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
+    (`lobes.floquet.period_map`).
+
+    Examples
+    --------
     Below 1 is stable. Without a cut a free mode decays by exp(-zeta w T) in a tooth period T:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
@@ -134,20 +158,46 @@ def stability_boundary(
     max_depth: float,
     vectors: ArrayLike | None = None,
 ) -> StabilityLobes:
-    """Depths (m) up to max_depth at each speed (rpm) where milling changes from stable to unstable or back.
+    """Compute the stability boundary over speed by semi-discretization.
 
-    x and y are directions of the machine; None stands for one that is rigid. `depth` is the lowest crossing, inf where
-    there is none; `crossings` are all, islands too. `kind` is "flip" where the multiplier is -1 (period two), else
-    "hopf"; the chatter frequency is the loudest of those that the multiplier leaves. The tooth period is divided into
-    pieces for all modes that count, and again twice as finely until limits and kinds have settled within 0.25 %;
-    `detail` states how many that took. vectors: directions (n, 2) of the modes of x, then of y, where they lie askew
-    (`build_milling_system`).
+    `depth` is the lowest crossing, inf if there is none; `crossings` are all, islands too. `kind` is "flip" for a
+    multiplier of -1 (period two), else "hopf"; the chatter frequency is the dominant one of the multiplier. The tooth
+    period is divided into pieces for all significant modes, and twice as finely until limits and kinds have converged
+    within 0.25 %; `detail` states how many that took.
 
-    Raises ValueError for bad speeds, depths, modes or vectors, ArithmeticError where a limit does not settle.
-    Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
-    (`lobes.floquet.build_period_map`).
+    Parameters
+    ----------
+    x, y : sequence of Mode, or None
+        Modes of each direction of the machine; None for a rigid direction.
+    cut : Cut
+        Cutter, immersion and material.
+    speed_rpm : array_like, shape (n,)
+        Spindle speeds (rpm).
+    max_depth : float
+        Deepest cut of interest (m).
+    vectors : array_like, shape (n, 2), optional
+        Directions of the modes of x, then of y, with rotated principal directions (`build_milling_system`).
 
-    Little immersion has flips between the lobes of a mean force, above 60 f / (N (k + 1/2)), 10000 rpm here:
+    Returns
+    -------
+    StabilityLobes
+        Depths (m) up to max_depth where milling changes from stable to unstable or back.
+
+    Raises
+    ------
+    ValueError
+        For invalid speeds, depths, modes or vectors.
+    ArithmeticError
+        If a limit does not converge.
+
+    References
+    ----------
+    Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
+    (`lobes.floquet.period_map`).
+
+    Examples
+    --------
+    Low immersion has flips between the lobes of a mean force, above 60 f / (N (k + 1/2)), 10000 rpm here:
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=1e6)
     >>> thin = Cut(teeth=2, immersion=0.1, direction="up", tangential=700e6, radial=200e6)
@@ -180,7 +230,7 @@ def stability_boundary(
 def chatter_at_limits(
     system: MillingSystem, rows: MillingRows, depth: Floats, number: Integers
 ) -> tuple[Floats, NDArray[np.str_]]:
-    """Chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
+    """Return chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
     multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]
     chatter = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
     return chatter, np.where(is_flip(multiplier), "flip", "hopf")

@@ -1,10 +1,9 @@
-"""The paper's spinning element compared with the pole-free one."""
+"""The paper's spinning element A B^-1, equations (13) to (25), compared with the pole-free one."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,12 +16,12 @@ from lobewatch.paper.comparison import Comparison, NumberGroup
 def printed_element(
     segment: SpinningSegment, frequency: float, speed_rpm: float, coupling: float = 1.0, one_sign: bool = True
 ) -> Floats:
-    """Stiffness of one element at a frequency (Hz) seen from the shaft, shape (8, 8), laid out as `spinning_element`.
+    """Return the stiffness of one element at a frequency (Hz) seen from the shaft, (8, 8), as `spinning_element`.
 
     The eight solutions exp(r z) of (13), r by (14) to (16), each with its ratio of v to u: their end forces are A,
     their end displacements B. coupling: sign of 2 m Omega w in (5), + as printed, - for u = U cos, v = V sin.
-    one_sign: end forces have one sign at both ends, as (23) is printed; right is the opposite one at z = 0. Not finite
-    where B cannot be inverted: at speed 0, at frequency 0, and where the two are equal.
+    one_sign: end forces have one sign at both ends, as (23) is printed; the opposite one at z = 0 is right. Not finite
+    if B cannot be inverted: at speed 0, at frequency 0, and if the two are equal.
     """
     w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
     length, exx, eyy = segment.length, segment.rigidity_xx, segment.rigidity_yy
@@ -44,7 +43,7 @@ def printed_element(
 
 
 def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) -> Floats:
-    """The two fourth powers of the roots of (13) by (14) to (16) (m^-4), shape (2,)."""
+    """Return the two fourth powers of the roots of (13) by (14) to (16) (m^-4), shape (2,)."""
     w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
     exx, eyy, mass = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length
     same, other = mass * (w**2 + spin**2), 2 * mass * w * spin
@@ -56,76 +55,47 @@ def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) 
 ELEMENT_SPEED_RPM = 24000.0
 """Speed at which the segments of the surrogate are compared (rpm)."""
 UNEQUAL_BEAM = SpinningSegment(length=0.5, rigidity_xx=1.0, rigidity_yy=4.0, mass_per_length=1.0)
-"""Half of a beam of length 1 that is not round, where the signs matter."""
+"""Half of a beam of length 1 that is not round, which shows the signs."""
 UNEQUAL_BEAM_SPEED_RPM = 30 / math.pi
-"""Its speed (rpm), 1 rad/s."""
+"""Speed of that beam (rpm), 1 rad/s."""
 ROOT_SCAN_FREQUENCIES = np.linspace(0.05, 40.0, 1600)
-"""Frequencies where sign changes of its determinant are looked for (rad/s)."""
+"""Frequencies at which sign changes of its determinant are searched (rad/s)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ElementStudy:
-    """What the printed element comes to."""
-
-    root_error: float
-    """Largest share by which the roots of (14) to (16) are off an eigenvalue solver's, over all segments."""
-    error: float
-    """Largest error of A B^-1 over all segments, as a share of its largest entry."""
-    critical_error: float
-    """The same next to the frequency that is the speed: 1e-6 of it away."""
-    is_finite: tuple[bool, bool]
-    """Whether A B^-1 exists at speed 0, and at a frequency that is the speed."""
-    asymmetry: float
-    """Largest difference of K and its transpose with the signs of (23), as a share of the largest entry."""
-    first_root: float
-    """First natural frequency of the cantilever with the right signs (rad/s)."""
-    other_root: float
-    """The same with the sign of (5) as printed."""
-    roots: tuple[int, int]
-    """Number of its natural frequencies within SCAN: with the right signs, and with those of (23) as printed."""
-
-
-def study_element(spindle: Spindle) -> ElementStudy:
-    """The segments of a round shaft, and a cantilever that is not round."""
-    segments = list(_spinning_segments(spindle))
-    frequency = printed.FREQUENCY
-    at_rest, at_speed = (printed_element(segments[0], frequency, speed) for speed in (0.0, 60 * frequency))
-    as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
-    right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
-    return ElementStudy(
-        max(_root_error(segment) for segment in segments),
-        max(_element_error(segment, frequency, ELEMENT_SPEED_RPM) for segment in segments),
-        max(_element_error(segment, frequency, 60 * frequency * (1 + 1e-6)) for segment in segments),
-        (bool(np.all(np.isfinite(at_rest))), bool(np.all(np.isfinite(at_speed)))),
-        float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed))),
-        right[0],
-        other[0],
-        (len(right), len(wrong)),
+def element_section(spindle: Spindle) -> NumberGroup:
+    """Return the numbers of the element: of the segments of a round shaft, and of a cantilever that is not round."""
+    segments, frequency = list(_spinning_segments(spindle)), printed.FREQUENCY
+    root_error = max(_root_error(segment) for segment in segments)
+    error, critical_error = (
+        max(_element_error(segment, frequency, speed) for segment in segments)
+        for speed in (ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6))
     )
-
-
-def element_section(study: ElementStudy) -> NumberGroup:
-    """Numbers of the element."""
-    at_rest, at_speed = ("exists" if finite else "does not exist" for finite in study.is_finite)
-    right, wrong = study.roots
+    at_rest, at_speed = (
+        "exists" if np.all(np.isfinite(printed_element(segments[0], frequency, speed))) else "does not exist"
+        for speed in (0.0, 60 * frequency)
+    )
+    as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
+    asymmetry = float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed)))
+    right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
     solver = "against an eigenvalue solver, 26 segments at 1722 Hz: right as printed"
     rounding = (
         f"signs put right, 26 segments, {ELEMENT_SPEED_RPM:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
     )
     near = f"1e-6 beside the speed of 1722 Hz; where both are equal A B^-1 {at_speed}, ours does"
-    shapes = f"a cantilever that is not round; {study.first_root:.5f} with the right sign: shapes alone are changed"
+    shapes = f"a cantilever that is not round; {right[0]:.5f} with the right sign: shapes alone are changed"
     symmetric = "in its largest entry: end forces have one sign as printed; with the right ones K is symmetric"
-    none = f"assembled as printed, that cantilever has so many frequencies below {ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s; right are {right}"
+    highest = f"{ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s"
+    none = f"assembled as printed, that cantilever has so many frequencies below {highest}; right are {len(right)}"
     return NumberGroup(
         "The spinning element: eqs. (5) and (13) to (25)",
         (),
         (
-            Comparison("error of the roots", "(14)-(16)", None, study.root_error, "-", 1, solver),
-            Comparison("error of A B^-1", "(17)-(25)", None, study.error, "-", 1, rounding),
-            Comparison("the same next to w = Omega", "(17)-(25)", None, study.critical_error, "-", 1, near),
-            Comparison("first root with the sign of (5)", "(5)", None, study.other_root, "rad/s", 6, shapes),
-            Comparison("K less its transpose", "(23)", None, study.asymmetry, "-", 2, symmetric),
-            Comparison("roots with the signs of (23)", "(23)", None, wrong, "", 1, none),
+            Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
+            Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),
+            Comparison("the same next to w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
+            Comparison("first root with the sign of (5)", "(5)", None, other[0], "rad/s", 6, shapes),
+            Comparison("K less its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
+            Comparison("roots with the signs of (23)", "(23)", None, len(wrong), "", 1, none),
         ),
     )
 
@@ -137,7 +107,7 @@ def _spinning_segments(spindle: Spindle) -> Iterator[SpinningSegment]:
 
 
 def _element_error(segment: SpinningSegment, frequency: float, speed_rpm: float) -> float:
-    """Largest error as a share of the largest entry, moments and slopes taken times and over the length."""
+    """Return the largest error over the largest entry, moments and slopes scaled by the length."""
     sections = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length, segment.length
     exact = spinning_element(*sections, [frequency], speed_rpm)[0]
     scale = np.tile([1.0, 1.0, segment.length, segment.length], 2)
@@ -159,7 +129,7 @@ def _root_error(segment: SpinningSegment) -> float:
 
 
 def _cantilever_roots(coupling: float, one_sign: bool) -> list[float]:
-    """Frequencies (rad/s) of the cantilever of two elements where its determinant changes sign."""
+    """Return frequencies (rad/s) of the cantilever of two elements at sign changes of its determinant."""
     from scipy.optimize import brentq  # takes longer to import than what it solves
 
     def determinant(w: float) -> float:

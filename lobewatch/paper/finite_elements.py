@@ -14,21 +14,21 @@ from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
 
 ElementKind = Literal["euler-bernoulli", "timoshenko", "linear"]
-"""Hermite cubics without shear; the cubics of Timoshenko theory; straight lines with shear, as BEAM188 has them."""
+"""Kind of element: Hermite cubics without shear; cubics of Timoshenko theory; linear with shear, as BEAM188."""
 
 BearingKind = Literal["springs", "rigid", "clamped"]
-"""What bearings do."""
+"""Support by the bearings: springs, held deflection, or held deflection and slope."""
 
 
 def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, bearings: BearingKind = "springs") -> float:
-    """The lowest bending frequency (Hz) of so many elements, shared out over the segments by their length.
+    """Return the lowest bending frequency (Hz) of so many elements, distributed over the segments by length.
 
     Bearings are springs at the nodes, or hold the deflection, clamped ones the rotation too. Consistent mass, with
-    rotary inertia where there is shear; the straight lines have their strain from the middle alone, or they would
-    lock. Segments are uniform, and bearings stand at their ends. Raises ValueError for fewer elements than segments.
+    rotary inertia if there is shear. Linear elements have their strain from the middle only, otherwise they would
+    lock. Segments are uniform, and bearings are at their ends. Raises ValueError for fewer elements than segments.
 
     Source: J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, ch. 5 and 11; T. J. R. Hughes, The Finite
-    Element Method, 1987, ch. 5.4 (straight lines).
+    Element Method, 1987, ch. 5.4 (linear elements).
     """
     from scipy.linalg import eigh  # takes longer to import than what it solves
 
@@ -48,7 +48,7 @@ def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, bearings
 
 
 def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
-    """Length of each element (m), and EI (N m^2), kappa GA (N), mass per length (kg/m), rho I (kg m), shape (4, n)."""
+    """Return element lengths (m), and EI (N m^2), kappa GA (N), mass per length (kg/m), rho I (kg m), shape (4, n)."""
     if elements < len(spindle.segments):
         raise ValueError(f"elements={elements} is less than the {len(spindle.segments)} segments; give one for each")
     length, outer, bore = np.array([(s.length, s.outer_diameter, s.bore_diameter) for s in spindle.segments]).T
@@ -70,13 +70,13 @@ def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
 
 
 def _cowper(poisson: float, bore: Floats) -> Floats:
-    """Shear coefficient of a ring, bore over outer diameter (G. R. Cowper, J. Appl. Mech. 33, 1966)."""
+    """Return the shear coefficient of a ring, bore over outer diameter (G. R. Cowper, J. Appl. Mech. 33, 1966)."""
     square = (1 + bore**2) ** 2
     return np.asarray(6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + (20 + 12 * poisson) * bore**2))
 
 
 def _matrices(length: Floats, section: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
-    """Stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
+    """Return stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
     rigidity, shear, mass, rotary = section
     point, weight = np.polynomial.legendre.leggauss(4)
     if kind == "linear":
@@ -99,7 +99,7 @@ def _matrices(length: Floats, section: Floats, kind: ElementKind) -> tuple[Float
 
 
 def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
-    """Deflection and rotation at x (0 to 1) for each end value, shape (4, n)."""
+    """Return deflection and rotation at x (0 to 1) for each end value, shape (4, n)."""
     one, none = np.ones(length.size), np.zeros(length.size)
     if kind == "linear":
         return np.array([(1 - x) * one, none, x * one, none]), np.array([none, (1 - x) * one, none, x * one])
@@ -124,7 +124,7 @@ def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tu
 
 
 def _strains(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
-    """Curvature (1/m) and shear strain at x for each end value, shape (4, n)."""
+    """Return curvature (1/m) and shear strain at x for each end value, shape (4, n)."""
     one, none = np.ones(length.size), np.zeros(length.size)
     if kind == "linear":
         rotation = _shapes(x, length, softness, kind)[1]
@@ -142,7 +142,7 @@ def _weighted_square(shape: Floats, weight: Floats) -> Floats:
 
 
 def _assemble_elements(parts: Floats) -> Floats:
-    """All elements in a row, shape (2 n + 2, 2 n + 2)."""
+    """Assemble all elements in a row, shape (2 n + 2, 2 n + 2)."""
     whole = np.zeros((2 * len(parts) + 2, 2 * len(parts) + 2))
     for i, part in enumerate(parts):
         whole[2 * i : 2 * i + 4, 2 * i : 2 * i + 4] += part
@@ -150,7 +150,7 @@ def _assemble_elements(parts: Floats) -> Floats:
 
 
 ELEMENT_COUNTS = (26, 39, 52, 77, 110, printed.FEM_ELEMENTS, 220, 308)
-"""Numbers of elements: one a segment, the paper's, twice the paper's, and between."""
+"""Numbers of elements: one per segment, the paper's, twice the paper's, and between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,19 +162,19 @@ class FiniteElementStudy:
     frequencies: Mapping[ElementKind, tuple[float, ...]]
     """Frequency for each of `ELEMENT_COUNTS` (Hz)."""
     clamped: float
-    """Frequency with shear where the bearings hold the slope too (Hz)."""
+    """Frequency with shear and bearings that hold the slope too (Hz)."""
 
     def error(self, kind: ElementKind, elements: int = printed.FEM_ELEMENTS) -> float:
-        """Share by which so many elements lie above the exact frequency."""
+        """Return the relative error of the frequency of so many elements."""
         return self.at(kind, elements) / self.exact[kind] - 1
 
     def at(self, kind: ElementKind, elements: int = printed.FEM_ELEMENTS) -> float:
-        """Frequency with so many elements (Hz)."""
+        """Return the frequency of so many elements (Hz)."""
         return self.frequencies[kind][ELEMENT_COUNTS.index(elements)]
 
 
 def study_meshes(plain: Spindle, shear: Spindle, exact: tuple[float, float]) -> FiniteElementStudy:
-    """Elements against the exact first frequency (Hz) by Euler-Bernoulli (plain) and by Timoshenko theory (shear)."""
+    """Compare elements with the exact first frequency (Hz) by Euler-Bernoulli (plain) and Timoshenko theory (shear)."""
     exacts: Mapping[ElementKind, float] = {"euler-bernoulli": exact[0], "timoshenko": exact[1], "linear": exact[1]}
     return FiniteElementStudy(
         exacts,
@@ -190,7 +190,7 @@ def study_meshes(plain: Spindle, shear: Spindle, exact: tuple[float, float]) -> 
 
 
 def mesh_section(study: FiniteElementStudy) -> NumberGroup:
-    """Numbers of the validation."""
+    """Return the numbers of the validation."""
     plain, cubic, straight = (study.at(kind) for kind in study.exact)
     above = round((printed.FEM_FREQUENCY / printed.RIGID_FREQUENCY - 1) * 100, 2)
     ours = (straight / study.exact["euler-bernoulli"] - 1) * 100

@@ -1,4 +1,4 @@
-"""The stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
+"""Stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from lobewatch.paper.comparison import Comparison, NumberGroup
 from modal import Mode
 
 STUDY_CUT = Cut(teeth=2, immersion=1.0, direction="up", tangential=600e6, radial=180e6)
-"""A slot with two teeth. The paper says nothing of its cut: Kt scales all depths alike, the teeth all speeds."""
+"""Slot with two teeth. The paper gives no cut: Kt scales all depths alike, the teeth all speeds."""
 LOBE_SPEEDS_RPM = np.arange(6000.0, 30001.0, 2.0)
-"""Speeds (rpm)."""
+"""Spindle speeds (rpm)."""
 POCKET_DEPTH_RATIO = 20.0
-"""Pockets are cut off at so many times the lowest limit."""
+"""Largest pocket depth over the lowest limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,20 +27,20 @@ class LobeStudy:
     new: StabilityLobes
     """Lobes of the measured mode."""
     by_rule: StabilityLobes
-    """Lobes of the old one: f_1 and K 10 % lower, as the paper has it."""
+    """Lobes of the old mode: f_1 and K 10 % lower, as in the paper."""
     by_model: StabilityLobes
-    """Lobes of the old one with the K of the recalibrated model."""
+    """Lobes of the old mode with K of the recalibrated model."""
     one_mode: StabilityLobes
     """Lobes of mode 1 of the surrogate."""
     six_modes: StabilityLobes
-    """Lobes of all its modes that are looked at."""
+    """Lobes of six modes of the surrogate."""
     by_zero_order: tuple[StabilityLobes, StabilityLobes]
-    """One and all modes, alike in x and y, by the zero-order approximation."""
+    """Lobes of one and of all modes, equal in x and y, by the zero-order approximation."""
     masses: tuple[float, float, float]
     """Modal mass of mode 1 (kg): measured, old by the rule, old by the model."""
 
     def share(self, lobes: StabilityLobes) -> float:
-        """Lowest limit over that of the new spindle."""
+        """Return the lowest limit over that of the new spindle."""
         return lobes.minimum.depth / self.new.minimum.depth
 
     @property
@@ -51,19 +51,19 @@ class LobeStudy:
         return deepest.before.speed_rpm, deepest.after.speed_rpm
 
     def pocket_limit_ratio(self, lobes: StabilityLobes) -> float:
-        """Limit at the speed of the new spindle's pocket over what it was there."""
+        """Return the limit at the speed of the new spindle's pocket over the new one."""
         speed = self.pocket[0]
         return float(lobes.depth_at(speed) / self.new.depth_at(speed))
 
     @staticmethod
     def errors_of_one_mode(first: StabilityLobes, several: StabilityLobes) -> tuple[float, float, float]:
-        """Share by which the lowest limit of one mode is off that of several; median and largest over all speeds."""
+        """Return the relative error of one mode: lowest limit, and median and largest over all speeds."""
         error = np.abs(first.depth / several.depth - 1)
         return first.minimum.depth / several.minimum.depth - 1, float(np.median(error)), float(np.max(error))
 
 
 def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -> LobeStudy:
-    """From the paper's mode, the model's K old over new, and the modes of the surrogate."""
+    """Compare lobes of the paper's mode, of the model's K old over new, and of the modes of the surrogate."""
     ratio = printed.OLD_FREQUENCY / printed.FREQUENCY
     aged = age_mode(measured, 0.9, "paper"), age_mode(measured, ratio, "model", stiffness_ratio)
     first = modes[:1]
@@ -80,12 +80,11 @@ def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -
 
 
 def _modal_mass(mode: Mode) -> float:
-    """Modal mass (kg)."""
     return float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2)
 
 
 def lobe_section(study: LobeStudy) -> NumberGroup:
-    """Numbers of the lobes."""
+    """Return the numbers of the lobes."""
     return NumberGroup(
         "Stability lobes, new and old: Fig. 10",
         ("fig-10",),

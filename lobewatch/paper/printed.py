@@ -1,4 +1,4 @@
-"""The numbers that stand in the paper: the only ones of the comparison that are not computed.
+"""Numbers printed in the paper, the only ones of the comparison that are not computed.
 
 O. Gaber and S. M. Hashemi, Effects of machine tool spindle decay on the stability lobe diagram: an
 analytical-experimental study, Shock and Vibration 2016, 4390185.
@@ -21,9 +21,9 @@ FREQUENCY = 1722.0
 BEARING_STIFFNESS = 1.28e9
 """Stiffness of each bearing that gives this frequency, Fig. 8 (N/m)."""
 OLD_FREQUENCY = 1550.0
-"""First natural frequency after the fall of 10 % that is assumed (Hz)."""
+"""First natural frequency after the assumed drop of 10 % (Hz)."""
 OLD_BEARING_STIFFNESS = 7.72e8
-"""Stiffness of each bearing that gives the frequency after the fall (N/m)."""
+"""Stiffness of each bearing after the drop (N/m)."""
 RIGID_CRITICAL_SPEED = 138464.0
 """Critical speed with rigid bearings, Fig. 7 (rpm)."""
 CRITICAL_SPEED = 103142.0
@@ -33,4 +33,4 @@ DAMPING_RATIO = 0.029136
 STIFFNESS = 3.2289e7
 """Stiffness K_exp of the measured mode, by (29) (N/m)."""
 OLD_STIFFNESS = 2.90601e7
-"""Stiffness K_theo of the old spindle, said to be that of (30) to (36) (N/m)."""
+"""Stiffness K_theo of the old spindle, attributed to (30) to (36) (N/m)."""

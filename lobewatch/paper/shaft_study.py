@@ -8,18 +8,8 @@ from importlib import resources
 
 import numpy as np
 
-from dsm import (
-    Calibration,
-    Spindle,
-    Theory,
-    WhirlMap,
-    calibrate,
-    critical_speed,
-    natural_frequencies,
-    static_stiffness,
-    stiffness_curve,
-    whirl_map,
-)
+import dsm
+from dsm import Calibration, Spindle, Theory, WhirlMap
 from dsm.arrays import Floats
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.paper import printed
@@ -27,7 +17,7 @@ from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
 
 
 def surrogate_spindle(bearing_stiffness: float, theory: Theory = "euler-bernoulli") -> Spindle:
-    """The packaged surrogate (26 segments, fitted to the paper's frequencies), each bearing as stiff as given (N/m)."""
+    """Return the surrogate (26 segments, fitted to the paper's frequencies) with a bearing stiffness (N/m)."""
     text = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
     machine = parse_machine_file(text)
     spindle = machine.model(machine.tap.tool)
@@ -40,7 +30,7 @@ STIFFNESS_CURVE_POINTS = 300
 WHIRL_SPEEDS_RPM = np.linspace(0.0, 150e3, 61)
 """Speeds of Figs. 7 and 9 (rpm)."""
 OPERATING_SPEED_RPM = 24000.0
-"""The fastest that the machine of the example turns (rpm)."""
+"""Highest speed of the machine in the example (rpm)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +46,7 @@ class ShaftStudy:
     new: Calibration
     """Bearings calibrated to the measured frequency."""
     old: Calibration
-    """Those bearings calibrated to the frequency after the fall."""
+    """Bearings calibrated to the frequency after the drop."""
     critical_speeds: tuple[float, float]
     """Critical speed on rigid and on calibrated bearings (rpm)."""
     curve: tuple[Floats, Floats]
@@ -70,30 +60,30 @@ class ShaftStudy:
 
 
 def study_shaft(theory: Theory) -> ShaftStudy:
-    """All of it by "euler-bernoulli" or "timoshenko"."""
+    """Study the shaft by one beam theory."""
     shaft = surrogate_spindle(printed.BEARING_STIFFNESS, theory)
     rigid = surrogate_spindle(math.inf, theory)
-    new = calibrate(shaft, printed.FREQUENCY)
-    highest = float(natural_frequencies(rigid, 1)[0])
+    new = dsm.calibrate(shaft, printed.FREQUENCY)
+    highest = float(dsm.natural_frequencies(rigid, 1)[0])
     frequency = np.linspace(0.13, 0.9985, STIFFNESS_CURVE_POINTS) * highest
-    turning = whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
+    turning = dsm.whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
     old = surrogate_spindle(printed.OLD_BEARING_STIFFNESS, theory)
     return ShaftStudy(
         rigid,
         highest,
-        (float(natural_frequencies(shaft, 1)[0]), float(natural_frequencies(old, 1)[0])),
+        (float(dsm.natural_frequencies(shaft, 1)[0]), float(dsm.natural_frequencies(old, 1)[0])),
         new,
-        calibrate(new.spindle, printed.OLD_FREQUENCY),
-        (critical_speed(rigid), critical_speed(new.spindle)),
-        (stiffness_curve(shaft, frequency), frequency),
-        whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
-        whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
+        dsm.calibrate(new.spindle, printed.OLD_FREQUENCY),
+        (dsm.critical_speed(rigid), dsm.critical_speed(new.spindle)),
+        (dsm.stiffness_curve(shaft, frequency), frequency),
+        dsm.whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
+        dsm.whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
         (float(turning.backward[0, 0]), float(turning.forward[0, 0])),
     )
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
-    """Numbers of the model at rest and of the model that spins; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Return the numbers at rest and of the spinning spindle; plain is Euler-Bernoulli, shear Timoshenko theory."""
     return (
         NumberGroup(
             "The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_numbers_at_rest(plain, shear))
@@ -173,15 +163,15 @@ class StiffnessStudy:
     static: tuple[float, float]
     """Exact static stiffness (N/m)."""
     linearized: tuple[float, float]
-    """The same by (30) to (36), linearised at the natural frequency (N/m)."""
+    """Static stiffness by (30) to (36), linearized at the natural frequency (N/m)."""
     modal: tuple[float, float]
     """Modal stiffness of mode 1 (N/m)."""
 
 
 def study_stiffness(old: Calibration) -> StiffnessStudy:
-    """From the bearings calibrated to the frequency before and after the fall."""
+    """Study the tip stiffness from the bearings calibrated to the frequency before and after the drop."""
     pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
-    before, after = (static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
+    before, after = (dsm.static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
     return StiffnessStudy(
         (old.static_stiffness_before, old.static_stiffness_after),
         (before, after),
@@ -190,7 +180,7 @@ def study_stiffness(old: Calibration) -> StiffnessStudy:
 
 
 def stiffness_section(study: StiffnessStudy) -> NumberGroup:
-    """Numbers of the tip stiffness."""
+    """Return the numbers of the tip stiffness."""
     old = printed.OLD_STIFFNESS
     ratio = round(old / printed.STIFFNESS, 4)
     static, modal = study.linearized[1] / study.linearized[0], study.modal[1] / study.modal[0]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Claim, NumberGroup, format_share
-from lobewatch.paper.element_study import ElementStudy, element_section, study_element
+from lobewatch.paper.element_study import element_section
 from lobewatch.paper.finite_elements import FiniteElementStudy, mesh_section, study_meshes
 from lobewatch.paper.lobe_study import LobeStudy, lobe_section, study_lobes
 from lobewatch.paper.shaft_study import (
@@ -24,7 +24,7 @@ from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
 def evaluate_claims(
     plain: ShaftStudy, shear: ShaftStudy, meshes: FiniteElementStudy, stiffness: StiffnessStudy, lobes: LobeStudy
 ) -> tuple[Claim, ...]:
-    """In the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Evaluate the claims in the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
     return (
         _validation_claim(meshes),
         *_bearing_claims(plain, shear),
@@ -84,15 +84,15 @@ def _decay_claims(stiffness: StiffnessStudy, lobes: LobeStudy) -> tuple[Claim, C
             "With f_1 the tip stiffness falls by 10 %, from K_exp to K_theo.",
             "fails",
             "K_theo is 0.9 K_exp in every digit. On the surrogate the static stiffness falls by "
-            f"{format_share(static)}, that of the mode, which an FRF shows, by {format_share(modal)}. Lobewatch takes K "
-            "from each new tap test.",
+            f"{format_share(static)}, that of the mode, which an FRF shows, by {format_share(modal)}. Lobewatch takes "
+            "K from each new tap test.",
         ),
         Claim(
             "A fall of f_1 by 10 % shifts the stability lobes significantly.",
             "holds",
             f"Sideways: pockets go with f_1 ({before:.0f} to {after:.0f} rpm), and at the speed of that pocket "
-            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit is left. Down it is K that counts: of "
-            f"the lowest limit {format_share(lobes.share(lobes.by_model))} is left with the model's K, "
+            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit is left. Down it is K that counts: "
+            f"of the lowest limit {format_share(lobes.share(lobes.by_model))} is left with the model's K, "
             f"{format_share(lobes.share(lobes.by_rule))} by the paper's rule.",
         ),
     )
@@ -103,23 +103,23 @@ def _mode_claim(lobes: LobeStudy) -> Claim:
     return Claim(
         "More modes than the first hardly matter for the lobes (its reference [18]).",
         "holds in part",
-        f"In the feed alone the lowest limit of one mode is {format_share(lowest)} off that of six of the surrogate; on "
-        f"the side of a pocket, which they move, the limit is off by up to {format_share(worst)}.",
+        f"In the feed alone the lowest limit of one mode is {format_share(lowest)} off that of six of the surrogate; "
+        f"on the side of a pocket, which they move, the limit is off by up to {format_share(worst)}.",
     )
 
 
 @dataclass(frozen=True, eq=False)
 class PaperStudy:
-    """What was computed for the comparison."""
+    """Results of the comparison with the paper."""
 
     plain: ShaftStudy
-    """Shaft by Euler-Bernoulli theory, the paper's."""
+    """Shaft by Euler-Bernoulli theory, as in the paper."""
     shear: ShaftStudy
     """Shaft by Timoshenko theory."""
     meshes: FiniteElementStudy
     """Finite elements."""
-    element: ElementStudy
-    """Spinning element as printed."""
+    element: NumberGroup
+    """Numbers of the spinning element as printed."""
     tap: TapStudy
     """Tap test."""
     stiffness: StiffnessStudy
@@ -129,10 +129,10 @@ class PaperStudy:
 
     @property
     def sections(self) -> tuple[NumberGroup, ...]:
-        """Every number of the paper beside ours, in the order of the paper."""
+        """Every number of the paper with ours, in the order of the paper."""
         at_rest, spinning = shaft_sections(self.plain, self.shear)
         return (
-            element_section(self.element),
+            self.element,
             at_rest,
             mesh_section(self.meshes),
             spinning,
@@ -143,12 +143,18 @@ class PaperStudy:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """What the paper claims, and whether it holds."""
+        """Claims of the paper, and whether they hold."""
         return evaluate_claims(self.plain, self.shear, self.meshes, self.stiffness, self.lobes)
 
 
 def study_paper() -> PaperStudy:
-    """All of it on the packaged surrogate: about a second of CPU."""
+    """Run the whole comparison on the packaged surrogate, in about a second of CPU.
+
+    Returns
+    -------
+    PaperStudy
+        All studies, with their numbers and claims.
+    """
     plain, shear = study_shaft("euler-bernoulli"), study_shaft("timoshenko")
     tap = study_tap(plain.new.spindle)
     stiffness = study_stiffness(plain.old)
@@ -156,7 +162,7 @@ def study_paper() -> PaperStudy:
         plain,
         shear,
         study_meshes(plain.rigid, shear.rigid, (plain.rigid_frequency, shear.rigid_frequency)),
-        study_element(plain.rigid),
+        element_section(plain.rigid),
         tap,
         stiffness,
         study_lobes(tap.measured, stiffness.modal[1] / stiffness.modal[0], tap.surrogate_modes),

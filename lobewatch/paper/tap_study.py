@@ -1,4 +1,4 @@
-"""Tap test of Figs. 5 and 6: one mode as the paper measured it, on emulated hits."""
+"""Tap test of Figs. 5 and 6: one mode as the paper measured it, picked by (28) and (29), and emulated hits."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
 from modal import Mode, fit_modes, pick_peaks, synthesize_frf
 
 EMULATED_TAP_RATE = 25600.0
-"""Samples a second."""
+"""Sample rate (Hz)."""
 EMULATED_TAP_CHANNELS = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
 """Hammer and accelerometer of the demo."""
 EMULATED_TAP_TRIGGER = Trigger(level=20.0, n_samples=6400, pre_trigger=512)
-"""Records of 0.25 s."""
+"""Trigger with records of 0.25 s."""
 EMULATED_TAP_SECONDS = 10.0
-"""Time in which ten good hits are there."""
+"""Time for ten good hits (s)."""
 
 
 def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[Frf]:
-    """The FRF of each of so many tap tests, each with random numbers of its own."""
+    """Yield the FRF of each of several tap tests, each with its own random numbers."""
     values = np.array([(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes])
     structure = Structure(values[:, 0], values[:, 1], values[:, 2])
     for seed in range(tests):
@@ -52,37 +52,37 @@ def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[
 TAP_FREQUENCY_LINES = np.arange(1000.0, 2501.0)
 """Lines of the FRF, 1 Hz apart (Hz)."""
 TAP_BAND = (1200.0, 2300.0)
-"""Band in which the mode of a tap test is looked for (Hz)."""
+"""Band of the mode of a tap test (Hz)."""
 EMULATED_TESTS = 8
-"""Emulated tap tests."""
+"""Number of emulated tap tests."""
 SURROGATE_MODES = 6
-"""Modes of the surrogate that are looked at."""
+"""Number of modes of the surrogate."""
 
 
 @dataclass(frozen=True, eq=False)
 class TapStudy:
-    """FRFs and the modes that are read from them."""
+    """FRFs and the modes identified from them."""
 
     measured: Mode
     """Mode with the paper's frequency, damping ratio and stiffness."""
     frf: Frf
     """FRF of that mode."""
     picked: Mode
-    """Mode picked from it."""
+    """Mode picked from that FRF."""
     fitted: Mode
-    """Mode fitted to it."""
+    """Mode fitted to that FRF."""
     surrogate_modes: tuple[Mode, ...]
     """Modes of the calibrated surrogate at the tool tip, with the paper's damping ratio."""
     surrogate_frf: Frf
-    """FRF of these."""
+    """FRF of the surrogate modes."""
     surrogate_picked: Mode
-    """Mode picked from that."""
+    """Mode picked from the FRF of the surrogate."""
     tapped: Frf
     """FRF of one emulated tap test on the surrogate."""
     scatter_picked: tuple[float, float]
-    """rms error of zeta and of K picked from emulated tap tests, as shares."""
+    """Relative rms error of zeta and of K picked from emulated tap tests."""
     scatter_fitted: tuple[float, float]
-    """The same of those fitted."""
+    """Relative rms error of zeta and of K fitted to emulated tap tests."""
 
     @property
     def extremes(self) -> tuple[float, float]:
@@ -98,7 +98,7 @@ class TapStudy:
 
 
 def study_tap(spindle: Spindle) -> TapStudy:
-    """The paper's mode, and the surrogate with its calibrated bearings."""
+    """Identify the paper's mode, and those of the surrogate with its calibrated bearings."""
     measured = Mode(printed.FREQUENCY, printed.DAMPING_RATIO, printed.STIFFNESS)
     shapes = mode_shapes(spindle, SURROGATE_MODES)
     modes = tuple(
@@ -123,19 +123,18 @@ def study_tap(spindle: Spindle) -> TapStudy:
 
 
 def _nearest_mode(modes: Sequence[Mode]) -> Mode:
-    """The mode nearest to the measured frequency."""
     return min(modes, key=lambda mode: abs(mode.frequency - printed.FREQUENCY))
 
 
 def _relative_scatter(modes: Sequence[Mode], truth: Mode) -> tuple[float, float]:
-    """rms error of zeta and of K as shares of the truth."""
+    """Return the relative rms error of zeta and of K."""
     values = np.array([(mode.damping_ratio, mode.stiffness) for mode in modes])
     zeta, stiffness = np.sqrt(np.mean((values / (truth.damping_ratio, truth.stiffness) - 1) ** 2, axis=0))
     return float(zeta), float(stiffness)
 
 
 def tap_section(study: TapStudy) -> NumberGroup:
-    """Numbers of the tap test."""
+    """Return the numbers of the tap test."""
     below, above = study.extremes
     zeta, stiffness = printed.DAMPING_RATIO, printed.STIFFNESS
     picked, fitted, model = study.picked, study.fitted, study.surrogate_modes[0]
@@ -145,7 +144,8 @@ def tap_section(study: TapStudy) -> NumberGroup:
     high = f"zeta^2 ({format_share(zeta**2)}) high for one mode alone, {halves}; the rest: lines 1 Hz apart"
     low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) low for one mode alone; the rest: lines 1 Hz apart"
     other = "the surrogate is fitted to frequencies, not to K"
-    tails = f"{format_share(study.surrogate_picked.stiffness / model.stiffness - 1, '+')}: tails of modes 2 to {SURROGATE_MODES} too"
+    shift = format_share(study.surrogate_picked.stiffness / model.stiffness - 1, "+")
+    tails = f"{shift}: tails of modes 2 to {SURROGATE_MODES} too"
     often = f"rms over {EMULATED_TESTS} emulated tap tests of ten hits, against the truth"
     rest = f"{often}: picking takes three lines, 4 Hz apart, for all"
     (zeta_picked, k_picked), (zeta_fitted, k_fitted) = study.scatter_picked, study.scatter_fitted

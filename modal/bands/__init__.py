@@ -1,1 +1,1 @@
-"""Modes band by band: found as peaks, fitted, settled with each other's tails, and looked at closer."""
+"""Modal extraction band by band: find peaks, fit, iterate, refine dense bands."""

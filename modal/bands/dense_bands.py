@@ -18,21 +18,22 @@ from modal.bands.residual_analysis import (
     residual_noise,
     systematic_error,
 )
-from modal.fitting import MAX_RESIDUAL_TERMS, fit_band, mode_pair_gain, residual_term_gain
+from modal.fitting.band_fit import MAX_RESIDUAL_TERMS
+from modal.fitting.fit_band import fit_band, mode_pair_gain, residual_term_gain
 from modal.poles import select_physical_poles
 
 HIDDEN_MODE_F_RATIO = 40.0
-"""A mode without a peak of its own lowers the sum of squares by this many times what its unknowns do by chance."""
+"""F ratio of the sum of squares that a mode without a peak must reach."""
 RESIDUAL_TERM_F_RATIO = 6.0
-"""A further residual term lowers it by this many times what two unknowns do by chance."""
+"""F ratio that a further residual term must reach."""
 MAX_HIDDEN_MODE_ERROR = 1 / 6
-"""Relative standard error that damping ratio and stiffness of a mode without a peak have at most."""
+"""Largest relative standard error of damping ratio and stiffness of a mode without a peak."""
 
 
 def refine_dense_band(band: FittedBand) -> FittedBand:
-    """The band with those modes added that have no peak of their own, where the sum of squares asks for them.
+    """Add modes without a peak of their own if the sum of squares asks for them.
 
-    The same where its fit leaves nothing but independent errors, or rounding.
+    A band whose residual is white noise or rounding is returned as it is.
     """
     if has_white_residual(band.fit) or has_rounding_residual(band):
         return band
@@ -54,7 +55,7 @@ def refine_dense_band(band: FittedBand) -> FittedBand:
 
 
 def _is_well_determined(band: FittedBand) -> bool:
-    """Whether all its modes are known well enough when what the model lacks counts, too."""
+    """Return whether all modes are certain enough, systematic errors included."""
     more, fit = systematic_error(band), band.fit
     error = np.sqrt(np.diag(more.factor * fit.covariance + more.covariance)).reshape(-1, fit.frequency.size)
     sizes = error[2 : 2 + len(fit.constant)] / np.abs(fit.constant)
@@ -65,7 +66,7 @@ def _is_well_determined(band: FittedBand) -> bool:
 
 
 def _trial_modes(band: FittedBand, split: bool) -> Iterator[Floats]:
-    """Starts (2, m) for more modes than are fitted, from all high LSCF poles down; then two for the highest mode."""
+    """Yield start values (2, m) for more modes, from all high LSCF poles down; then for a split of the highest mode."""
     fit, poles = band.fit, select_physical_poles(band.data.chart)
     fitted = fit.poles
     size = np.pi * poles.frequency * poles.largest / poles.damping_ratio
@@ -80,7 +81,7 @@ def _trial_modes(band: FittedBand, split: bool) -> Iterator[Floats]:
 
 
 def _add_residual_terms(band: FittedBand) -> FittedBand:
-    """The band with as many residual terms as lower the sum of squares for more than by chance."""
+    """Add residual terms while they lower the sum of squares by more than chance."""
     data = band.data
     for terms in range(band.terms + 1, MAX_RESIDUAL_TERMS + 1):
         least = RESIDUAL_TERM_F_RATIO * len(data.target) * band.fit.sum_of_squares / band.fit.degrees_of_freedom
@@ -98,22 +99,21 @@ def _add_residual_terms(band: FittedBand) -> FittedBand:
 
 
 MIN_PAIR_GAIN = 9.0
-"""Gain of a pair, over what each of its unknowns takes off by chance, which a mode alone has once in 8000 (exp -9)."""
+"""Least gain of a pair per unknown over chance; a single mode reaches it once in 8000 cases (exp -9)."""
 PAIR_TRIAL_OFFSET = 0.35
-"""Half the distance at which two modes in place of one are tried (half-power half-widths)."""
+"""Half the distance of the two trial modes (half-power half-widths)."""
 MAX_PAIR_SIZE_CHANGE = 2.0
-"""Standard errors that the size of a mode may change by where its stiffness is its own all the same."""
+"""Largest change of a mode's size by a pair (standard errors) for which its stiffness counts as its own."""
 MAX_PAIR_RESIDUAL_TO_NOISE = 2.0
-"""Times the noise (rms) that two modes in place of one leave at most."""
+"""Largest residual of a pair over the noise (rms)."""
 MIN_PAIR_SHARE = 0.01
-"""Share (rms) of a mode below which what a pair adds to it means nothing: real peaks are no more linear than that."""
+"""Least contribution of a pair over the mode (rms): real peaks are no more linear than that."""
 
 
 def mark_close_modes(band: FittedBand) -> FittedBand:
-    """The band with the frequencies of two modes that may stand in place of one: its K is then that of both.
+    """Record the frequencies of two close modes that may replace one fitted mode, whose K is then that of both.
 
-    They are said where the curve of one mode is surely not all that there is, two leave nothing but noise, and neither
-    of them is as large as the one.
+    Conditions: a single mode does not explain the peak, two leave white noise, and neither is as large as the one.
     """
     fit, data = band.fit, band.data
     if band.close_frequencies or has_rounding_residual(band):
@@ -133,8 +133,10 @@ def mark_close_modes(band: FittedBand) -> FittedBand:
 
 
 def _least_likely_single_mode(band: FittedBand) -> int | None:
-    """The mode whose peak is least likely that of one mode alone; None where chance explains all of them, what a pair
-    adds is next to nothing, or it leaves far more than noise."""
+    """Return the mode that is least likely to be a single one.
+
+    None if chance explains all of them, a pair adds next to nothing, or it leaves far more than noise.
+    """
     fit, data = band.fit, band.data
     gains = [mode_pair_gain(fit, data.frequency, data.weight, band.terms, i) for i in range(fit.frequency.size)]
     i, unknowns = int(np.argmax(gains)), 2 * len(data.target)
@@ -145,7 +147,7 @@ def _least_likely_single_mode(band: FittedBand) -> int | None:
 
 
 def split_pole(poles: Floats, i: int) -> Floats:
-    """Poles with two in place of one, which come last, (2, m + 1)."""
+    """Replace one pole by two, which come last, shape (2, m + 1)."""
     frequency, damping_ratio = poles[:, i]
     apart = PAIR_TRIAL_OFFSET * damping_ratio * frequency
     pair = [[frequency - apart, frequency + apart], 2 * [damping_ratio]]

@@ -24,32 +24,32 @@ from modal.bands.residual_analysis import has_rounding_residual
 
 @contextmanager
 def limit_to_one_thread() -> Iterator[None]:
-    """Keeps the numerical libraries of this process to one thread as long as it is entered."""
+    """Limit the numerical libraries to one thread: with two, small matrices take three times as long."""
     with _thread_controller().limit(limits=1):
         yield
 
 
 @cache
 def _thread_controller() -> ThreadpoolController:
-    """Looked for once: that takes as long as a fit."""
+    """Find the libraries once: it takes as long as a fit."""
     return ThreadpoolController()
 
 
 MIN_NOISE_GROWTH_EVIDENCE = 4.0
-"""Twice the gain of log likelihood from which noise is taken to grow with the FRF; chance brings it once in 44."""
+"""Twice the log likelihood gain from which noise grows with the FRF; chance reaches it once in 44 cases."""
 MAX_SCORING_STEPS = 12
-"""Most steps of Fisher scoring; it settles in some five."""
+"""Most steps of Fisher scoring; about five are usual."""
 SCORING_TOLERANCE = 1e-6
-"""Relative change of its shares after which it has settled."""
+"""Relative change of the shares at convergence."""
 MIN_NOISE_FLOOR_SHARE = 1e-4
-"""Share that the floor has at least of the variance at the mean squared height."""
+"""Least share of the noise floor in the variance at the mean squared height."""
 
 
 def update_line_weights(state: Extraction, given: Floats) -> Floats:
-    """Weights (p, n) that what the fits of these bands leave asks for; given: those that nothing speaks against.
+    """Return line weights (p, n) that follow from the residuals of the bands; given: weights without that knowledge.
 
-    Noise proportional to the FRF (of the hammer, of the place that is hit, of leakage) is largest on the peaks, where
-    equal weights take it for that of the whole band: the errors of damping ratio and stiffness come out too small.
+    Noise proportional to the FRF (of the hammer, of the hit position, of leakage) is largest on the peaks. Equal
+    weights spread it over the whole band: the errors of damping ratio and stiffness come out too small.
     """
     weight = given.copy()
     for band in state.bands:
@@ -59,9 +59,9 @@ def update_line_weights(state: Extraction, given: Floats) -> Floats:
 
 
 def _noise_profile(left: Complexes, band: FittedBand, given: Floats) -> Floats:
-    """For each FRF of a band the rms of its weighted noise by line, over that of the whole band, (p, n).
+    """Return the rms of the weighted noise by line over that of the band, for each FRF, shape (p, n).
 
-    left: what the fit leaves of the receptances (m/N); given: weights, all of shape (p, n).
+    left: residual of the receptances (m/N); given: weights, all of shape (p, n).
     """
     height = np.abs((band.data.target - left) * given) ** 2
     variance = _fit_noise_variance(np.abs(left * given) ** 2, height, given > 0)
@@ -69,9 +69,9 @@ def _noise_profile(left: Complexes, band: FittedBand, given: Floats) -> Floats:
 
 
 def _fit_noise_variance(left: Floats, height: Floats, counts: Flags) -> Floats:
-    """Likeliest variance by line, floor + slope height, or equal where that is as likely; of each FRF, shape (p, n).
+    """Fit the likeliest variance by line of each FRF, floor + slope height or equal on all lines, shape (p, n).
 
-    left, height: squares of the residual and of the model; counts: the lines that it is told from, all (p, n).
+    left, height: squares of the residual and of the model; counts: lines used, all (p, n).
     """
     columns = np.stack([np.ones(left.shape), height / np.mean(height, axis=1, keepdims=True)], axis=1)
     known, squares = columns * counts[:, np.newaxis], left * counts
@@ -90,25 +90,42 @@ def _fit_noise_variance(left: Floats, height: Floats, counts: Flags) -> Floats:
 
 
 def _log_likelihood(left: Floats, variance: Floats, counts: Flags) -> Floats:
-    """Log likelihood of these variances by the squares of complex normal residuals, of each FRF, shape (p,)."""
+    """Return the log likelihood of these variances for complex normal residuals of each FRF, shape (p,)."""
     return np.asarray(-np.sum((np.log(variance) + left / variance) * counts, axis=1))
 
 
 MAX_REWEIGHTING_ROUNDS = 4
-"""Most rounds in which weights follow what the fits leave."""
+"""Most rounds in which weights follow the residuals."""
 MIN_WEIGHT_CHANGE = 0.2
-"""Relative change of weights that is not worth another fit."""
+"""Relative change of weights that needs a new fit."""
 STRAY_LINE_RATIO = 8.0
-"""A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
+"""Residual of a stray line over the median of the lines around it."""
 STRAY_ROUNDING_SHARE = 1e-8
-"""Share of the largest value below which no residual means anything."""
+"""Share of the largest value below which a residual is rounding."""
 
 
 def extract_modes(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Extraction:
-    """Find and fit all modes of these FRFs between band[0] and band[1] (Hz), with poles that are common to all.
+    """Find and fit all modes of one or several FRFs with common poles.
 
-    One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_common_modes`.
+    Parameters
+    ----------
+    frfs : sequence of Frf
+        FRFs on the same lines, the driving point first.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz).
 
+    Returns
+    -------
+    Extraction
+        Fitted bands of modes.
+
+    Raises
+    ------
+    ValueError
+        As `fit_common_modes`.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
     >>> state = extract_modes([frf])
     >>> [f"{band.fit.frequency[0]:.1f} Hz" for band in state.bands]
@@ -124,11 +141,11 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     empty = Extraction(lines, np.array([line_weights(frf) for frf in lines]), ())
     peaks = _merge_resonances([find_resonances(frf) for frf in lines])
     state = iterate_bands(_fit_bands(empty, peaks))
-    beside = _with_residual_resonances(state, peaks)
-    state = state if len(beside) == len(peaks) else iterate_bands(_fit_bands(state, beside))
-    closer = tuple(refine_dense_band(band) for band in state.bands)
-    if any(new is not old for new, old in zip(closer, state.bands, strict=True)):
-        state = iterate_bands(replace(state, bands=closer))
+    extended = _with_residual_resonances(state, peaks)
+    state = state if len(extended) == len(peaks) else iterate_bands(_fit_bands(state, extended))
+    refined = tuple(refine_dense_band(band) for band in state.bands)
+    if any(new is not old for new, old in zip(refined, state.bands, strict=True)):
+        state = iterate_bands(replace(state, bands=refined))
     stray = _stray_lines(state)
     if np.any(stray):
         state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))
@@ -137,7 +154,7 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
 
 
 def _reweight(state: Extraction) -> Extraction:
-    """Bands fitted with the weights that what they leave asks for, until those stay about as they are."""
+    """Refit the bands with weights from their residuals until the weights converge."""
     given = state.weight
     for _ in range(MAX_REWEIGHTING_ROUNDS):
         weight = update_line_weights(state, given)
@@ -152,7 +169,7 @@ def _reweight(state: Extraction) -> Extraction:
 
 
 def _limit_to_common_band(frfs: Sequence[Frf]) -> list[Frf]:
-    """All with the narrowest usable band."""
+    """Give all FRFs the narrowest usable band."""
     if not frfs:
         raise ValueError("there is no FRF; give one or more, the driving point first")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
@@ -163,7 +180,7 @@ def _limit_to_common_band(frfs: Sequence[Frf]) -> list[Frf]:
 
 
 def _merge_resonances(found: Sequence[list[Resonance]]) -> list[Resonance]:
-    """Resonances of all FRFs by rising frequency, of two nearer to each other than a half-width the higher."""
+    """Merge the resonances of all FRFs by rising frequency; of two within a half-width the higher stays."""
     common: list[Resonance] = []
     for new in sorted(chain.from_iterable(found), key=lambda r: -r.height):
         if all(abs(new.frequency - old.frequency) >= max(new.half_width, old.half_width) for old in common):
@@ -172,9 +189,9 @@ def _merge_resonances(found: Sequence[list[Resonance]]) -> list[Resonance]:
 
 
 def _fit_bands(before: Extraction, resonances: list[Resonance]) -> Extraction:
-    """A first fit of every band around these, the highest first, each without the tails of those before.
+    """Fit every band around these resonances for the first time, the highest first, without the tails of those before.
 
-    A band that was there before as it is now keeps its fit.
+    An earlier band with the same resonances and lines keeps its fit.
     """
     wanted = sorted(group_into_bands(resonances, before.frf.frequency), key=lambda local: -local.height)
     kept = [band for band in before.bands if any(_is_band_of(band, local) for local in wanted)]
@@ -187,19 +204,19 @@ def _fit_bands(before: Extraction, resonances: list[Resonance]) -> Extraction:
 
 
 def _is_band_of(band: FittedBand, local: LocalBand) -> bool:
-    """Whether a band was laid around these peaks on these lines."""
+    """Return whether a band was laid around these peaks on these lines."""
     return (band.resonances, band.lines) == (local.resonances, local.lines)
 
 
 def _with_residual_resonances(state: Extraction, known: list[Resonance]) -> list[Resonance]:
-    """Known resonances with those that stand out of what the fit of these leaves in any of the FRFs."""
+    """Add the resonances that stand out of the residual of any FRF."""
     for frf, fitted in zip(state.frfs, state.receptance, strict=True):
         known = add_residual_resonances(known, replace(frf, receptance=frf.receptance - fitted))
     return known
 
 
 def _stray_lines(state: Extraction) -> Flags:
-    """Lines that stand far out of the residual on both sides of them: hum, or a carrier; shape (p, n)."""
+    """Return which lines stand far out of the residual on both sides of them (hum, a carrier), shape (p, n)."""
     stray = np.zeros(state.weight.shape, bool)
     for band in state.bands:
         size = np.abs(band.data.target) * band.data.weight

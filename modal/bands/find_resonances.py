@@ -1,4 +1,4 @@
-"""Where an FRF has resonances: peaks of its mobility that are too high for noise and turn like a mode."""
+"""Find the resonances of an FRF: mobility peaks above the noise whose phase turns as that of a mode."""
 
 from __future__ import annotations
 
@@ -16,43 +16,44 @@ from modal.arrays import Complexes, Flags, Floats, Indices
 from modal.bands.frf_lines import incoherent_noise, measured_over_receptance, remove_drift
 
 MIN_FRF_LINES = 8
-"""One mode and its residual terms have seven unknowns."""
+"""Fewest lines of an FRF: one mode and its residual terms have seven unknowns."""
 SMOOTHING_LENGTHS = 4 ** np.arange(10)
 """Lengths of the running means (lines), up to a sixteenth of the FRF."""
 MIN_PEAK_PROMINENCE_DB = 1.0
-"""A peak stands this far above its saddles (dB of mobility) ..."""
+"""Least height of a peak above its saddles (dB of mobility)."""
 MIN_PEAK_TO_NOISE = 8.0
-"""... and this many rms of the noise, which no ripple among a million lines reaches."""
+"""Least height of a peak above its saddles over the noise rms; no ripple among a million lines reaches it."""
 NOISE_MEDIAN_LINES = 65
-"""Lines that the noise of each is told from, by their median."""
+"""Lines of the running median that the noise of each line is taken from."""
 MAX_SMOOTHING_LOSS = 4.0
-"""Height of a peak that may be the luck of its highest line (rms of the noise)."""
+"""Height that a peak may owe to noise on its highest line (rms of the noise)."""
 MIN_PHASE_TURN = 0.5
-"""Angle between the chords of the mobility from the lower side to the peak and from there to the upper side (rad).
+"""Least angle between the chords of the mobility from the lower side to the peak and on to the upper side (rad).
 
-On the circle of a mode, from half-power point to half-power point, it is -pi/2, whatever its neighbours add."""
+On the circle of a mode, between the half-power points, the angle is -pi/2 whatever the neighbours add.
+"""
 MAX_PHASE_TURN = 2.6
-"""Of a mode narrower than the line spacing the chords lie side by side; which way it turns is not to be seen (rad)."""
+"""Largest visible angle (rad): for a mode narrower than the line spacing the sense of rotation is lost."""
 MIN_RESONANCE_COHERENCE = 0.3
-"""Mean coherence over a peak, of hum at random phase one over the number of hits; below 0.5 a mode is doubtful."""
+"""Least mean coherence over a peak; hum at random phase has one over the number of hits."""
 MIN_RESIDUAL_PEAK_DISTANCE = 2.0
-"""A peak of the residual counts this many times the sum of the half-widths away from all known ones ..."""
+"""Least distance of a residual peak from known resonances, over the sum of the half-widths."""
 MIN_RESIDUAL_PEAK_SHARE = 0.02
-"""... and from this share of the height of its neighbour; a real peak is a linear mode to a percent or so."""
+"""Least height of a residual peak over that of its neighbour; real peaks are linear modes to about 1 %."""
 
 
 class ConjugateError(ValueError):
-    """An FRF whose phase rises through its resonances, as that of the complex conjugate of response over force does."""
+    """Raised for an FRF with rising phase at its resonances: the complex conjugate of response over force."""
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """One peak of the mobility."""
+    """Peak of the mobility."""
 
     frequency: float
-    """Frequency of its highest line (Hz)."""
+    """Frequency of the highest line (Hz)."""
     half_width: float
-    """Distance from there to the nearer half-power point, roughly zeta f_n (Hz)."""
+    """Distance from the peak to the nearer half-power point (Hz), roughly zeta f_n."""
     height: float
     """Height of the mobility (m/s/N)."""
 
@@ -66,12 +67,12 @@ class _Peak:
 
 
 def find_resonances(frf: Frf) -> list[Resonance]:
-    """Resonances by rising frequency, over all lines of the FRF (all above 0 Hz).
+    """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
     The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
-    r - 1/r = -+ 2 zeta. Peaks are looked for line by line and then in ever longer running means of the complex
-    mobility, so that a wide mode is found in noise that hides it from single lines. Two modes with no dip between
-    them are one peak, and a mode much narrower than the line spacing is none.
+    r - 1/r = -+ 2 zeta. Peaks are searched line by line and then in ever longer running means of the complex
+    mobility, which reveals a wide mode that noise hides from single lines. Two modes with no dip between
+    them are one peak. A mode much narrower than the line spacing is not found.
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
@@ -88,22 +89,22 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     return sorted(turning, key=lambda r: r.frequency)
 
 
-def add_residual_resonances(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
-    """Known resonances with those that stand out of what the fit of these leaves, by rising frequency.
+def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[Resonance]:
+    """Add resonances that stand out of the residual of a fit to the known ones, by rising frequency.
 
-    left: the measured FRF less all that was fitted. Where a known resonance stands its residual does not count, and
-    neither do single lines (hum).
+    residual: the measured FRF less all that was fitted. Residual peaks at known resonances and single lines (hum)
+    are ignored.
     """
     if not known:
         return []
     least = MIN_RESIDUAL_PEAK_SHARE * min(r.height for r in known)
-    peaks = [peak for peak in _find_peaks_at_all_scales(left, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
+    peaks = [peak for peak in _find_peaks_at_all_scales(residual, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
     turning = [peak.resonance for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
     return sorted([*known, *(new for new in turning if _is_separate_resonance(known, new))], key=lambda r: r.frequency)
 
 
 def _is_separate_resonance(known: Sequence[Resonance], new: Resonance) -> bool:
-    """Whether it is apart from all known ones, and high enough against the one with the highest tail there."""
+    """Return whether a resonance is apart from all known ones and high enough against the highest tail there."""
     distance = np.array([abs(new.frequency - old.frequency) for old in known])
     apart = MIN_RESIDUAL_PEAK_DISTANCE * np.array([new.half_width + old.half_width for old in known])
     if np.any(distance <= apart):
@@ -121,9 +122,9 @@ def _check_frf(frf: Frf) -> None:
 
 
 def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
-    """Refuse a conjugate: the peaks of its accelerance turn the wrong way, and so do all lines together.
+    """Reject a conjugated FRF: the peaks of its accelerance turn the wrong way, and so do all lines together.
 
-    Not of the mobility, where the drift near 0 Hz would have the last word.
+    The mobility would not do: the drift near 0 Hz would decide.
     """
     falling = sum(p.resonance.frequency * p.resonance.height for p in peaks if p.turn < -MIN_PHASE_TURN)
     rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if MIN_PHASE_TURN < p.turn < MAX_PHASE_TURN)
@@ -131,15 +132,14 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
     if rising > falling and np.sum(phase_step) > 0:
         raise ConjugateError(
             "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
-            "complex conjugate of response over force: give Frf the conjugate of receptance (on the command line: "
-            "--conjugate)"
+            "complex conjugate of response over force: give Frf the conjugate of receptance (numpy.conj)"
         )
 
 
 def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
-    """Every peak of any running mean, from the longest mean that costs it no more height than noise explains.
+    """Find the peaks of all running means, each from the longest mean that costs no more height than noise explains.
 
-    least: height of the mobility below which none is looked at (m/s/N).
+    least: height of the mobility below which peaks are ignored (m/s/N).
     """
     noise, mobility = mobility_noise(frf), frf.mobility
     peaks: list[_Peak] = []
@@ -158,7 +158,7 @@ def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
 
 
 def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
-    """Box mean over this many lines, twice."""
+    """Apply a box mean over this many lines twice."""
     if length == 1:
         return values
     return np.asarray(scipy.ndimage.uniform_filter1d(scipy.ndimage.uniform_filter1d(values, length), length))
@@ -187,7 +187,7 @@ def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> l
 
 
 def _has_deep_valleys(size: Floats, tops: Indices) -> Flags:
-    """Whether the valley before a neighbour that is higher is deep enough, for each peak."""
+    """Return for each peak whether the valley before a higher neighbour is deep enough."""
     if tops.size < 2:
         return np.ones(tops.size, dtype=bool)
     height = size[tops]
@@ -201,18 +201,17 @@ def _has_deep_valleys(size: Floats, tops: Indices) -> Flags:
 
 
 def _higher_saddle(size: Floats, top: int, lowest: float) -> float:
-    """The higher of the lowest values between a peak and what is higher on either side, or the lowest of all."""
+    """Return the higher of the two saddles between a peak and higher values, or the lowest value of all."""
     return max(_lowest_before_higher_value(side, lowest) for side in (size[top::-1], size[top:]))
 
 
 def _lowest_before_higher_value(side: Floats, lowest: float) -> float:
-    """Lowest value between side[0] and the next higher one; the lowest of all where none is higher."""
+    """Return the lowest value between side[0] and the next higher one, or the lowest of all if none is higher."""
     higher = int(np.argmax(side > side[0]))
     return float(side[:higher].min()) if higher else lowest
 
 
 def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> _Peak:
-    """size: of the mobility."""
     f = frf.frequency
     below, above = _lines_to_half_power(size[top::-1]), _lines_to_half_power(size[top:])
     low, high = top - math.ceil(below), top + math.ceil(above)
@@ -227,14 +226,14 @@ def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: 
 
 
 def _peak_coherence(frf: Frf, lines: slice) -> float:
-    """1 where no coherence of meaning is known."""
+    """Return the mean coherence over a peak, 1 if the coherence is unknown."""
     if frf.coherence is None or not frf.has_random_error:
         return 1.0
     return float(np.mean(frf.coherence[lines]))
 
 
 def _lines_to_half_power(size: Floats) -> float:
-    """Lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
+    """Count the lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
     level = size[0] / np.sqrt(2)
     higher = np.flatnonzero(size > size[0])
     side = size[: higher[0]] if higher.size else size
@@ -246,9 +245,10 @@ def _lines_to_half_power(size: Floats) -> float:
 
 
 def mobility_noise(frf: Frf) -> Floats:
-    """rms of the noise on each line of the mobility, shape (n,): what is larger, its third differences or coherence.
+    """Estimate the noise rms on each line of the mobility (m/s/N), shape (n,).
 
-    Third differences do not see noise that is alike on neighbouring lines, as that of an overloaded sensor is.
+    The larger of two estimates: third differences and coherence. Third differences do not see noise that is alike
+    on neighbouring lines, as that of an overloaded sensor is.
     """
     factor = measured_over_receptance(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)

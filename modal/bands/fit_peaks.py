@@ -11,23 +11,23 @@ import numpy as np
 from modal.arrays import Flags, Floats
 from modal.bands.extraction import BandData, Extraction, FittedBand
 from modal.bands.find_resonances import Resonance
-from modal.fitting import MIN_RESIDUAL_TERMS, BandFit, fit_band, fit_real_constants, remove_residual_terms
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit
+from modal.fitting.fit_band import fit_band, fit_real_constants, remove_residual_terms
 from modal.poles import select_physical_poles
 
 JOINT_FIT_DISTANCE = 4.0
-"""Neighbours nearer than this many times the sum of their half-widths are fitted together."""
+"""Distance of neighbours fitted together, over the sum of their half-widths."""
 MAX_RESONANCES_PER_BAND = 6
-"""Most resonances that are fitted together: the time of a fit grows with their square, and more of them often do not
-settle."""
+"""Most resonances fitted together: the time grows with their square, and more often fail to converge."""
 BAND_MARGIN_HALF_WIDTHS = 8.0
-"""A local band ends this many half-widths beyond its outer resonances."""
+"""Half-widths that a band extends beyond its outer resonances."""
 MIN_BAND_MARGIN_LINES = 6
-"""Lines that a local band has at least on either side, where there are as many."""
+"""Fewest lines of a band on either side of its resonances."""
 
 
 @dataclass(frozen=True)
 class LocalBand:
-    """Resonances that are fitted together."""
+    """Resonances to be fitted together."""
 
     resonances: tuple[Resonance, ...]
     """Resonances by rising frequency."""
@@ -36,14 +36,14 @@ class LocalBand:
 
     @property
     def height(self) -> float:
-        """Of its highest resonance (m/s/N)."""
+        """Height of the highest resonance (m/s/N)."""
         return max(resonance.height for resonance in self.resonances)
 
 
 def group_into_bands(resonances: Sequence[Resonance], frequency: Floats) -> list[LocalBand]:
-    """Bands around close resonances; neighbouring ones meet between them, in proportion to their half-widths.
+    """Group close resonances into bands that meet between them in proportion to the half-widths.
 
-    resonances come by rising frequency, frequency (Hz) has shape (n,).
+    resonances come by rising frequency; frequency (Hz) has shape (n,).
     """
     groups = [part for group in _close_groups(resonances) for part in _split_group(group)]
     meetings = [_band_boundary(a[-1], b[0]) for a, b in pairwise(groups)]
@@ -63,7 +63,7 @@ def _close_groups(resonances: Sequence[Resonance]) -> Iterator[tuple[Resonance, 
 
 
 def _split_group(group: tuple[Resonance, ...]) -> Iterator[tuple[Resonance, ...]]:
-    """The group, or what is left of it when it is cut at its widest gaps until no part is too large."""
+    """Split a group at its widest gaps until no part is too large."""
     if len(group) <= MAX_RESONANCES_PER_BAND:
         yield group
         return
@@ -91,17 +91,17 @@ def _band_lines(group: tuple[Resonance, ...], below: float, above: float, freque
 
 
 MAX_PEAK_FIT_ERROR = 1 / 3
-"""Relative standard error of damping ratio and stiffness above which a peak is not a mode."""
+"""Largest relative standard error of damping ratio and stiffness of a mode with a peak."""
 MIN_MODE_PEAK_SHARE = 0.05
-"""Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
+"""Least mobility peak of a mode over its reference height; 1 dB of prominence needs twice this."""
 MAX_FITTED_DAMPING = 0.9
-"""Damping ratio up to which a mode oscillates visibly; the fit itself ends at 1."""
+"""Largest damping ratio of a mode that visibly oscillates; the fit itself ends at 1."""
 MAX_DIRECT_FIT_RESIDUAL = 0.05
-"""A fit from the peaks alone that leaves less than this share (rms) needs no LSCF poles to start from."""
+"""Largest relative residual (rms) of a fit started from the peaks that needs no LSCF poles."""
 
 
 def fit_peaks(data: BandData, resonances: Sequence[Resonance]) -> FittedBand | None:
-    """The resonances of a band, each from its own width, or from the LSCF pole nearest to it; None where none fits."""
+    """Fit the resonances of a band, started from their widths or from the nearest LSCF poles; None if none fits."""
     starts = np.array([(r.frequency, r.half_width / r.frequency) for r in resonances]).T
     height = np.array([r.height for r in resonances])
     fitted = _fit_valid_modes(data, starts, height, MIN_RESIDUAL_TERMS)
@@ -114,7 +114,7 @@ def fit_peaks(data: BandData, resonances: Sequence[Resonance]) -> FittedBand | N
 
 
 def refit_band(band: FittedBand, data: BandData) -> FittedBand | None:
-    """The modes of a band fitted to other data; None where none of them is left. Those that a person chose all stay."""
+    """Fit the modes of a band to other data; edited modes all stay, and None means that no mode is left."""
     if band.edits:
         poles, held = band.fit.poles, band.fit.held
         fit = fit_band(data.frequency, data.target, data.weight, poles, band.terms, held)
@@ -124,14 +124,14 @@ def refit_band(band: FittedBand, data: BandData) -> FittedBand | None:
 
 
 def refit_with_real_constants(band: FittedBand) -> FittedBand:
-    """The band with real modal constants, where they do."""
+    """Fit real modal constants if they describe the band as well."""
     data = band.data
     fit = fit_real_constants(band.fit, data.frequency, data.target, data.weight, band.terms)
     return replace(band, fit=fit) if np.all(are_modes(fit, data.frequency, band.height)) else band
 
 
 def are_modes(fit: BandFit, frequency: Floats, height: Floats, largest_error: float = MAX_PEAK_FIT_ERROR) -> Flags:
-    """Which lie in the band, are high enough, and are known well enough in one of the FRFs at least."""
+    """Return which fits lie in the band, are high enough, and are certain enough in one of the FRFs at least."""
     return np.asarray(
         (fit.frequency > frequency[0])
         & (fit.frequency < frequency[-1])
@@ -143,7 +143,7 @@ def are_modes(fit: BandFit, frequency: Floats, height: Floats, largest_error: fl
 
 
 def _nearest_poles(data: BandData, resonances: Sequence[Resonance], starts: Floats) -> Floats:
-    """Starts (2, m) with the highest LSCF pole within the half-width of each resonance, where there is one."""
+    """Replace start values (2, m) by the highest LSCF pole within the half-width of each resonance, if there is one."""
     poles, starts = select_physical_poles(data.chart), starts.copy()
     for i, resonance in enumerate(resonances):
         near = np.abs(poles.frequency - resonance.frequency) < resonance.half_width
@@ -154,19 +154,19 @@ def _nearest_poles(data: BandData, resonances: Sequence[Resonance], starts: Floa
 
 
 def _residual_share(fit: BandFit, data: BandData) -> float:
-    """What a fit leaves, as a share (rms) of what it was fitted to."""
+    """Return the residual rms over that of the data."""
     return float(np.sqrt(fit.sum_of_squares) / np.linalg.norm(data.target * data.weight))
 
 
 def _better_fit(a: tuple[BandFit, Floats] | None, b: tuple[BandFit, Floats] | None) -> tuple[BandFit, Floats] | None:
-    """The one with more modes, of two with as many that which leaves less."""
+    """Return the fit with more modes, or with the smaller residual."""
     return max(
         (fit for fit in (a, b) if fit is not None), key=lambda fit: (fit[1].size, -fit[0].sum_of_squares), default=None
     )
 
 
 def _fit_valid_modes(data: BandData, starts: Floats, height: Floats, terms: int) -> tuple[BandFit, Floats] | None:
-    """Fit after the weakest of those that turn out to be no modes are taken out, one by one."""
+    """Fit modes, removing the weakest one that is no valid mode until all are."""
     while height.size:
         fit = fit_band(data.frequency, data.target, data.weight, starts, terms)
         sure = np.zeros(height.size, bool) if fit is None else are_modes(fit, data.frequency, height)
@@ -178,24 +178,24 @@ def _fit_valid_modes(data: BandData, starts: Floats, height: Floats, terms: int)
 
 
 MAX_BAND_SWEEPS = 4
-"""Most rounds over the bands, each with the tails of the other bands' modes as they are then."""
+"""Most sweeps over the bands, each with the current tails of the other bands."""
 TAIL_CHANGE_TOLERANCE = 0.01
-"""Change of those tails beyond the residual terms, as a share of what the fit leaves, that is not worth another fit."""
+"""Change of the tails beyond the residual terms, over the residual, that needs no new fit."""
 
 
 def iterate_bands(state: Extraction) -> Extraction:
-    """Bands fitted again, where their weights are others, and until the tails of the others' modes stay as they are."""
+    """Refit bands whose weights changed, until the tails of the other bands no longer change."""
     for _ in range(MAX_BAND_SWEEPS):
         before = state.bands
         for band in before:
-            state = _replace_band(state, band, _refit_changed_band(state, band))
+            state = replace_band(state, band, _refit_changed_band(state, band))
         if all(new is old for new, old in zip(state.bands, before, strict=False)):
             break
     return state
 
 
 def _refit_changed_band(state: Extraction, band: FittedBand) -> FittedBand | None:
-    """A band fitted to what the modes of all others leave now; the same where that has not changed."""
+    """Fit a band to the data without the modes of all others; return it as it is if that has not changed."""
     data = state.data(band.lines, without=band)
     return (
         band if np.array_equal(data.weight, band.data.weight) and _has_converged(band, data) else refit_band(band, data)
@@ -203,13 +203,16 @@ def _refit_changed_band(state: Extraction, band: FittedBand) -> FittedBand | Non
 
 
 def _has_converged(band: FittedBand, data: BandData) -> bool:
-    """Whether the weighted data of a band has not changed by more than its residual terms take up."""
+    """Return whether the weighted data of a band has changed by no more than its residual terms take up."""
     off, most = data.target - band.data.target, TAIL_CHANGE_TOLERANCE * np.sqrt(band.fit.sum_of_squares)
     if np.linalg.norm(off * data.weight) < most:
         return True
     return bool(np.linalg.norm(remove_residual_terms(data.frequency, off, data.weight, band.terms)) < most)
 
 
-def _replace_band(state: Extraction, old: FittedBand, new: FittedBand | None) -> Extraction:
-    bands = (new if band is old else band for band in state.bands)
-    return state if new is old else replace(state, bands=tuple(band for band in bands if band is not None))
+def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:
+    """Replace a band, add a new one if `old` is None, or remove one if `new` is None."""
+    if new is old:
+        return state
+    bands = [*(band for band in state.bands if band is not old), *([] if new is None else [new])]
+    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))

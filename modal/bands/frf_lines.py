@@ -13,29 +13,29 @@ from modal.arrays import Floats
 
 
 def usable_lines(frf: Frf, band: tuple[float, float] | None) -> Frf:
-    """The lines above 0 Hz that lie in the usable band, where the FRF has one, and in band (Hz).
+    """Select the lines above 0 Hz inside the usable band of the FRF and inside `band` (Hz).
 
-    Raises ValueError where fewer than two are left.
+    Raises ValueError if fewer than two lines remain.
     """
     above_zero = frf.in_band((frf.frequency[1], frf.frequency[-1])) if frf.frequency[0] == 0 else frf
     return above_zero.in_band(frf.usable_band).in_band(band)
 
 
 VARIANCE_SMOOTHING_LINES = 25
-"""Lines over which the variance is averaged, so that a line that is small by chance does not count for more."""
+"""Lines that the variance is averaged over, so that a line that is small by chance does not gain weight."""
 DISTURBED_LINE_RATIO = 8.0
-"""Times the median about it that the variance of an undisturbed line never reaches."""
+"""Variance of a disturbed line over the median around it, at least."""
 MAX_USUAL_AVERAGES = 10
-"""Hits that few people average more of."""
+"""Number of averages assumed if it is unknown."""
 MIN_VARIANCE_SHARE = 1e-6
-"""Share of the mean variance below which no line is believed."""
+"""Least variance of a line over the mean variance."""
 
 
 def line_weights(frf: Frf) -> Floats:
-    """Weights of the receptance, 1/rms of its noise up to a factor, shape (n,).
+    """Return the weights of the receptance, 1/rms of its noise up to a factor, shape (n,).
 
-    The noise is that of the coherence where there are three averages or more (random error times |H|, squared and
-    averaged over neighbouring lines). Else it is taken as equal on all lines of the quantity that was measured.
+    With three averages or more the noise follows from the coherence (random error times |H|, squared and
+    averaged over neighbouring lines). Otherwise it is equal on all lines of the measured quantity.
     """
     factor = measured_over_receptance(frf)
     error = frf.random_error
@@ -47,9 +47,9 @@ def line_weights(frf: Frf) -> Floats:
 
 
 def incoherent_noise(frf: Frf) -> Floats:
-    """rms of the noise of what was measured that its coherence tells, shape (n,); 0 where it tells nothing.
+    """Return the noise rms of the measured quantity from its coherence, shape (n,), or 0 without coherence.
 
-    A coherence below 1 is that of several hits: of ten, where nobody said how many.
+    An unknown number of averages counts as ten.
     """
     if frf.coherence is None:
         return np.zeros(frf.frequency.size)
@@ -60,7 +60,7 @@ def incoherent_noise(frf: Frf) -> Floats:
 
 
 def _smooth_variance(variance: Floats) -> Floats:
-    """Running mean that a disturbed line (hum) does not spread over; such a line keeps its own variance."""
+    """Smooth the variance over lines, leaving out disturbed lines (hum), which keep their own."""
     most = DISTURBED_LINE_RATIO * scipy.ndimage.median_filter(variance, VARIANCE_SMOOTHING_LINES)
     return np.where(
         variance > most, variance, scipy.ndimage.uniform_filter1d(np.minimum(variance, most), VARIANCE_SMOOTHING_LINES)
@@ -68,23 +68,23 @@ def _smooth_variance(variance: Floats) -> Floats:
 
 
 def measured_over_receptance(frf: Frf) -> Floats:
-    """|measured quantity| over |receptance|: 1, omega or omega^2 by line, shape (n,)."""
+    """Return |measured quantity| over |receptance| by line: 1, omega or omega^2, shape (n,)."""
     power = {"receptance": 0, "mobility": 1, "accelerance": 2}[frf.measured_as]
     return np.asarray((2 * np.pi * frf.frequency) ** power)
 
 
 MIN_DRIFT_LINES = 12
-"""Lines that a drift is told from."""
+"""Fewest lines that a drift is fitted to."""
 MAX_DRIFT_FREQUENCY_SHARE = 1 / 16
-"""Share of the highest frequency below which it is looked for."""
+"""Share of the highest frequency below which a drift is searched."""
 MAX_DRIFT_SCATTER = 0.1
-"""Share of the drift that half of these lines may differ by; more is no drift."""
+"""Largest median scatter of a drift, relative to it."""
 DRIFT_ROUNDING_SHARE = 1e-9
-"""Share of the FRF below which nothing but drift is left."""
+"""Share of the FRF below which nothing but drift is without_drift."""
 
 
 def remove_drift(frf: Frf) -> Frf:
-    """Without A/f^2, A complex, where the range of low lines that is most like it is no more than that; else as it is.
+    """Subtract the drift A/f^2 (A complex) of an accelerometer at rest, if the low lines show one.
 
     A constant error of an accelerance is such a drift of the receptance, of any phase; against the phase of a mode it
     turns the peak into a dip. Behind a high-pass filter it begins above the lowest lines.
@@ -93,21 +93,23 @@ def remove_drift(frf: Frf) -> Frf:
     scatter, drift = min(drifts, key=lambda candidate: candidate[0], default=(np.inf, 0.0))
     if scatter > MAX_DRIFT_SCATTER:
         return frf
-    left = frf.receptance - drift / frf.frequency**2
+    without_drift = frf.receptance - drift / frf.frequency**2
     return (
-        replace(frf, receptance=left) if np.any(np.abs(left) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance)) else frf
+        replace(frf, receptance=without_drift)
+        if np.any(np.abs(without_drift) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance))
+        else frf
     )
 
 
 def _fit_drift(frf: Frf, lines: slice) -> tuple[float, complex]:
-    """What A is on these lines, after the share of it that half of them differ by."""
+    """Return the relative scatter of A over some lines, and A."""
     constants = frf.receptance[lines] * frf.frequency[lines] ** 2
     middle = complex(np.median(constants.real), np.median(constants.imag))
     return (float(np.median(np.abs(constants - middle)) / abs(middle)) if middle else np.inf), middle
 
 
 def _low_octaves(frf: Frf) -> Iterator[slice]:
-    """Octaves of the low lines from the lowest up, none of fewer lines than a drift is told from."""
+    """Yield octaves of the low lines from the lowest up, each with enough lines for a drift."""
     f, start = frf.frequency, 0
     while start < f.size and f[start] < MAX_DRIFT_FREQUENCY_SHARE * f[-1]:
         end = max(int(np.searchsorted(f, 2 * f[start])), start + MIN_DRIFT_LINES)

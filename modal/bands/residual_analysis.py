@@ -9,32 +9,33 @@ import numpy as np
 
 from modal.arrays import Complexes, Flags, Floats
 from modal.bands.extraction import FittedBand
-from modal.fitting import MAX_RESIDUAL_TERMS, BandFit, refit_nearby
+from modal.fitting.band_fit import MAX_RESIDUAL_TERMS, BandFit
+from modal.fitting.fit_band import refit_nearby
 
 RESIDUAL_BLOCKS = 48
-"""Runs of lines that the means of what a fit leaves are looked at in."""
+"""Blocks of lines whose mean residuals are compared with white noise."""
 MAX_WHITENESS_EXCESS = 1.0
-"""Standard deviations that their size may lie above what independent errors have."""
+"""Standard deviations that the block means of a white residual may exceed their expected size by."""
 
 
 def has_white_residual(fit: BandFit) -> bool:
-    """Whether the means of neighbouring lines are as small as those of independent errors."""
-    left = fit.complex_residual
-    length = max(2, left.shape[1] // RESIDUAL_BLOCKS)
-    blocks = left[:, : left.shape[1] // length * length].reshape(len(left), -1, length)
+    """Return whether the means of neighbouring residuals are as small as those of independent errors."""
+    residual = fit.complex_residual
+    length = max(2, residual.shape[1] // RESIDUAL_BLOCKS)
+    blocks = residual[:, : residual.shape[1] // length * length].reshape(len(residual), -1, length)
     size = np.sum(np.abs(blocks.mean(axis=2)) ** 2) * length
-    expected = fit.sum_of_squares / left.size * blocks[..., 0].size
+    expected = fit.sum_of_squares / residual.size * blocks[..., 0].size
     return bool(size < expected * (1 + MAX_WHITENESS_EXCESS / np.sqrt(blocks[..., 0].size)))
 
 
 def passes_f_test(more: BandFit, fewer: BandFit, least: float) -> bool:
-    """Whether the sum of squares falls by more than `least` times what the further unknowns take off by chance."""
+    """Return whether further unknowns lower the sum of squares by more than `least` times what chance would."""
     gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.degrees_of_freedom - more.degrees_of_freedom, 1)
     return gain > least * more.sum_of_squares / more.degrees_of_freedom
 
 
 def has_lower_aic(fit: BandFit, other: BandFit) -> bool:
-    """By the information criterion of Akaike (sum of squares and number of unknowns)."""
+    """Return whether a fit has the lower Akaike information criterion."""
     variance = min(candidate.sum_of_squares / candidate.degrees_of_freedom for candidate in (fit, other))
     return (
         fit.sum_of_squares - 2 * variance * fit.degrees_of_freedom
@@ -43,11 +44,11 @@ def has_lower_aic(fit: BandFit, other: BandFit) -> bool:
 
 
 NEAR_MODE_HALF_WIDTHS, MIN_NEAR_MODE_LINES = 3.0, 16
-"""It counts within so many half-widths of the mode, and on so many lines at least."""
+"""Half-widths around a mode, and lines at least, that its own residual is taken from."""
 
 
 def residual_near_mode(band: FittedBand, i: int) -> tuple[float, float]:
-    """rms of the residual about mode i as a share of its peak, and over that of the noise (from third differences)."""
+    """Return the residual rms near mode i over its peak, and over the noise rms from third differences."""
     fit, weight = band.fit, band.data.weight
     distance = np.abs(band.data.frequency - fit.frequency[i])
     reach = max(
@@ -63,50 +64,51 @@ def residual_near_mode(band: FittedBand, i: int) -> tuple[float, float]:
 
 
 def residual_noise(fit: BandFit) -> float:
-    """rms of the noise in the weighted FRFs of a band, from third differences of what the fit leaves."""
+    """Return the noise rms in the weighted FRFs of a band, from third differences of the residual."""
     return float(np.median(np.abs(np.diff(fit.complex_residual, 3))) / np.sqrt(20 * np.log(2)))
 
 
 MIN_CORRELATION_SIGNIFICANCE = 3.0
-"""Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
+"""Multiple of 1/sqrt(lines) by which the share of independent values is below 1 if the residual is correlated.
+
+White noise reaches it once in 700 cases.
+"""
 HIDDEN_ERROR_FACTOR = 4.0
-"""Standard error that may hide in what is left about a mode, over the part that is no noise as a share of its peak."""
+"""Standard error of a mode over the non-noise part of its residual, as a share of its peak."""
 MAX_UNEVEN_NOISE_RATIO = 2.0
-"""Times the noise that may be left about a mode where noise is uneven, and nothing else is there."""
+"""Residual over noise near a mode that uneven noise alone may cause."""
 RESIDUAL_ROUNDING_SHARE = 1e-7
-"""Share of what was measured below which a residual means nothing."""
+"""Share of the measured values below which a residual is rounding."""
 REDUCED_RESIDUAL_TERMS = 2
-"""Residual terms that the fit is tried without again; without more it may follow no mode at all."""
+"""Number of residual terms left out in trial fits; with fewer terms the fit may follow no mode at all."""
 TRIAL_LINE_RANGES = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
-"""Of the lines of a band, that the fit is tried on again ..."""
+"""Ranges of the lines of a band used in trial fits, as shares."""
 TRIAL_PEAK_HALF_WIDTHS = 2.0
-"""... for the modes of which they hold all lines within so many half-widths; others have no peak there."""
+"""Half-widths around a mode that a trial range must hold completely; else the peak is cut."""
 
 
 @dataclass(frozen=True, eq=False)
 class SystematicError:
-    """What is to be added to the errors of a band."""
+    """Errors to be added to those of a band because its residual is not white noise."""
 
     factor: float
-    """Factor on the covariance from the residual: real values fitted over those that count as independent; 1 where
-    white."""
+    """Factor on the covariance from the residual: real values over independent values; 1 for white noise."""
     degrees_of_freedom: float
-    """Degrees of freedom that are left."""
+    """Remaining degrees of freedom."""
     covariance: Floats
-    """Covariance of the errors in the order of `BandFit`, by how far other bands and residual terms move them; 0 where
-    white."""
+    """Covariance of the errors in the order of `BandFit`, from trial fits; 0 for white noise."""
 
 
 def systematic_error(band: FittedBand) -> SystematicError:
-    """Errors beyond those of white noise, where the residual of a band is coloured; none where it is white.
+    """Estimate the errors beyond those of white noise, if the residual of a band is correlated.
 
     Structure that the model lacks leaves a residual that is alike over many lines. As many of its values are
     independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
-    What such structure shifts in the modes the residual does not show: each band is fitted again with fewer and more
-    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most; a part
-    that cuts a peak says nothing of that mode. What is left about a mode beyond twice the noise, in squares, as a share
+    The residual does not show how far such structure shifts the modes. So each band is fitted again with fewer and more
+    residual terms and on parts of its lines. Each value gets the largest shift as its error; a part that cuts a peak
+    does not count for that mode. The residual near a mode beyond twice the noise, in squares, as a share
     of its peak, may hide an error of four times that share of its half-width, its damping ratio and its size, whatever
-    its colour: by that the same hits differ on several sensors.
+    its correlation: several sensors of the same hits differ by that.
     """
     fit = band.fit
     hidden = _hidden_error(band)
@@ -126,8 +128,7 @@ def systematic_error(band: FittedBand) -> SystematicError:
 
 
 def _hidden_error(band: FittedBand) -> Floats:
-    """Errors that may hide in what the fit leaves about each mode, where it is more than noise, in the order of
-    `BandFit`: as shares of half-width, damping ratio and size."""
+    """Return the errors that the residual near each mode may hide, in the order of `BandFit`."""
     fit, left = band.fit, [residual_near_mode(band, i) for i in range(band.fit.frequency.size)]
     of_peak, of_noise = np.array(left).T
     share = (
@@ -142,29 +143,28 @@ def _hidden_error(band: FittedBand) -> Floats:
 
 
 def has_rounding_residual(band: FittedBand) -> bool:
-    """Whether its fit leaves so little that it means nothing."""
+    """Return whether the residual is no more than rounding."""
     scale = np.linalg.norm(band.data.target * band.data.weight)
     return bool(band.fit.sum_of_squares < (RESIDUAL_ROUNDING_SHARE * scale) ** 2)
 
 
 def _count_independent_values(fit: BandFit) -> float:
-    """How many of the real values that a fit leaves are independent; about all of them for white noise."""
+    """Estimate how many of the real residuals are independent; about all of them for white noise."""
     power = np.abs(np.fft.fft(fit.complex_residual, axis=1)) ** 2
     return float(4 * power.sum() ** 2 / np.sum(power**2)) if power.any() else float(fit.residual.size)
 
 
 def _trial_changes(band: FittedBand) -> Iterator[Floats]:
-    """Changes of the same modes with other residual terms, and on parts of the lines, in the order of `BandFit`; 0 of
-    those that a part cuts."""
+    """Yield the changes of the modes in trial fits, in the order of `BandFit`; 0 for modes whose peak a trial cuts."""
     fit, data, n = band.fit, band.data, band.data.frequency.size
     everything = slice(0, n)
-    tries = [
+    trials = [
         (everything, terms)
         for terms in range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
         if terms != band.terms
     ]
     for part, terms in [
-        *tries,
+        *trials,
         *((slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES),
     ]:
         values = refit_nearby(fit, data.frequency[part], data.target[:, part], data.weight[:, part], terms)
@@ -174,13 +174,12 @@ def _trial_changes(band: FittedBand) -> Iterator[Floats]:
 
 
 def _is_peak_cut(fit: BandFit, left_out: Floats) -> Flags:
-    """Whether lines (Hz) that are left out belong to the peak of each mode, (m,)."""
+    """Return for each mode whether lines that are left out (Hz) belong to its peak, shape (m,)."""
     distance = np.abs(left_out[:, np.newaxis] - fit.frequency)
     return np.asarray(np.any(distance < TRIAL_PEAK_HALF_WIDTHS * np.prod(fit.poles, axis=0), axis=0))
 
 
 def _change_of_values(fit: BandFit, poles: Floats, constant: Complexes) -> Floats:
-    """Change to other values, in the order of `BandFit`."""
     turn = np.exp(-1j * np.angle(fit.constant))
     off = (constant - fit.constant) * turn
     return np.concatenate([(poles - fit.poles).ravel(), off.real.ravel(), off.imag.ravel()])

@@ -1,5 +1,1 @@
-"""Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""Least-squares fit of a few neighbouring modes in one FRF, or in several with common poles."""

@@ -11,14 +11,14 @@ import numpy as np
 from modal.arrays import Complexes, Flags, Floats
 
 MIN_SINGULAR_VALUE_SHARE = 1e-10
-"""Share of the largest singular value below which an unknown cannot be told from the others."""
+"""Least singular value, over the largest, of an unknown that can be separated from the others."""
 
 
 @dataclass(frozen=True, eq=False)
 class FixedPoleFit:
-    """Modes of p FRFs at given poles.
+    """Fit of the modal constants of p FRFs at given poles.
 
-    c unknowns of each FRF are its modal constants: m real parts, and m imaginary ones where they are complex; k poles
+    Each FRF has c unknowns, its modal constants: m real parts, and m imaginary parts if they are complex. k poles
     may move.
     """
 
@@ -27,22 +27,24 @@ class FixedPoleFit:
     free: Flags
     """Whether each of them may move, (2 m,)."""
     q: Floats
-    """Orthonormal bases of what the residual terms leave of the modes, (p, 2 n, c)."""
+    """Orthonormal bases of the modes without their part in the residual terms, (p, 2 n, c)."""
     inverse: Floats
-    """Inverses of their triangles, (p, c, c)."""
+    """Inverses of the triangular factors, (p, c, c)."""
     linear: Floats
     """Best modal constants, (p, c)."""
     left: Floats
-    """Weighted data that is left, (p, 2 n)."""
+    """Weighted residuals, (p, 2 n)."""
     unknowns: int
     """Modal constants and residual terms of all FRFs, real and imaginary parts."""
     squares: Floats
-    """What the residual terms leave of the squares of partial fractions of each mode, (p, 2, m, 2 n): their slopes by
-    its pole for residues that are real, and imaginary."""
+    """Squared partial fractions of each mode without residual terms, (p, 2, m, 2 n).
+
+    They are the slopes by the pole for real and for imaginary residues.
+    """
 
     @cached_property
     def cost(self) -> float:
-        """Sum of squares; infinite for what are no poles."""
+        """Sum of squares; infinite for illegal poles."""
         cost = float(self.residual @ self.residual)
         is_legal = self.poles.min() > 0 and self.poles[1].max() < 1
         return cost if is_legal and math.isfinite(cost) else np.inf
@@ -54,20 +56,21 @@ class FixedPoleFit:
 
     @property
     def scale(self) -> Floats:
-        """What a step of one means: zeta f and zeta of those that may move, (k,)."""
+        """Scale of a step, zeta f and zeta of the free values, (k,)."""
         return np.concatenate([self.poles[0] * self.poles[1], self.poles[1]])[self.free]
 
     @property
     def residual(self) -> Floats:
-        """Of all FRFs, (2 n p,)."""
+        """Residuals of all FRFs, (2 n p,)."""
         return self.left.reshape(-1)
 
     @cached_property
     def slope(self) -> Floats:
-        """Slope of the models by what may move, frequencies in zeta f, damping ratios in shares of themselves, while
-        their residues A f / (2i sqrt(1 - zeta^2)) stay, (p, k, 2 n).
+        """Slope of the models by the free values at constant residues A f / (2i sqrt(1 - zeta^2)), (p, k, 2 n).
 
-        Only these differ from FRF to FRF: the squares that they multiply are worked out once.
+        Frequencies in units of zeta f, damping ratios relative to themselves. Only the constants differ from FRF to
+        FRF:
+        the squares are computed once.
         """
         zeta = self.poles[1]
         turning = np.sqrt(1 - zeta**2)
@@ -79,14 +82,14 @@ class FixedPoleFit:
         return np.asarray(every if self.free.all() else every[:, self.free])
 
     @cached_property
-    def _follow(self) -> Floats:
-        """What the constants take up of the slopes, in their bases, (p, k, c)."""
+    def _constant_slopes(self) -> Floats:
+        """Part of the slopes that the constants take up, in their bases, (p, k, c)."""
         return np.asarray(self.slope @ self.q)
 
     @cached_property
     def by_frf(self) -> Floats:
-        """Slope of the residual by the scaled poles, the constants following (Kaufman), FRF by FRF, (p, k, 2 n)."""
-        taken = self._follow @ self.q.mT
+        """Slope of the residual by the scaled poles with optimal constants (Kaufman), by FRF, (p, k, 2 n)."""
+        taken = self._constant_slopes @ self.q.mT
         return np.asarray(np.subtract(taken, self.slope, out=taken))
 
     @cached_property
@@ -111,14 +114,14 @@ class FixedPoleFit:
         return np.asarray(linear + 0j if linear.shape[1] == m else linear[:, :m] + 1j * linear[:, m:])
 
     def spread(self, values: Floats) -> Floats:
-        """Values (k, ...) of what may move, with 0 for all that may not, (2 m, ...)."""
+        """Return values (k, ...) of the free unknowns, with 0 for the fixed ones, (2 m, ...)."""
         everything = np.zeros((self.free.size, *values.shape[1:]))
         everything[self.free] = values
         return everything
 
     @cached_property
     def _solution(self) -> tuple[Floats, Floats]:
-        """Norms of the columns of the Jacobian, (k,), and inverse of its triangle when they are one, (k, k)."""
+        """Norms of the Jacobian columns, (k,), and inverse of the triangle of the scaled Jacobian, (k, k)."""
         norm = np.linalg.norm(self.jacobian, axis=1)
         triangle = np.linalg.qr(self.jacobian.T / norm, mode="r")
         left, singular, right = np.linalg.svd(triangle)
@@ -127,7 +130,7 @@ class FixedPoleFit:
         return norm, (right.T / singular) @ left.T
 
     def gain(self, rows: Floats) -> float:
-        """Fall of the cost, to first order, with a further linear unknown for each row of each FRF, (p, rows, 2 n)."""
+        """Return the first-order drop of the cost by one more linear unknown per row of each FRF, (p, rows, 2 n)."""
         norm, inverse = self._solution
         new = rows - rows @ self.q @ self.q.mT
         taken = (new @ (self.by_frf.mT / norm @ inverse)).reshape(-1, norm.size)
@@ -138,72 +141,72 @@ class FixedPoleFit:
         return float(fall @ np.linalg.lstsq(size, fall, rcond=None)[0])
 
     @cached_property
-    def _turned(self) -> Floats:
-        """Constants along themselves and across, from the bases, (p, 2, m, c); c = 2 m."""
+    def _rotated_constants(self) -> Floats:
+        """Size and phase direction of the constants in the bases, (p, 2, m, c); c = 2 m."""
         constant, m = self.constant[..., np.newaxis], self.poles.shape[1]
         off = constant.conj() / np.abs(constant) * (self.inverse[:, :m] + 1j * self.inverse[:, m:])
         return np.stack([off.real, off.imag], axis=1)
 
     @cached_property
-    def _by_poles(self) -> Floats:
+    def _pole_errors(self) -> Floats:
         """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
-        by_poles = -(self._turned @ self._follow.mT[:, np.newaxis]).swapaxes(0, 1)
-        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._own
+        by_poles = -(self._rotated_constants @ self._constant_slopes.mT[:, np.newaxis]).swapaxes(0, 1)
+        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._residue_slopes
         return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
 
     @property
-    def _own(self) -> Floats:
-        """Shares of itself by which each residue changes with its own pole while the constant stays, (m, k)."""
+    def _residue_slopes(self) -> Floats:
+        """Relative change of each residue with its own pole at a fixed constant, (m, k)."""
         zeta = self.poles[1]
         return np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
 
     @cached_property
     def covariance(self) -> Floats:
-        """Of the errors of a complex fit by independent ones of variance 1, (2 m + 2 p m, 2 m + 2 p m).
+        """Covariance of the errors of a complex fit for independent noise of variance 1, (2 m + 2 p m, 2 m + 2 p m).
 
-        Raises LinAlgError where an unknown cannot be told from the others.
+        Raises LinAlgError if an unknown cannot be separated from the others.
         """
         norm, inverse = self._solution
-        moved = self._by_poles @ (inverse / norm[:, np.newaxis])
-        covariance, (p, _, m, _) = moved @ moved.T, self._turned.shape
+        moved = self._pole_errors @ (inverse / norm[:, np.newaxis])
+        covariance, (p, _, m, _) = moved @ moved.T, self._rotated_constants.shape
         at_once = covariance[2 * m :, 2 * m :].reshape(2, p, m, 2, p, m)
         each = np.arange(p)
-        at_once[:, each, :, :, each] += np.einsum("pamc,pbnc->pambn", self._turned, self._turned)
+        at_once[:, each, :, :, each] += np.einsum("pamc,pbnc->pambn", self._rotated_constants, self._rotated_constants)
         return covariance
 
     @cached_property
     def influence(self) -> Floats:
-        """Of the weighted FRFs on the errors of a complex fit, one Gauss-Newton step, (2 m + 2 p m, 2 n p)."""
+        """Influence of the weighted FRFs on the errors of a complex fit, a Gauss-Newton step, (2 m + 2 p m, 2 p n)."""
         norm, inverse = self._solution
-        p, _, m, _ = self._turned.shape
+        p, _, m, _ = self._rotated_constants.shape
         steps = (inverse / norm[:, np.newaxis]) @ inverse.T @ (self.jacobian / norm[:, np.newaxis])
-        influence = -self._by_poles @ steps
+        influence = -self._pole_errors @ steps
         at_once = influence[2 * m :].reshape(2, p, m, p, -1)
         each = np.arange(p)
-        at_once[:, each, :, each] += self._turned @ self.q.mT[:, np.newaxis]
+        at_once[:, each, :, each] += self._rotated_constants @ self.q.mT[:, np.newaxis]
         return influence
 
 
 RESIDUAL_POWERS = (-2, 0, 2, 4, 6, 8)
-"""Of the frequency, in the order in which residual terms are taken."""
+"""Powers of the frequency in the order of the residual terms."""
 MIN_RESIDUAL_TERMS = 4
-"""Complex residual terms that every band has."""
+"""Number of complex residual terms of every band."""
 MAX_RESIDUAL_TERMS = len(RESIDUAL_POWERS)
-"""Complex residual terms that a band has at most."""
+"""Largest number of complex residual terms of a band."""
 
 
 def residual_powers(frequency: Floats, terms: int) -> Floats:
-    """The first powers of the frequency, shape (terms, n)."""
+    """Return the first powers of the frequency, shape (terms, n)."""
     square = (frequency / np.mean(frequency)) ** 2
     return np.stack([square ** (power // 2) for power in RESIDUAL_POWERS[:terms]])
 
 
 @dataclass(frozen=True, eq=False)
 class BandFit:
-    """Values of m modes that were fitted together in p FRFs.
+    """Fit of m modes together in p FRFs.
 
-    Errors come in the order: all frequencies, all damping ratios, then FRF by FRF what every modal constant is off
-    along itself (its size), then FRF by FRF what it is off across (its phase, times its size): 2 m + 2 p m values.
+    Order of the errors: all frequencies, all damping ratios, then by FRF the size error of each modal constant, then by
+    FRF its phase error (times its size): 2 m + 2 p m values.
     """
 
     frequency: Floats
@@ -211,26 +214,26 @@ class BandFit:
     damping_ratio: Floats
     """Damping ratios (-), shape (m,)."""
     constant: Complexes
-    """Modal constants A (m/N), shape (p, m); all of them real where complex ones were not asked for."""
+    """Modal constants A (m/N), shape (p, m); all real after a real fit."""
     degrees_of_freedom: int
     """Real values that were fitted less unknowns."""
     complex_fit: FixedPoleFit
-    """The fit with complex constants, whose errors are those of the modes."""
+    """Fit with complex constants, which the errors come from."""
     residual: Floats
     """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     phase_if_complex: Floats
-    """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
+    """Phases (rad) that complex constants would have, of a real fit, shape (p, m); else 0."""
     held: Flags
     """Modes whose frequency and damping ratio were given and have no error, shape (m,)."""
 
     @cached_property
     def covariance(self) -> Floats:
-        """Of the errors, by what the fit leaves, shape (2 m + 2 p m, 2 m + 2 p m)."""
+        """Covariance of the errors from the residual, shape (2 m + 2 p m, 2 m + 2 p m)."""
         return self.complex_fit.covariance * (self.sum_of_squares / self.degrees_of_freedom)
 
     @property
     def influence(self) -> Floats:
-        """Errors by a change of the weighted FRFs, one Gauss-Newton step, shape (2 m + 2 p m, 2 n p)."""
+        """Influence of the weighted FRFs on the errors, one Gauss-Newton step, shape (2 m + 2 p m, 2 n p)."""
         return self.complex_fit.influence
 
     @property
@@ -240,12 +243,12 @@ class BandFit:
 
     @property
     def size_error(self) -> Floats:
-        """Standard errors of the sizes of the modal constants, relative to them, shape (p, m)."""
+        """Relative standard errors of the sizes of the modal constants, shape (p, m)."""
         return np.asarray(self.standard_error[2 : 2 + len(self.constant)] / np.abs(self.constant))
 
     @property
     def complex_residual(self) -> Complexes:
-        """The residual line by line, shape (p, n)."""
+        """Residual line by line, shape (p, n)."""
         parts = self.residual.reshape(len(self.constant), 2, -1)
         return np.asarray(parts[:, 0] + 1j * parts[:, 1])
 
@@ -261,21 +264,21 @@ class BandFit:
 
     @property
     def sum_of_squares(self) -> float:
-        """Of the weighted residuals."""
+        """Sum of the squared weighted residuals."""
         return float(self.residual @ self.residual)
 
     def influence_of(self, i: int) -> Floats:
-        """The part of the influence that belongs to FRF i, shape (2 m + 2 p m, 2 n)."""
+        """Return the influence of FRF i, shape (2 m + 2 p m, 2 n)."""
         return np.hsplit(self.influence, len(self.constant))[i]
 
     def of_mode(self, i: int, frequency: Floats) -> Complexes:
-        """Mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""
+        """Return the receptance of mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""
         return replace(
             self, frequency=self.frequency[[i]], damping_ratio=self.damping_ratio[[i]], constant=self.constant[:, [i]]
         ).receptance(frequency)
 
     def receptance(self, frequency: Floats) -> Complexes:
-        """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
+        """Return the receptance of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
         fn, zeta = self.poles[:, :, np.newaxis]
         r = frequency / fn
         turn = self.constant.imag / np.sqrt(1 - zeta[:, 0] ** 2)
@@ -285,5 +288,5 @@ class BandFit:
 
 
 def split_complex(values: Complexes) -> Floats:
-    """Real, then imaginary parts along the last axis."""
+    """Join real and imaginary parts along the last axis."""
     return np.concatenate([values.real, values.imag], axis=-1)

@@ -15,22 +15,22 @@ from modal.arrays import Complexes, Flags, Floats
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit, FixedPoleFit, residual_powers, split_complex
 
 MIN_CURVE_SEPARATION = 1e-2
-"""Share of itself that each curve has beyond all others where normal equations lose no more than four digits."""
+"""Least independent part of each curve for which normal equations lose no more than four digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProjectedBand:
-    """Weighted FRFs of a band, and the modes that they are fitted with."""
+    """Weighted FRFs of a band without residual terms."""
 
     frequency: Floats
     weight: Floats
     """Weights, (p, n)."""
     bases: Floats
-    """Orthonormal bases of the residual terms of each FRF, the same of real and imaginary parts, (p, n, terms)."""
+    """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (p, n, terms)."""
     data: Floats
-    """Values that they leave of each weighted FRF, (p, 1, 2 n)."""
+    """Weighted FRFs without residual terms, (p, 1, 2 n)."""
     held: Flags
-    """Modes whose poles stay where they are, (m,)."""
+    """Modes with fixed poles, (m,)."""
 
     @cached_property
     def _free(self) -> Flags:
@@ -39,7 +39,7 @@ class ProjectedBand:
 
     @cached_property
     def _root(self) -> Complexes:
-        """i f, (n,)."""
+        """Values i f, (n,)."""
         return np.asarray(1j * self.frequency)
 
     @cached_property
@@ -48,7 +48,7 @@ class ProjectedBand:
         return np.tile(self.weight, 2)[:, np.newaxis]
 
     def at(self, poles: Floats, is_complex: bool) -> FixedPoleFit:
-        """The best modal constants at these poles, (2, m)."""
+        """Fit the modal constants at these poles, (2, m)."""
         m = poles.shape[1]
         rows = _project_out(self.bases, self._both * _model_rows(self._root, poles))
         q, inverse = _orthonormal(rows[:, : 2 * m if is_complex else m])
@@ -61,7 +61,10 @@ class ProjectedBand:
 
 
 def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: Flags) -> ProjectedBand:
-    """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,)."""
+    """Remove the residual terms from the weighted FRFs of a band.
+
+    frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,).
+    """
     bases = _term_bases(frequency, weight, terms)
     return ProjectedBand(
         frequency, weight, bases, _project_out(bases, split_complex(weight * receptance)[:, np.newaxis]), held
@@ -69,21 +72,21 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
 
 
 def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
-    """What residual terms leave of weighted receptances, (p, 2 n); arguments as `project_band`."""
+    """Return weighted receptances without residual terms, (p, 2 n); arguments as `project_band`."""
     return _project_out(_term_bases(frequency, weight, terms), split_complex(weight * receptance)[:, np.newaxis])[:, 0]
 
 
 def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
-    """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
+    """Return the first-order drop of the sum of squares by one more residual term in each FRF."""
     power = residual_powers(frequency, terms + 1)[-1]
     return _linear_gain(fit, frequency, weight, terms, np.stack([power, 1j * power]))
 
 
 def mode_pair_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int, i: int) -> float:
-    """Fall of the sum of squares, to first order, that two modes close together in place of mode i would bring.
+    """Return the first-order drop of the sum of squares by two close modes in place of mode i.
 
     Two poles at lambda - d and lambda + d add the second derivative of R / (i w - lambda) by lambda, which goes with
-    its third power; what is odd in d the pole of the one mode follows.
+    its third power. The pole of the single mode follows what is odd in d.
     """
     fn, zeta = fit.poles[:, i]
     pole, r = complex(-zeta, np.sqrt(1 - zeta**2)), 1j * frequency / fn
@@ -102,9 +105,9 @@ def _term_bases(frequency: Floats, weight: Floats, terms: int) -> Floats:
 
 
 def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
-    """Orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse of their triangle, (p, c, c).
+    """Return orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse triangle, (p, c, c).
 
-    By Cholesky, in half the time, where no row is all but a sum of the others, so that this is as exact.
+    By Cholesky, in half the time, if no row is nearly a sum of the others, which makes it as exact.
     """
     gram = rows @ rows.mT
     with contextlib.suppress(np.linalg.LinAlgError):
@@ -118,7 +121,7 @@ def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
 
 
 def _model_rows(root: Complexes, poles: Floats) -> Floats:
-    """Modes of constants 1, of constants i, and their slopes by both parts of the pole, (4 m, 2 n); root is i f, (n,).
+    """Return modes of constants 1 and i, and their slopes by both parts of the pole, (4 m, 2 n); root is i f, (n,).
 
     With lambda in Hz, h = g / (i f - lambda), g = f_n / (2 sqrt(1 - zeta^2)), and h' for its conjugate: -i (h - h'),
     h + h', h^2 + h'^2 and i (h^2 - h'^2).
@@ -134,29 +137,31 @@ def _model_rows(root: Complexes, poles: Floats) -> Floats:
 
 
 def _project_out(bases: Floats, values: Floats) -> Floats:
-    """Values (p, k, 2 n) less their part in orthonormal bases (p, n, terms) of real and of imaginary parts."""
+    """Subtract from values (p, k, 2 n) their part in orthonormal bases (p, n, terms) of real and imaginary parts."""
     parts = values.reshape(len(bases), -1, bases.shape[1])
     taken = parts @ bases @ bases.mT
     return np.subtract(parts, taken, out=taken).reshape(values.shape)
 
 
 AKAIKE_PENALTY = 2.0
-"""Complex constants are taken where they lower the sum of squares by this many times what an unknown does by chance."""
+"""Factor on the chance gain of an unknown that complex constants must exceed (Akaike)."""
 MAX_FIT_EVALUATIONS = 60
-"""Evaluations of the model; a mode in its own band takes some five."""
+"""Most evaluations of the model; a single mode takes about five."""
 FIT_STEP_TOLERANCE = 1e-13
-"""Step (share of the half-power half-width) after which there is nothing left to gain."""
+"""Step at convergence (half-power half-widths)."""
 INITIAL_FIT_DAMPING = 1e-3
 """Damping of the first step, over the diagonal of the scaled normal matrix."""
 MIN_EFFECTIVE_FIT_DAMPING = 0.1
-"""Damping after a step that led nowhere, at least; less hardly changes the step."""
+"""Least damping after a failed step; less hardly changes the step."""
 GOOD_GAIN_RATIO, POOR_GAIN_RATIO = 0.75, 0.25
-"""Share of the promised fall from which the damping falls, and below which it rises."""
+"""Share of the predicted cost drop above which the damping decreases, and below which it increases."""
 NEARBY_FIT_STEPS = 2
-"""Steps after which the values of much the same fit are taken as they are; with five, sensors of the same measured hits
-agree no more often."""
+"""Steps of a trial fit near the solution.
+
+With five steps, sensors of the same measured hits agree no more often.
+"""
 MIN_WORTHWHILE_GAIN = 1e-3
-"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thirtieth of an error."""
+"""Least cost drop of a step over that by chance of one unknown: a thirtieth of an error."""
 
 
 def fit_band(
@@ -167,15 +172,15 @@ def fit_band(
     terms: int = MIN_RESIDUAL_TERMS,
     held: Flags | None = None,
 ) -> BandFit | None:
-    """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None where nothing fits.
+    """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None if nothing fits.
 
     L (modes far below, and the free body) and U (modes far above) are complex: the tail of a damped neighbour is not
     real, and a real L or U would push its imaginary part into zeta and K, by percents. In accelerance,
-    -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured. Further terms, f^2,
+    -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight knows what was measured. Further terms, f^2,
     f^4, ..., follow the tails of strong modes just outside the band.
 
     The linear unknowns are eliminated, f and zeta found by Levenberg-Marquardt. frequency (Hz) has shape (n,),
-    receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m). held, (m,): modes that stay at their starts.
+    receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m). held, (m,): modes fixed at their starts.
 
     Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
     """
@@ -190,10 +195,10 @@ def fit_band(
 
 
 def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> BandFit:
-    """The same modes with real constants, where Akaike's criterion allows.
+    """Fit the same modes with real constants, if Akaike's criterion allows.
 
-    It does where they raise the sum of squares by no more than twice what phases take off by chance. The errors stay
-    those of the complex fit, for a phase that is not asked for is not known to be 0. Else the fit as it is. Arguments
+    It does if they raise the sum of squares by no more than twice what phases take off by chance. The errors stay
+    those of the complex fit, for an unfitted phase is not known to be 0. Otherwise the fit is unchanged. Arguments
     as `fit_band`.
 
     Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.
@@ -211,9 +216,10 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
 def refit_nearby(
     fit: BandFit, frequency: Floats, receptance: Complexes, weight: Floats, terms: int
 ) -> tuple[Floats, Complexes] | None:
-    """Poles (2, m) and modal constants (p, m) of the same modes with other residual terms or on other lines, nearly.
+    """Refit the same modes approximately with other residual terms or on other lines.
 
-    After a few steps, with real constants where those of the fit are; None where nothing fits. Arguments as `fit_band`.
+    Returns poles (2, m) and modal constants (p, m) after a few steps, with real constants if those of the fit are; None
+    if nothing fits. Arguments as `fit_band`.
     """
     p, m = fit.constant.shape
     if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size:
@@ -226,7 +232,7 @@ def refit_nearby(
 
 
 def _poles_for_real_constants(fit: BandFit) -> Floats:
-    """Poles (2, m) that real constants would have, to first order in the phases taken off."""
+    """Return the poles (2, m) of real constants, to first order in the removed phases."""
     m, covariance = fit.frequency.size, fit.covariance
     across = slice(2 * m + fit.constant.size, None)
     off = fit.constant.imag * np.sign(fit.constant.real)
@@ -249,13 +255,13 @@ def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
 
 
 def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:
-    """Levenberg-Marquardt; None where it does not converge."""
+    """Run Levenberg-Marquardt; None if it does not converge."""
     state, has_converged = _descend(band, starts, is_complex, MAX_FIT_EVALUATIONS)
     return state if has_converged else None
 
 
 def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:
-    """Where so many evaluations lead, and whether there is nothing left to gain there."""
+    """Run a number of evaluations and return the state and whether it has converged."""
     state, damping = band.at(starts, is_complex), INITIAL_FIT_DAMPING
     for _ in range(trials):
         if not np.isfinite(state.cost):
@@ -279,8 +285,7 @@ def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int)
 
 
 def _damped_step(state: FixedPoleFit, damping: float) -> tuple[Floats, float, float]:
-    """Damped Gauss-Newton step in units of the scale, shape (k,), the squared change of the model that it makes to
-    first order, and the fall of the cost that it promises."""
+    """Return the damped Gauss-Newton step (k,), its squared model change (first order), and the predicted cost drop."""
     gram, gradient = state.gram, state.gradient
     norm = np.sqrt(gram.diagonal())
     scaled = gram / (norm[:, np.newaxis] * norm)

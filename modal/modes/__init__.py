@@ -1,1 +1,1 @@
-"""Modes as plain data, and what follows from them alone: a synthesised FRF, a common delay, a mode followed."""
+"""Modes as plain data: synthesized FRFs, matching, measurement effects, edits by hand."""

@@ -13,10 +13,29 @@ from modal.modes.mode import Mode
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> float:
-    """Modal assurance criterion |a^H b|^2 / (a^H a b^H b) of two shapes (p,): 1 for the same shape, 0 for none of it.
+    """Return the modal assurance criterion |a^H b|^2 / (a^H a b^H b) of two mode shapes.
 
-    Raises ValueError for shapes of different length, and of zeros. Source: Allemang & Brown (1982), IMAC 1.
+    Parameters
+    ----------
+    a, b : array_like, shape (p,)
+        Mode shapes over the same points.
 
+    Returns
+    -------
+    float
+        1 for the same shape, 0 for orthogonal ones.
+
+    Raises
+    ------
+    ValueError
+        For shapes of different length, and of zeros.
+
+    References
+    ----------
+    Allemang & Brown (1982), IMAC 1.
+
+    Examples
+    --------
     >>> mac([1.0, 0.5, -0.2], [2.0, 1.0, -0.4])  # the same shape, another scale
     1.0
     >>> mac([1.0, 0.0], [0.0, 1.0])
@@ -32,37 +51,51 @@ def mac(a: ArrayLike, b: ArrayLike) -> float:
 
 
 TYPICAL_MODE_CHANGE = (0.03, 0.5, 0.3)
-"""Relative change of frequency, damping ratio and stiffness from one measurement to the next that counts as one."""
+"""Relative changes of frequency, damping ratio and stiffness between measurements that count as distance 1."""
 TYPICAL_MAC_LOSS = 0.1
-"""1 - MAC that counts as one."""
+"""1 - MAC that counts as distance 1."""
 MAX_MATCH_DISTANCE = 4.0
 """Distance above which a mode is no longer the same."""
 DOUBTFUL_MATCH_DISTANCE = 2.5
-"""Distance above which it may be another one."""
+"""Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
-"""Relative change of the frequency up to which a mode is the same where nothing else may be another one's."""
+"""Largest relative change of frequency of a mode that is alike otherwise."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
-"""A second mode that is less than this many times as far may be the one, too."""
+"""Distance of the second nearest mode over that of the nearest below which it is a rival."""
 
 
 @dataclass(frozen=True, eq=False)
-class FollowedMode:
-    """The mode that continues an earlier one."""
+class ModeMatch:
+    """Mode that continues an earlier one."""
 
     mode: Mode | None
-    """Mode that continues it; None where no mode is near enough."""
+    """Matching mode; None if no mode is near enough."""
     remarks: tuple[Remark, ...]
-    """Reasons why it may be another mode, or why there is none; empty where it is clear."""
+    """Reasons why it may be another mode, or why there is none."""
 
 
-def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
-    """Of modes (driving points) the one that is most like the last one followed, with a remark where that is not clear.
+def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
+    """Find the mode that continues the last followed one.
 
-    The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
-    in units of a likely change (of the stiffness where both know it), and of 1 - MAC where both modes have shapes over
-    the same points. A mode that is alike
-    but for its frequency is the same up to 15 %, the fall of a spindle that must be seen.
+    The distance of two modes is the root of the sum of squares of the changes of frequency, damping ratio and
+    stiffness,
+    each in units of a typical change (stiffness if both know it), and of 1 - MAC if both modes have shapes over
+    the same points. A mode that is alike but for its frequency is the same up to 15 %, the largest drop of a spindle.
 
+    Parameters
+    ----------
+    last : Mode
+        Mode followed last.
+    modes : sequence of Mode
+        Modes of the new measurement; only driving points count.
+
+    Returns
+    -------
+    ModeMatch
+        Most similar mode, with a remark if it is doubtful.
+
+    Examples
+    --------
     >>> last = Mode(700.0, 0.03, 2e7)
     >>> now = [Mode(650.0, 0.03, 1.8e7), Mode(905.0, 0.02, 6e7)]
     >>> follow_mode(last, now).mode.frequency  # Hz
@@ -74,15 +107,15 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> FollowedMode:
     if not near or not _is_same_mode(last, near[0]):
         nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
         text = f"no mode to follow, none is like this one{nearest}"
-        return FollowedMode(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
+        return ModeMatch(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
     first, about = _match_distance(last, near[0]), f"{near[0].frequency:.0f} Hz"
     if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
         text = f"followed mode in doubt: {near[1].frequency:.1f} Hz is nearly as like {_values_text(last)}"
-        return FollowedMode(near[0], (Remark("rival-mode", about, text),))
+        return ModeMatch(near[0], (Remark("rival-mode", about, text),))
     if first > DOUBTFUL_MATCH_DISTANCE:
         text = f"followed mode in doubt: it was {_values_text(last)}, now {_values_text(near[0])}"
-        return FollowedMode(near[0], (Remark("large-change", about, text),))
-    return FollowedMode(near[0], ())
+        return ModeMatch(near[0], (Remark("large-change", about, text),))
+    return ModeMatch(near[0], ())
 
 
 def _is_same_mode(last: Mode, mode: Mode) -> bool:
@@ -107,18 +140,31 @@ def _match_distance(a: Mode, b: Mode) -> float:
 
 
 MATCHED_FREQUENCY_SHARE = 0.005
-"""Relative distance of two frequencies within which a mode is there again; as asked of repeated measurements."""
+"""Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
 
 
 def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list[Mode]:
-    """The modes, each with how many of the others have it within 0.5 %.
+    """Count for each mode how many other FRFs have it within 0.5 %.
 
-    others: modes, of any trust, of other FRFs of the same structure: sensors of the same hits, points, the same point
-    measured again. `assess_trust` doubts less what is found again.
+    `assess_trust` trusts modes more that others have too.
 
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes of one FRF.
+    others : sequence of sequences of Mode
+        Modes, of any trust, of other FRFs of the structure: sensors of the same hits, points, repeated measurements.
+
+    Returns
+    -------
+    list of Mode
+        The modes with `match_count`.
+
+    Examples
+    --------
     >>> once, twice = Mode(412.0, 0.01, 3e7), Mode(500.0, 0.02, 2e7)
     >>> others = [[Mode(500.4, 0.021, 5e7)], [Mode(499.1, 0.018, -4e7)]]
-    >>> [mode.found_again for mode in match_modes([once, twice], others)]
+    >>> [mode.match_count for mode in match_modes([once, twice], others)]
     [(0, 2), (2, 2)]
     """
     return [
@@ -132,10 +178,31 @@ def _has_mode_near(modes: Sequence[Mode], frequency: float) -> bool:
 
 
 def predominant_mode(modes: Sequence[Mode], band: tuple[float, float] | None = None) -> Mode | None:
-    """The driving-point mode inside band (Hz, ends included) with the largest peak of -Im of receptance, 1/(2 zeta K).
+    """Return the driving-point mode with the largest peak of -Im of receptance, 1/(2 zeta K).
 
-    None where there is none. Source: Gaber & Hashemi (2015), "the most predominant mode".
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes of one FRF.
+    band : tuple of float, optional
+        Lowest and highest frequency (Hz), ends included.
 
+    Returns
+    -------
+    Mode or None
+        Predominant mode; None if the band holds none.
+
+    Raises
+    ------
+    ValueError
+        For an empty band.
+
+    References
+    ----------
+    Gaber & Hashemi (2015), "the most predominant mode".
+
+    Examples
+    --------
     >>> modes = [Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 1e7)]
     >>> predominant_mode(modes).frequency  # Hz: 1 / (2 zeta K) is 1.25 um/N there, and 1.67 at 900 Hz
     900.0

@@ -13,24 +13,47 @@ from modal.modes.mode import Mode, ratio_or_zero
 
 
 def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
-    """The mode without the exponential window exp(-t/time_constant) (s) that the response was recorded with.
+    """Remove the effect of an exponential window on the response from a mode.
 
-    The window adds 1/time_constant to the decay rate zeta w_n and leaves the damped frequency and the strength of
-    the free decay as they are: zeta falls by 1/(w_n time_constant), to first order, and K follows w_n^2. Standard
-    errors are carried over. A remark that lines were smoothed goes: that was the window.
+    The window exp(-t/time_constant) adds 1/time_constant to the decay rate zeta w_n and changes neither the damped
+    frequency nor the strength of the free decay: zeta falls by 1/(w_n time_constant), to first order, and K follows
+    w_n^2. Standard errors are carried over. A remark on smoothed lines goes: that was the window.
 
-    delay: time from the start of the window to the hit (s), the centre of the pulse. By then the window has fallen to
-    exp(-delay/time_constant), so that all of the response is smaller by that and K is larger: it is taken off as well.
-    0 where the window begins at the hit, or lies over the force, too.
+    Parameters
+    ----------
+    mode : Mode
+        Mode of the windowed response.
+    time_constant : float
+        Time constant of the window (s).
+    delay : float
+        Time from the start of the window to the centre of the pulse (s). The window has fallen to
+        exp(-delay/time_constant) by then, which makes K larger; this is removed, too. 0 if the window begins at the
+        hit,
+        or covers the force, too.
 
-    Of a windowed acceleration K comes out too large by a further 2 zeta/(w_n time_constant) of itself, a few parts in
-    ten thousand, unless `correct_windowed_receptance` has divided by the s^2 that belongs to it.
+    Returns
+    -------
+    Mode
+        Mode without the window.
 
-    Raises ValueError for a time constant that is not > 0, for a delay that is not finite and >= 0, and for a mode that
-    decays no faster than the window.
-    Source: Fladung & Rost (1997), Application and correction of the exponential window for FRFs, Mechanical Systems
+    Raises
+    ------
+    ValueError
+        For a time constant that is not > 0, a delay that is not finite and >= 0, and a mode that decays no faster than
+        the window.
+
+    Notes
+    -----
+    For a windowed acceleration K is too large by a further 2 zeta/(w_n time_constant), a few parts in
+    ten thousand, unless `correct_windowed_receptance` has divided by the matching s^2.
+
+    References
+    ----------
+    Fladung & Rost (1997), Application and correction of the exponential window for FRFs, Mechanical Systems
     and Signal Processing 11, 23.
 
+    Examples
+    --------
     >>> windowed = Mode(500.0, 0.02 + 1 / (2 * np.pi * 500.0 * 0.1), 2e7)  # exp(-t / 0.1 s) over the response
     >>> round(remove_window(windowed, 0.1).damping_ratio, 4)
     0.02
@@ -64,14 +87,32 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
 
 
 def widen_for_window(mode: Mode, time_constant: float, record: float) -> Mode:
-    """The mode with its covariance from the fit widened by what a window over a record (s) does to white noise.
+    """Widen the fit covariance of a mode by the effect of a window on white noise.
 
-    Under the window the noise of neighbouring lines is alike: of the values of a record of length T as many are
-    independent as the share (integral of w^2)^2 / (T integral of w^4) says, 1 for no window and time_constant/T for a
-    short one. A fit takes them all for independent. What the scatter of the hits says holds anyhow.
+    Under the window the noise of neighbouring lines is correlated: the share of independent values in a record of
+    length T is (integral of w^2)^2 / (T integral of w^4), 1 without a window and time_constant/T for a
+    short one. A fit takes all values as independent. The scatter of the hits needs no correction.
 
-    Source: Harris (1978), On the use of windows for harmonic analysis, Proc. IEEE 66, 51 (noise bandwidth).
+    Parameters
+    ----------
+    mode : Mode
+        Fitted mode.
+    time_constant : float
+        Time constant of the window (s).
+    record : float
+        Record length (s).
 
+    Returns
+    -------
+    Mode
+        Mode with wider covariance.
+
+    References
+    ----------
+    Harris (1978), On the use of windows for harmonic analysis, Proc. IEEE 66, 51 (noise bandwidth).
+
+    Examples
+    --------
     >>> mode = Mode(500.0, 0.02, 2e7, covariance=np.diag([0.1, 0.001, 1e5]) ** 2)
     >>> widened = widen_for_window(mode, time_constant=0.05, record=0.8)  # s
     >>> (widened.fit_error / mode.fit_error).round(2).tolist()  # sqrt(record / time constant) = 4
@@ -86,12 +127,12 @@ def widen_for_window(mode: Mode, time_constant: float, record: float) -> Mode:
 
 
 def _window_widening(a: float) -> float:
-    """T (integral of w^4) / (integral of w^2)^2 of w = exp(-a t/T) from 0 to T."""
+    """Return T (integral of w^4) / (integral of w^2)^2 of w = exp(-a t/T) from 0 to T."""
     return float(a * np.expm1(-4 * a) / -(np.expm1(-2 * a) ** 2))
 
 
 def _phase_correlation(mode: Mode, slope: Floats) -> Floats | None:
-    """Of the error of the phase, which stays as it is, with those of the values without the window."""
+    """Return the correlations of the unchanged phase error with those of the values without the window."""
     if mode.phase_correlation is None or mode.best_covariance is None:
         return mode.phase_correlation
     error = np.sqrt(np.diag(slope @ mode.best_covariance @ slope.T))
@@ -99,7 +140,7 @@ def _phase_correlation(mode: Mode, slope: Floats) -> Floats | None:
 
 
 def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float) -> Floats:
-    """Of frequency, damping ratio and stiffness without the window by those with it, shape (3, 3).
+    """Return the Jacobian of frequency, damping ratio and stiffness without the window by those with it, (3, 3).
 
     w^2 = size^2 - 2 zeta size/tau + 1/tau^2.
     """
@@ -117,18 +158,32 @@ def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float
 
 
 MIN_MODES_FOR_COMMON_DECAY, MIN_COMMON_DECAY_SPAN = 4, 3.0
-"""Modes that agree, and the ratio of their highest frequency to the lowest, at least."""
+"""Fewest modes with a common decay rate, and least ratio of their highest frequency to the lowest."""
 MAX_DECAY_RATE_SPREAD = 0.2
-"""Standard deviation of the logarithms of their decay rates up to which these are alike; chosen. Over a span of 3 those
-of equal damping ratios have 0.4 or more."""
+"""Largest standard deviation of the logarithms of common decay rates; chosen.
+
+Over a span of 3, equal damping ratios have 0.4 or more.
+"""
 
 
 def common_decay_rate(modes: Sequence[Mode]) -> float | None:
-    """Decay rate zeta w (1/s) that all these modes have about; None where they do not, or are too few to tell.
+    """Return the decay rate that all modes share, a sign of an exponential window.
 
     Structures damp their modes by about equal damping ratios, so that decay rates grow with frequency. Under a window
     exp(-t/tau) that is shorter than their decay all rates are 1/tau, and damping ratios fall as 1/f.
 
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes of one FRF.
+
+    Returns
+    -------
+    float or None
+        Decay rate zeta w (1/s); None if the rates differ or the modes are too few.
+
+    Examples
+    --------
     >>> windowed = [Mode(f, 1 / (0.05 * 2 * np.pi * f), 2e7) for f in (500.0, 900.0, 1300.0, 1900.0)]  # zeta w = 1/tau
     >>> round(1 / common_decay_rate(windowed), 4)  # s: the time constant of the window
     0.05
@@ -144,37 +199,55 @@ def common_decay_rate(modes: Sequence[Mode]) -> float | None:
 
 
 REAL_MODE_PHASE_SCATTER_DEG = 2.0
-"""Phases of the modes of a lightly damped structure scatter about 0 by this (degrees)."""
+"""Phase scatter of the modes of a lightly damped structure (degrees)."""
 MIN_DELAY_PHASE_DEG = 5.0
-"""A delay counts from this phase on, at the highest mode (degrees) ..."""
+"""Least phase of a delay at the highest mode (degrees)."""
 MIN_MODES_FOR_COMMON_DELAY = 3
-"""... where so many modes agree ..."""
+"""Fewest modes that a delay is estimated from."""
 MAX_DELAY_CHI_SQUARE = 4.0
-"""... and it leaves a sum of squares (in their errors) below this many times the number of modes less one ..."""
+"""Largest chi-square with the delay, per number of modes less one."""
 MAX_DELAY_RESIDUAL_SHARE = 0.1
-"""... and below this share of what there was without it."""
+"""Largest chi-square with the delay over that without it."""
 
 
 @dataclass(frozen=True)
 class CommonDelay:
-    """A delay that explains the phases of all modes."""
+    """Delay that explains the phases of all modes."""
 
     skew: float
-    """The response is sampled so much later than the force (s); the value for `Channel.skew`."""
+    """Time by which the response is sampled later than the force (s); the value for `Channel.skew`."""
     skew_std: float
     """Standard error (s)."""
 
     def phase_deg(self, frequency: float) -> float:
-        """The phase that it gives a real mode at this frequency (Hz)."""
+        """Return the phase of a real mode at this frequency (degrees).
+
+        Parameters
+        ----------
+        frequency : float
+            Frequency (Hz).
+        """
         return 360 * frequency * self.skew
 
 
 def common_delay(modes: Sequence[Mode]) -> CommonDelay | None:
-    """The delay whose phase, linear in frequency, is that of all modal constants; None where they have none in common.
+    """Estimate the delay between the channels that explains the phases of all modes.
 
     A response that is sampled later than the force leads by 2 pi f skew on every line; complex modes follow no such
-    line. Three modes at least.
+    line.
 
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes of one FRF, at least three.
+
+    Returns
+    -------
+    CommonDelay or None
+        Delay; None if the phases are not linear in frequency.
+
+    Examples
+    --------
     >>> late = 20e-6  # s: a converter that takes its channels one after the other
     >>> modes = [Mode(f, 0.02, 2e7, phase_deg=360.0 * f * late) for f in (500.0, 900.0, 1300.0)]
     >>> round(common_delay(modes).skew * 1e6, 2)  # us
@@ -193,12 +266,12 @@ def common_delay(modes: Sequence[Mode]) -> CommonDelay | None:
 
 
 MASKED_HALF_WIDTHS = 2.0
-"""Half-power half-widths to either side of a mode at which it hides others less than on its peak."""
+"""Half-power half-widths from a mode at which its neighbours are less hidden than on its peak."""
 
 
 @dataclass(frozen=True)
 class MassLoading:
-    """Relative changes of a mode when a mass is put on, to first order."""
+    """Relative changes of a mode by an added mass, to first order."""
 
     frequency: float
     """Change of the natural frequency (-), < 0."""
@@ -207,12 +280,31 @@ class MassLoading:
 
 
 def mass_loading(mode: Mode, frf: Frf, mass: float) -> MassLoading:
-    """Change of a mode by a mass (kg) at the driving point whose FRF this is.
+    """Estimate the change of a mode by a small mass at the driving point.
 
     With the modal mass M = K/w^2 the frequency falls by mass/(2 M). K follows the shape, which the mass bends towards
     the other modes: -2 mass w^2 R of itself, R the receptance at w of all others, those outside the lines, too.
-    Source: first-order perturbation of K phi = w^2 M phi by mass e e^T, e.g. Ewins, Modal Testing, ch. 2.
 
+    Parameters
+    ----------
+    mode : Mode
+        Mode of the driving point.
+    frf : Frf
+        FRF of the driving point.
+    mass : float
+        Added mass (kg).
+
+    Returns
+    -------
+    MassLoading
+        Relative changes.
+
+    References
+    ----------
+    First-order perturbation of K phi = w^2 M phi by mass e e^T, e.g. Ewins, Modal Testing, ch. 2.
+
+    Examples
+    --------
     A sensor of 20 g on a single mode of K = 20 N/um at 500 Hz, M = K / w^2 = 2.03 kg: -m / (2 M)
 
     >>> mode = Mode(500.0, 0.02, 2e7)
@@ -228,11 +320,27 @@ def mass_loading(mode: Mode, frf: Frf, mass: float) -> MassLoading:
 
 
 def with_mass_uncertainty(mode: Mode, frf: Frf, mass_std: float) -> Mode:
-    """The mode with what it may be off by because the mass that was taken off is known to a standard error (kg).
+    """Add the uncertainty of a subtracted sensor mass to the errors of a mode.
 
+    Parameters
+    ----------
+    mode : Mode
+        Mode without the sensor mass.
+    frf : Frf
+        FRF of the driving point.
+    mass_std : float
+        Standard error of the mass (kg).
+
+    Returns
+    -------
+    Mode
+        Mode with wider covariances.
+
+    Examples
+    --------
     >>> mode = Mode(500.0, 0.02, 2e7, covariance=np.diag([0.1, 0.001, 1e5]) ** 2)
-    >>> doubted = with_mass_uncertainty(mode, synthesize_frf([mode], np.arange(1.0, 1501.0)), mass_std=2e-3)
-    >>> round(float(mode.fit_error[0]), 3), round(float(doubted.fit_error[0]), 3)  # Hz: 2 g are 0.25 Hz
+    >>> wider = with_mass_uncertainty(mode, synthesize_frf([mode], np.arange(1.0, 1501.0)), mass_std=2e-3)
+    >>> round(float(mode.fit_error[0]), 3), round(float(wider.fit_error[0]), 3)  # Hz: 2 g are 0.25 Hz
     (0.1, 0.266)
     """
     loading = mass_loading(mode, frf, mass_std)

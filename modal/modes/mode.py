@@ -14,22 +14,31 @@ from acquisition import Frf, Remark
 from modal.arrays import Complexes, Floats
 
 UNKNOWN_PHASE_STD_DEG = 90.0
-"""Standard error (degrees) of a phase of which nothing is known."""
+"""Standard error of an unknown phase (degrees)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One mode: receptance (Re A + Im A (zeta + i r) / sqrt(1 - zeta^2)) / (1 - r^2 + 2i zeta r), r = f/f_n.
+    """Vibration mode: receptance (Re A + Im A (zeta + i r) / sqrt(1 - zeta^2)) / (1 - r^2 + 2i zeta r), r = f/f_n.
 
     A = exp(i phase) / K is its modal constant (m/N): in R / (i w - lambda) + conj(R) / (i w - conj(lambda)) with the
     pole lambda = -zeta w_n + i w_d the residue R is A w_n^2 / (2i w_d). A real mode has phase 0 and the receptance
     1/K / (1 - r^2 + 2i zeta r).
 
-    The stiffness of a driving point is positive. A negative one is legal: it belongs to a response measured
-    where the mode moves against the hammer, and says so (`is_driving_point`).
+    The stiffness of a driving point is positive. A negative stiffness is legal: there the response moves against
+    the hammer (`is_driving_point`).
 
-    Source: Ewins, Modal Testing, ch. 2.6 (complex modes); docs/modal.md says what K means for one.
+    Raises
+    ------
+    ValueError
+        For values that no mode has.
 
+    References
+    ----------
+    Ewins, Modal Testing, ch. 2.6 (complex modes); docs/modal.md explains K of a complex mode.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> round(mode.peak * 1e6, 3)  # um/N; 1 / (2 zeta K)
     1.25
@@ -42,52 +51,53 @@ class Mode:
     damping_ratio: float
     """Viscous damping ratio zeta (-)."""
     stiffness: float
-    """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative where Re A is; NaN of a mode seen in
-    free decays alone, where no force was measured."""
+    """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative like Re A.
+
+    NaN for a mode of free decays, whose force was not measured.
+    """
     covariance: Floats | None = None
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
-    That takes the errors of neighbouring lines as independent; what noise of the hammer adds, alike over many lines,
-    is in it where the hits were given. None where not estimated."""
+    The errors of neighbouring lines count as independent. With hits it includes the hammer noise, which is alike over
+    many lines. None if not estimated.
+    """
     degrees_of_freedom: float = np.inf
-    """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
+    """Degrees of freedom of that covariance: real values fitted less unknowns of the whole band."""
     method: str = ""
-    """Method it was found by."""
+    """Method of identification."""
     jackknife: Floats | None = None
-    """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
+    """Covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
-    """Hits that the jackknife left out in turn, of the FRF with the fewest."""
+    """Number of hits of the jackknife, of the FRF with the fewest."""
     phase_deg: float = 0.0
-    """Phase of its modal constant times the sign of K (degrees), -90 to 90; 0 for a real mode."""
+    """Phase of the modal constant times the sign of K (degrees), -90 to 90; 0 for a real mode."""
     phase_deg_std: float = 0.0
-    """Standard error of that phase (degrees), of a mode that was found real, too; 0 where it was not asked for."""
+    """Standard error of that phase (degrees), of a real mode, too; 0 if it was not estimated."""
     phase_correlation: Floats | None = None
     """Correlations of the error of the phase with those of (frequency, damping_ratio, stiffness), shape (3,)."""
     coherence: float | None = None
-    """Mean coherence between the half-power points; None where it is not known."""
+    """Mean coherence between the half-power points; None if unknown."""
     misfit: float | None = None
-    """rms of what the fit leaves in its band over rms of the noise there: 1 for a fit that leaves nothing."""
+    """Residual rms near the mode over the noise rms; 1 for a perfect fit."""
     misfit_share: float | None = None
-    """rms of what the fit leaves in its band over the height of its peak."""
+    """Residual rms near the mode over the height of its peak."""
     edge_distance: float | None = None
-    """Distance from its frequency to the nearer end of the lines, in its half-power half-widths zeta f_n."""
+    """Distance from the nearer end of the lines, in half-power half-widths zeta f_n."""
     remaining_decay: float | None = None
-    """Share of its decay that is left when the record ends; None where the length of the record is not known."""
+    """Share of the decay that is left when the record ends; None for an unknown record length."""
     half_power_damping: float | None = None
-    """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
+    """Damping ratio from the half-power width of the peak, for comparison; None without such a width."""
     shape: Floats | None = None
-    """Mode shape over the FRFs of `fit_common_modes`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
+    """Mode shape over the FRFs of `fit_common_modes`, largest 1 or -1, first > 0, shape (p,); None for one FRF."""
     match_count: tuple[int, int] | None = None
-    """Number of other FRFs of the same structure that have it too, and number of those looked at; None where nobody
-    looked (`match_modes`)."""
+    """Number of other FRFs with this mode, and number compared (`match_modes`); None without comparison."""
     relative_peak: float | None = None
-    """Its peak of receptance over the highest of the same free decays, had all been excited alike; None where the
-    force was measured and K tells."""
+    """Peak of receptance over the highest of the same free decays, all excited alike; None if K is known."""
     remarks: tuple[Remark, ...] = ()
-    """Reasons why it may not be trusted; empty where nothing speaks against it. Their codes: docs/remarks.md."""
+    """Reasons why the mode may not be trusted. docs/remarks.md lists their codes."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no mode."""
+        """Check values and covariances."""
         for wrong in chain(self._wrong_values(), self._wrong_errors()):
             raise ValueError(wrong)
 
@@ -112,7 +122,7 @@ class Mode:
         if not (np.isfinite(self.phase_deg_std) and self.phase_deg_std >= 0):
             yield f"phase_deg_std={self.phase_deg_std} is not a finite number >= 0"
         if not self.degrees_of_freedom > 0:
-            yield f"freedom={self.degrees_of_freedom} is not a number > 0"
+            yield f"degrees_of_freedom={self.degrees_of_freedom} is not a number > 0"
         if self.jackknife is not None and self.n_hits < 2:
             yield f"n_hits={self.n_hits}: a jackknife has at least 2 hits"
 
@@ -123,12 +133,12 @@ class Mode:
 
     @property
     def is_driving_point(self) -> bool:
-        """True unless hammer and sensor move against each other in this mode (negative stiffness)."""
+        """False if hammer and sensor move against each other in this mode (negative stiffness)."""
         return not self.stiffness < 0
 
     @property
     def peak(self) -> float:
-        """Receptance at its resonance, 1 / (2 |K| zeta) (m/N); of free decays `relative_peak`, to compare these."""
+        """Receptance at resonance, 1 / (2 |K| zeta) (m/N); for free decays `relative_peak`."""
         if self.relative_peak is not None:
             return self.relative_peak
         return float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
@@ -149,24 +159,25 @@ class Mode:
 
     @property
     def best_covariance(self) -> Floats | None:
-        """The covariance to go on with: over the hits where there are any, else that of the fit; None without both."""
+        """Covariance over the hits, or of the fit if there are no hits; None without both."""
         return self.covariance if self.jackknife is None else self.jackknife
 
     @property
     def standard_error(self) -> Floats:
-        """Standard errors of (frequency Hz, damping_ratio, stiffness N/m), shape (3,); NaN where not estimated.
+        """Standard errors of (frequency Hz, damping_ratio, stiffness N/m), shape (3,); NaN if not estimated.
 
-        Over the hits where there are any, else those of the fit."""
+        From the hits if there are any, else from the fit.
+        """
         return _root_of_diagonal(self.best_covariance)
 
     @property
     def fit_error(self) -> Floats:
-        """Standard errors from `covariance`, with or without a jackknife, shape (3,); NaN where not estimated."""
+        """Standard errors from `covariance`, with or without a jackknife, shape (3,); NaN if not estimated."""
         return _root_of_diagonal(self.covariance)
 
     @property
     def correlation(self) -> Floats:
-        """Correlations of the errors, shape (3, 3); NaN where not estimated, 0 with a value that has no error."""
+        """Correlations of the errors, shape (3, 3); NaN if not estimated, 0 with a value that has no error."""
         if self.best_covariance is None:
             return np.full((3, 3), np.nan)
         correlation = ratio_or_zero(self.best_covariance, np.outer(self.standard_error, self.standard_error))
@@ -174,22 +185,64 @@ class Mode:
         return correlation
 
     def quantile(self, level: float = 0.95) -> float:
-        """Standard errors to either side of a value that hold the truth with this probability (-); see interval."""
+        """Return the half-width of an interval in standard errors.
+
+        Parameters
+        ----------
+        level : float
+            Probability that the interval holds the true value (-).
+
+        Returns
+        -------
+        float
+            Quantile of Student's t (-).
+
+        Raises
+        ------
+        ValueError
+            For a level outside 0 to 1.
+        """
         if not 0 < level < 1:
             raise ValueError(f"level={level} is not between 0 and 1")
         p = (1 + level) / 2
         return float(scipy.special.stdtrit(self.degrees_of_freedom if self.jackknife is None else self.n_hits - 1, p))
 
     def interval(self, level: float = 0.95) -> Floats:
-        """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
+        """Return the confidence intervals of frequency, damping ratio and stiffness.
 
-        Student's t: with n_hits - 1 degrees of freedom over hits, else with those of the fit."""
+        Student's t: with n_hits - 1 degrees of freedom over hits, else with those of the fit.
+
+        Parameters
+        ----------
+        level : float
+            Probability that an interval holds the true value (-).
+
+        Returns
+        -------
+        ndarray, shape (3, 2)
+            Lower and upper limit of each (Hz, -, N/m).
+        """
         reach = self.quantile(level) * self.standard_error
         value = np.array([self.frequency, self.damping_ratio, self.stiffness])
         return np.stack([value - reach, value + reach], axis=1)
 
     def scaled(self, frequency: float, stiffness: float, method: str) -> Mode:
-        """The mode with its frequency and stiffness times these factors (-), its covariances along with them."""
+        """Return the mode with scaled frequency and stiffness, covariances included.
+
+        Parameters
+        ----------
+        frequency : float
+            Factor on the natural frequency (-).
+        stiffness : float
+            Factor on the stiffness (-).
+        method : str
+            Text to be added to `method`.
+
+        Returns
+        -------
+        Mode
+            Scaled mode.
+        """
         scale = np.outer(*2 * [np.array([frequency, 1.0, stiffness])])
         covariance, jackknife = (None if c is None else c * scale for c in (self.covariance, self.jackknife))
         return replace(
@@ -202,14 +255,25 @@ class Mode:
         )
 
     def receptance(self, frequency: Floats) -> Complexes:
-        """Receptance of this mode alone (m/N), same shape as frequency (Hz)."""
+        """Return the receptance of this mode alone.
+
+        Parameters
+        ----------
+        frequency : ndarray
+            Frequencies (Hz), any shape.
+
+        Returns
+        -------
+        ndarray
+            Receptance (m/N), same shape.
+        """
         r, zeta, constant = np.asarray(frequency) / self.frequency, self.damping_ratio, self.constant
         turned = constant.imag * (zeta + 1j * r) / np.sqrt(1 - zeta**2) if constant.imag else 0.0
         return np.asarray((constant.real + turned) / (1 - r**2 + 2j * zeta * r))
 
 
 def ratio_or_zero(value: Floats, error: Floats) -> Floats:
-    """Values over errors; 0 where a value has none."""
+    """Return values over errors; 0 for a value without error."""
     return np.divide(value, error, out=np.zeros(value.shape), where=error != 0)
 
 
@@ -218,8 +282,27 @@ def _root_of_diagonal(covariance: Floats | None) -> Floats:
 
 
 def synthesize_frf(modes: Sequence[Mode], frequency: ArrayLike) -> Frf:
-    """Sum of the receptances of modes at frequency (Hz), shape (n,). Raises ValueError for an axis that Frf refuses.
+    """Sum the receptances of modes.
 
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes.
+    frequency : array_like, shape (n,)
+        Frequencies (Hz).
+
+    Returns
+    -------
+    Frf
+        Sum of the receptances.
+
+    Raises
+    ------
+    ValueError
+        For a frequency axis that Frf rejects.
+
+    Examples
+    --------
     >>> modes = [Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)]
     >>> frf = synthesize_frf(modes, np.arange(1.0, 1501.0))
     >>> round(float(abs(frf.receptance).max()) * 1e6, 2), int(frf.frequency[abs(frf.receptance).argmax()])  # um/N, Hz

@@ -1,4 +1,4 @@
-"""What a person says of the modes of an FRF."""
+"""Edits of the modes of an FRF by a person."""
 
 from __future__ import annotations
 
@@ -11,8 +11,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ModeEdits:
-    """Modes that are added, left out, or held by hand; ValueError for values that no mode has, or that stand twice.
+    """Modes to be added, dropped or fixed by hand.
 
+    Raises
+    ------
+    ValueError
+        For values that no mode has, or a frequency given twice.
+
+    Examples
+    --------
     >>> ModeEdits(add=(298.0,), fix=((1500.0, 0.03),))
     ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
     >>> ModeEdits(fix=((1500.0, 1.5),))
@@ -24,12 +31,12 @@ class ModeEdits:
     add: tuple[float, ...] = ()
     """Frequencies near which a further mode is fitted (Hz)."""
     drop: tuple[float, ...] = ()
-    """Frequencies of modes that are left out (Hz)."""
+    """Frequencies of modes to be left out (Hz)."""
     fix: tuple[tuple[float, float], ...] = ()
-    """Natural frequencies (Hz) and damping ratios that modes are held at; their modal constants are fitted."""
+    """Natural frequencies (Hz) and damping ratios at which modes are held; their modal constants are fitted."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no frequency or damping ratio, and what stands twice."""
+        """Check frequencies and damping ratios."""
         for name, frequency in self._frequencies():
             if not (isfinite(frequency) and frequency > 0):
                 raise ValueError(f"{name} {frequency:g}: is no frequency > 0; give it in Hz")
@@ -49,22 +56,33 @@ class ModeEdits:
         yield from (("fix", frequency) for frequency, _ in self.fix)
 
     def __bool__(self) -> bool:
-        """Whether anything is said."""
+        """Return whether there is any edit."""
         return bool(self.add or self.drop or self.fix)
 
     def __str__(self) -> str:
-        """As options say it, without their dashes: "add 298, drop 412, fix 1500:0.03"."""
+        """Return the edits as text: "add 298, drop 412, fix 1500:0.03"."""
         words = [f"{name} {frequency:.10g}" for name, frequency in self._frequencies()]
         dampings = ["" for _ in (*self.add, *self.drop)] + [f":{zeta:.10g}" for _, zeta in self.fix]
         return ", ".join(map("".join, zip(words, dampings, strict=True)))
 
     def with_window(self, time_constant: float) -> ModeEdits:
-        """The same of an FRF whose response is under exp(-t/time_constant) (s), which adds to the damping held."""
+        """Return the edits for a response under an exponential window, which adds to the fixed damping.
+
+        Parameters
+        ----------
+        time_constant : float
+            Time constant of the window exp(-t/time_constant) (s).
+
+        Returns
+        -------
+        ModeEdits
+            Edits with larger damping ratios.
+        """
         return ModeEdits(self.add, self.drop, tuple(_add_window_damping(*held, time_constant) for held in self.fix))
 
 
 def _add_window_damping(frequency: float, zeta: float, time_constant: float) -> tuple[float, float]:
-    """Its damped frequency stays."""
+    """Add the damping of a window and keep the damped frequency."""
     size = 2 * np.pi * frequency
     decay = zeta * size + 1 / time_constant
     w = float(np.hypot(decay, size * np.sqrt(1 - zeta**2)))
@@ -74,8 +92,27 @@ def _add_window_damping(frequency: float, zeta: float, time_constant: float) -> 
 def parse_mode_edits(
     add: Sequence[str] | None = None, drop: Sequence[str] | None = None, fix: Sequence[str] | None = None
 ) -> ModeEdits:
-    """Edits from "298" (Hz) and "1500:0.03" (Hz and damping ratio); ValueError for any other text.
+    """Parse edits of modes.
 
+    Parameters
+    ----------
+    add, drop : sequence of str, optional
+        Frequencies as in "298" (Hz).
+    fix : sequence of str, optional
+        Frequency and damping ratio as in "1500:0.03" (Hz and -).
+
+    Returns
+    -------
+    ModeEdits
+        Parsed edits.
+
+    Raises
+    ------
+    ValueError
+        For any other text.
+
+    Examples
+    --------
     >>> parse_mode_edits(add=["298"], fix=["1500:0.03"])
     ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
     """
@@ -96,5 +133,5 @@ def _numbers(name: str, text: str, wanted: str, count: int) -> list[float]:
         numbers = []
     if len(numbers) != count:
         point = "; write decimals with a point" if "," in text else ""
-        raise ValueError(f"--{name} {text}: give {wanted}{point}")
+        raise ValueError(f"ModeEdits.{name} {text}: give {wanted}{point}")
     return numbers

@@ -1,1 +1,1 @@
-"""How good fitted modes are: whether to believe them, and what the fit did not see."""
+"""Quality of fitted modes: figures, remarks, trust."""

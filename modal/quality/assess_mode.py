@@ -13,24 +13,24 @@ from modal.arrays import Floats
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
 from modal.bands.residual_analysis import residual_near_mode
-from modal.fitting import MIN_RESIDUAL_TERMS
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.modes.measurement_effects import common_delay
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
 from modal.quality.trust import MAX_MISFIT_RATIO, MAX_REMAINING_DECAY, MIN_MISFIT_SHARE, relative_error, trust_rules
 
 
 def with_truncation_error(mode: Mode) -> Mode:
-    """The mode with what is left of its decay when the record ends in its errors.
+    """Add the effect of a truncated decay to the errors of a mode.
 
-    On the lines of the record (multiples of one over its length T) all of the mode is 1 - exp(lambda T) of itself, with
-    a size of exp(-zeta w T) = left_ringing and a phase that is not known: K and the phase of the modal constant are off
-    by up to that share, by 1/sqrt(2) of it in the mean of squares. f and zeta are so only where the hit came late in
-    the record or zeros were appended to it, by less; they get the same share of zeta f and of zeta. Where more than 5 %
-    is left the errors stay: that is doubtful, and lines that come from no record, but were computed, have none of it.
+    On the lines of the record (multiples of one over its length T) the mode is 1 - exp(lambda T) of itself, with
+    size exp(-zeta w T) = remaining_decay and unknown phase: K and the phase of the modal constant are off
+    by up to that share, by 1/sqrt(2) of it in the mean square. f and zeta are affected only if the hit came late in
+    the record or zeros were appended, and by less; they get the same share of zeta f and of zeta. Beyond 5 %
+    the errors stay: the mode is doubtful then, and lines that were computed without a record have no truncation.
 
     Source: integral of exp((lambda - iw) t) from 0 to T.
 
-    >>> mode = Mode(500.0, 0.01, 2e7, np.diag([0.01, 1e-4, 1e5]) ** 2, left_ringing=0.04)
+    >>> mode = Mode(500.0, 0.01, 2e7, np.diag([0.01, 1e-4, 1e5]) ** 2, remaining_decay=0.04)
     >>> [f"{error:.2g}" for error in with_truncation_error(mode).standard_error]  # Hz, -, N/m
     ['0.14', '0.0003', '5.7e+05']
     """
@@ -49,31 +49,30 @@ def with_truncation_error(mode: Mode) -> Mode:
 
 
 def _widen_covariance(covariance: Floats | None, off: Floats) -> Floats | None:
-    """With further independent errors of what has one: a value that a person holds has none."""
+    """Add independent errors to those values that have one; a fixed value has none."""
     return None if covariance is None else covariance + np.diag(np.where(np.diag(covariance) > 0, off, 0.0) ** 2)
 
 
 MIN_GOOD_COHERENCE = 0.9
-"""Mean coherence between the half-power points; below it the averaged hits disagree."""
+"""Least mean coherence between the half-power points for hits that agree."""
 MAX_CONSTANT_PHASE_DEG = 20.0
-"""Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
+"""Largest phase of a real modal constant beyond the delay between the channels (degrees)."""
 DOMINANT_NEIGHBOUR_RATIO = 20.0
-"""Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
+"""Peak of a strong mode over that of a small one on its flank, which may be its own non-linearity."""
 MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY = 0.005, 0.02
-"""Share of a mode's decay left when the record ends that is said: from the second on, and from the first on where it
-makes most of the error of K."""
+"""Remaining decay that is reported if it makes most of the error of K, and in any case."""
 REPORTED_MODE_ERROR = 0.2
-"""Relative standard error of damping ratio or stiffness from which it is said."""
+"""Relative standard error of damping ratio or stiffness that is reported."""
 MIN_SMOOTHED_HALF_WIDTH_LINES = 12.0
-"""Half-power half-width in lines from which smoothing over five of them bends a mode by less than 2 %."""
+"""Half-power half-width (lines) from which smoothing over five lines changes a mode by less than 2 %."""
 MAX_HIT_SCATTER_RATIO = 3.0
-"""Standard error over hits over that of the fit."""
+"""Largest standard error over hits, over that of the fit, that is not reported."""
 MAX_HALF_POWER_DIFFERENCE, MIN_HALF_POWER_LINES = 0.25, 4
-"""Share that the damping ratio from the half-power width may differ by, where so many lines lie between its points."""
+"""Largest relative difference of the half-power damping ratio, and fewest lines between its points."""
 
 
 def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
-    """Mode i of a band with its figures of quality and the remarks that follow from them."""
+    """Add the quality figures of mode i of a band, and the remarks that follow from them."""
     share, misfit = residual_near_mode(band, i)
     figures = replace(
         mode,
@@ -84,14 +83,14 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
         remaining_decay=_remaining_decay(state.record_length, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
-    judged = with_truncation_error(figures)
+    assessed = with_truncation_error(figures)
     remarks = chain(
-        _edit_remarks(band, i, judged),
-        _position_remarks(state, band, i, judged),
-        _value_remarks(band, i, judged, share),
-        _error_remarks(judged),
+        _edit_remarks(band, i, assessed),
+        _position_remarks(state, band, i, assessed),
+        _value_remarks(band, i, assessed, share),
+        _error_remarks(assessed),
     )
-    return replace(judged, remarks=tuple(remarks))
+    return replace(assessed, remarks=tuple(remarks))
 
 
 def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
@@ -111,7 +110,6 @@ def _mode_coherence(state: Extraction, mode: Mode) -> float | None:
 
 
 def _edge_distance(state: Extraction, mode: Mode) -> float:
-    """Of a mode from the nearer end of the lines, in its half-power half-widths."""
     f = state.frf.frequency
     return float(min(mode.frequency - f[0], f[-1] - mode.frequency) / (mode.damping_ratio * mode.frequency))
 
@@ -146,12 +144,12 @@ def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -
 
 
 def _stiffness_error(mode: Mode) -> float:
-    """Relative standard error of K (-); 0 where not estimated."""
+    """Return the relative standard error of K (-), 0 if not estimated."""
     return 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
 
 
 def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool:
-    """Whether what bends mode i is not fitted: a mode beyond the lines, or that by which a strong one is not linear."""
+    """Return whether an unfitted mode beyond the lines, or a non-linear strong mode, distorts mode i."""
     at_edge = band.lines.start == 0 or band.lines.stop >= state.frf.frequency.size
     if at_edge and band.terms > MIN_RESIDUAL_TERMS:
         return True
@@ -168,7 +166,7 @@ def _frequency_text(mode: Mode) -> str:
 
 
 def _remaining_decay(record: float | None, half_width: float) -> float | None:
-    """Share of the decay after the record (s); None where its length is not known."""
+    """Return the share of the decay after the record (s); None if its length is unknown."""
     return None if record is None else float(np.exp(-2 * np.pi * half_width * record))
 
 
@@ -211,7 +209,7 @@ def _error_remarks(mode: Mode) -> Iterator[Remark]:
 
 
 def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
-    """All modes of an FRF, those whose modal constants are far off real with a remark."""
+    """Add a remark to the modes of an FRF whose modal constants are far from real."""
     delay = common_delay(modes)
     return [_add_phase_remark(mode, 0.0 if delay is None else delay.phase_deg(mode.frequency)) for mode in modes]
 
@@ -225,12 +223,15 @@ def _add_phase_remark(mode: Mode, expected: float) -> Mode:
 
 
 def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
-    """All modes of an FRF, with a remark on the narrow ones where its lines were smoothed."""
+    """Add a remark to the narrow modes of an FRF if its lines were smoothed."""
     step = float(np.mean(np.diff(frf.frequency)))
     narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
     if not any(narrow) or not is_smoothed(frf):
         return [*modes]
-    text = f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: zeta too large, K too small by percents"
+    text = (
+        f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: "
+        "zeta too large, K too small by percents"
+    )
     cure = "export the lines without smoothing or window"
     return [
         replace(mode, remarks=(*mode.remarks, Remark("smoothed-lines", _frequency_text(mode), text, cure)))

@@ -10,52 +10,64 @@ from acquisition import Remark, stiffness_remark
 from modal.modes.mode import Mode
 
 REJECTED_MISFIT_SHARE = 0.3
-"""What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode; less is in its
-errors."""
+"""Rejected residual near a mode, where it is more than noise, over its peak; less is in its errors."""
 REJECTED_HIDDEN_MISFIT_SHARE = 0.05
-"""The same of a mode without a peak of its own."""
+"""Rejected residual near a mode without a peak of its own, over its height."""
 ROTATED_PHASE_DEG = 30.0
-"""Phase of the modal constant off real (degrees) beyond which a mode must be known well: what noise and the flanks of
-others make has any phase."""
+"""Phase of the modal constant (degrees) beyond which a mode must be certain: noise and flanks have any phase."""
 MAX_ROTATED_MODE_ERROR, REJECTED_MODE_ERROR = 0.1, 1 / 3
-"""Relative standard error of damping ratio or stiffness, the larger one: of a turned mode, and of any."""
+"""Largest relative standard error of damping ratio or stiffness of a rotated mode, and of any mode."""
 REJECTED_MATCHED_MODE_ERROR = 0.5
-"""The same of a mode that is found again, turned or not."""
+"""Rejected relative standard error of a mode that other FRFs have, too."""
 MIN_OTHER_FRFS, MIN_MATCHED_SHARE = 2, 0.75
-"""Other FRFs of the structure, and their share that has a mode, from which it is found again: one alone has a mode
-within 0.5 % by chance in one case of five."""
+"""Number of other FRFs, and their share with the mode, from which it is matched.
+
+A single other FRF has a mode within 0.5 % by chance in one case of five.
+"""
 DOUBTFUL_HIDDEN_DAMPING, REJECTED_HIDDEN_DAMPING = 0.08, 0.15
-"""Damping ratio of a mode without a peak of its own; machine structures have 0.005 to 0.08."""
+"""Doubtful and rejected damping ratio of a mode without a peak; machine structures have 0.005 to 0.08."""
 MAX_MODE_DAMPING = 0.3
-"""Damping ratio that no peak makes a mode."""
+"""Largest damping ratio of a mode."""
 MIN_TRUSTED_COHERENCE = 0.5
-"""Mean coherence at the peak below which most of what was measured is not the hammer's."""
+"""Least mean coherence at the peak; below it most of the response is not caused by the hammer."""
 MAX_REMAINING_DECAY = 0.05
-"""Share of the decay left when the record ends that the errors of the mode stand for."""
+"""Largest share of the decay after the record that the errors of a mode account for."""
 MAX_MISFIT_RATIO = 2.0
-"""rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
+"""Residual rms over noise rms above which the residual is more than noise."""
 MIN_MISFIT_SHARE = 0.01
-"""... from this share of the peak; on the zeta and K of a mode without a peak of its own it bears more."""
+"""Residual rms over the peak from which a misfit counts."""
 DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
-"""Remarks that stand for a figure which a mode does not carry; those of ..."""
+"""Codes of remarks that make a mode doubtful."""
 COMMON_REMARK_CODES = ("smoothed-lines",)
-"""... what is alike in all FRFs of a structure, so that to find it again says nothing."""
+"""Those remarks that apply to all FRFs of a structure alike, so that a match proves nothing."""
 
 
 class Trust(enum.StrEnum):
-    """How far a mode can be believed."""
+    """Trust in a mode."""
 
     TRUSTED = "trusted"
-    """Its values hold within their errors."""
+    """Values hold within their errors."""
     DOUBTFUL = "doubtful"
-    """There is a mode; its zeta or K may be off by more than their errors say."""
+    """A mode exists; its zeta or K may be off by more than their errors."""
     REJECTED = "rejected"
-    """Not to be told from what the fit cannot explain: no decision should rest on it."""
+    """Mode cannot be distinguished from what the fit does not explain; no decision may rest on it."""
 
 
 def assess_trust(mode: Mode) -> Trust:
-    """The worst verdict of all rules, from figures and codes alone; the table of docs/modal.md says why each.
+    """Return the worst verdict of all trust rules. The table in docs/modal.md gives the reasons.
 
+    Parameters
+    ----------
+    mode : Mode
+        Mode with quality figures and remarks.
+
+    Returns
+    -------
+    Trust
+        Verdict.
+
+    Examples
+    --------
     >>> assess_trust(Mode(500.0, 0.02, 2e7, misfit=1.0, misfit_share=0.01))
     <Trust.TRUSTED: 'trusted'>
     >>> assess_trust(Mode(500.0, 0.02, 2e7, misfit=30.0, misfit_share=0.5))
@@ -66,8 +78,20 @@ def assess_trust(mode: Mode) -> Trust:
 
 
 def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
-    """What speaks against a mode, as codes of remarks, each with the verdict that it alone would bring.
+    """Yield the rules that a mode violates.
 
+    Parameters
+    ----------
+    mode : Mode
+        Mode with quality figures and remarks.
+
+    Yields
+    ------
+    tuple of str and Trust
+        Code of the remark, and the verdict of this rule.
+
+    Examples
+    --------
     >>> list(trust_rules(Mode(500.0, 0.02, 2e7, misfit=30.0, misfit_share=0.5)))
     [('misfit', <Trust.REJECTED: 'rejected'>)]
     """
@@ -80,9 +104,9 @@ def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
 
 
 def is_matched(mode: Mode) -> bool:
-    """Whether so many other FRFs of the structure have it that it is no chance.
+    """Return whether so many other FRFs of the structure have the mode that it is no chance.
 
-    >>> is_matched(Mode(500.0, 0.02, 2e7, match_modes=(3, 4))), is_matched(Mode(500.0, 0.02, 2e7))
+    >>> is_matched(Mode(500.0, 0.02, 2e7, match_count=(3, 4))), is_matched(Mode(500.0, 0.02, 2e7))
     (True, False)
     """
     found, of = mode.match_count or (0, 0)
@@ -90,7 +114,7 @@ def is_matched(mode: Mode) -> bool:
 
 
 def _figure_limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
-    """Code, value, and the limits above which it makes a mode doubtful and rejected."""
+    """Yield code, value, and the limits above which it makes a mode doubtful and rejected."""
     never, again = float("inf"), is_matched(mode)
     share = (mode.misfit_share or 0.0) if (mode.misfit or 1.0) > MAX_MISFIT_RATIO else 0.0
     if again or mode.half_power_damping is not None or mode.misfit is None:
@@ -110,8 +134,7 @@ def _figure_limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
 
 
 def relative_error(mode: Mode) -> float:
-    """The larger of the relative standard errors of damping ratio and stiffness (-), of what is known; 0 where not
-    estimated."""
+    """Return the larger relative standard error of damping ratio and stiffness (-), 0 if not estimated."""
     if mode.best_covariance is None:
         return 0.0
     _, damping, stiffness = mode.standard_error
@@ -124,47 +147,59 @@ REJECTION_REASONS = {
     "misfit": "the fit leaves too much of it",
     "uncertain": "its damping or stiffness is hardly known",
 }
-"""Why a mode is rejected, in words, by the rule of `trust_rules`."""
+"""Text for each rule of `trust_rules` that rejects a mode."""
 MAX_NEGATIVE_PEAK_SHARE = 0.1
 """Peak of a mode with negative stiffness over the largest, below which it is left out; chosen."""
 REJECTED_MODE_REMEDY = (
-    "look at it with lobewatch modes --figure; against drift let the sensor rest longer, or change its cable"
+    "look at it with modal.synthesize_frf; against drift let the sensor rest longer, or change its cable"
 )
 
 
 @dataclass(frozen=True, eq=False)
 class CredibleModes:
-    """The modes of one FRF that may be believed."""
+    """Modes of one FRF that can be used."""
 
     modes: tuple[Mode, ...]
-    """Modes that may be followed, calibrated and used for lobes."""
+    """Modes that can be followed, calibrated and used for lobes."""
     opposed: tuple[Mode, ...]
-    """Modes that could be, were their stiffness not negative: no driving point. Small ones are left out."""
+    """Credible modes with negative stiffness: no driving point. Small ones are left out."""
     remarks: tuple[Remark, ...]
-    """One about each of the rest, with the reason."""
+    """One remark with the reason for each of the other modes."""
 
 
 def select_credible_modes(modes: Sequence[Mode]) -> CredibleModes:
-    """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects.
+    """Select the modes that can be followed, calibrated and used for lobes.
 
+    Leaves out drift, peaks cut by the edge of the lines, stiffnesses of no machine, and modes rejected by
+    `assess_trust`.
+
+    Parameters
+    ----------
+    modes : sequence of Mode
+        Modes of one FRF.
+
+    Returns
+    -------
+    CredibleModes
+        Selected modes, and a remark on each of the others.
+
+    Examples
+    --------
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
     >>> [round(mode.frequency) for mode in select_credible_modes(fit_modes(frf)).modes]  # Hz
     [500, 900]
     >>> select_credible_modes([Mode(500.0, 0.02, 2.0)]).remarks[0].code  # N/um taken for N/m
     'stiffness-not-believed'
     """
-    judged = [(mode, _rejection_remark(mode)) for mode in modes]
-    plausible = [mode for mode, doubt in judged if doubt is None]
-    largest = max((mode.peak for mode in plausible), default=0.0)
-    against = [mode for mode in plausible if not mode.is_driving_point]
-    small = [mode for mode in against if mode.peak < MAX_NEGATIVE_PEAK_SHARE * largest]
+    rejections = [_rejection_remark(mode) for mode in modes]
+    credible = [mode for mode, rejection in zip(modes, rejections, strict=True) if rejection is None]
+    largest = max((mode.peak for mode in credible), default=0.0)
+    opposed = [mode for mode in credible if not mode.is_driving_point]
+    small = [mode for mode in opposed if mode.peak < MAX_NEGATIVE_PEAK_SHARE * largest]
     return CredibleModes(
-        tuple(mode for mode in plausible if mode.is_driving_point),
-        tuple(mode for mode in against if mode not in small),
-        (
-            *(doubt for _, doubt in judged if doubt is not None),
-            *(_opposed_mode_remark(mode, largest) for mode in small),
-        ),
+        tuple(mode for mode in credible if mode.is_driving_point),
+        tuple(mode for mode in opposed if mode not in small),
+        (*filter(None, rejections), *(_opposed_mode_remark(mode, largest) for mode in small)),
     )
 
 
@@ -175,7 +210,7 @@ def _opposed_mode_remark(mode: Mode, largest: float) -> Remark:
 
 
 def _rejection_remark(mode: Mode) -> Remark | None:
-    """Why a mode is not believed; None where it is."""
+    """Return the reason why a mode is not credible; None if it is."""
     at = f"{mode.frequency:.4g} Hz"
     stiffness = stiffness_remark(mode.stiffness) if mode.has_stiffness else None
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from lobes import Cut
 
+pytestmark = pytest.mark.quick
+
 IMMERSIONS = st.floats(0.001, 1.0)
 
 

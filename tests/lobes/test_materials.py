@@ -20,6 +20,8 @@ from lobes import (
     materials_by_name,
 )
 
+pytestmark = pytest.mark.quick
+
 PAGE = Path(__file__).parents[2] / "docs" / "materials.md"
 LISTED = [known for known in all_cutting_coefficients() if known.specific_forces]
 TESTS = [known for known in all_cutting_coefficients() if not known.specific_forces]

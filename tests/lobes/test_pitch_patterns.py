@@ -12,6 +12,8 @@ from lobes.pitch_patterns import MAX_EDGE_IMBALANCE, MAX_PITCH_DEVIATION
 from lobes.tooth_force import mean_regeneration
 from modal import Mode
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("teeth", [2, 3, 4, 5, 6, 7, 8, 12])
 @pytest.mark.parametrize("half_wave", [1.3, 12.0])

@@ -18,7 +18,9 @@ from lobes import (
     published_feed_per_tooth,
     published_speed_of_any_tool,
 )
-from lobes.tool_data import published_rows
+from lobes.materials import read_table
+
+pytestmark = pytest.mark.quick
 
 PAGE = Path(__file__).parents[2] / "docs" / "tools.md"
 GROUPS = {
@@ -47,7 +49,7 @@ def test_each_row_is_a_range_with_its_source() -> None:
         ("cutting_speeds.csv", "low_m_per_min", "high_m_per_min"),
         ("feeds_per_tooth.csv", "low", "high"),
     ):
-        for row in published_rows(name):
+        for row in read_table(name):
             assert 0 < float(row[low]) <= float(row[high]), row
             assert {*row["tool_material"].split(";")} <= {*TOOL_MATERIALS}, row
             assert row["cut"] in ("slot", "side"), row
@@ -125,13 +127,13 @@ def test_the_page_holds_what_the_tables_hold() -> None:
     names = {
         row["source"].split(": ")[0]
         for table in ("cutting_speeds.csv", "feeds_per_tooth.csv")
-        for row in published_rows(table)
+        for row in read_table(table)
     }
     assert {row[0] for row in rows if len(row) == 2} >= names
 
 
 def page_rows() -> list[list[str]]:
-    """What is known, a row for each group, tool material and kind of cut."""
+    """Return the published ranges, a row for each group, tool material and kind of cut."""
     rows = []
     for group, name in GROUPS.items():
         for tool in TOOL_MATERIALS:

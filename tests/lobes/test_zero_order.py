@@ -32,7 +32,7 @@ def frf(modes: list[Mode]) -> Frf:
 
 
 def test_directional_coefficients() -> None:
-    """alpha = -4 pi H0 / (N Kt)."""
+    """Compare with alpha = -4 pi H0 / (N Kt)."""
     alpha = -4 * math.pi / (3 * 600e6) * mean_force(CUT)
     assert alpha.ravel() == pytest.approx([-1.109956, -1.640796, 1.500796, 0.890044], abs=5e-7)
 

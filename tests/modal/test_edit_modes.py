@@ -26,7 +26,7 @@ OTHER = Mode(298.0, 0.01, 2e8)
 
 
 def measured(modes: list[Mode], noise: float = 0.002, seed: int = 0) -> Extraction:
-    """The extraction of these modes, the noise a share of the largest accelerance."""
+    """Return the extraction of these modes with noise as a share of the largest accelerance."""
     exact = synthesize_frf(modes, LINES).accelerance
     random = np.random.default_rng(seed).normal(size=(2, LINES.size)) * noise * np.max(np.abs(exact)) / np.sqrt(2)
     return extract_modes([from_accelerance(LINES, exact + random[0] + 1j * random[1])])

@@ -55,8 +55,7 @@ def test_a_small_peak_on_the_flank_of_a_far_stronger_one_is_doubtful(weaker: flo
 
 
 def with_echo(noise: float) -> Mode:
-    """A mode with a ripple from an echo of 2 %: alike over many lines, it may hide a shift, however many lines there
-    are."""
+    """Return a mode with a ripple from an echo of 2 %, which is alike over many lines and may hide a shift."""
     echo = 1 + 0.02 * np.exp(-2j * np.pi * 0.35 * LINES)
     exact, random = synthesize_frf([Mode(97.1, 0.02, 7e6)], LINES).accelerance * echo, np.random.default_rng(1)
     off = random.normal(size=(2, LINES.size)) * noise * np.max(np.abs(exact))

@@ -28,6 +28,12 @@ OPTION_NAMES: Mapping[str, str] = {
     "Description.start": "--start",
     "Description.tacho": "--tacho",
     "Description.unit": "--unit",
+    # modal
+    "ModeEdits.add": "--add",
+    "ModeEdits.drop": "--drop",
+    "ModeEdits.fix": "--fix",
+    "modal.synthesize_frf": "lobewatch modes --figure",
+    "numpy.conj": "on the command line: --conjugate",
     # lobewatch.machine
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",

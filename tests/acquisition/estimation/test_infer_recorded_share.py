@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, estimate_frf, from_accelerance, infer_recorded_share
 from modal import Mode, Trust, assess_trust, fit_modes, synthesize_frf
-from tests.modal.test_uncertainty import tap
+from tests.modal.test_hit_scatter import tap
 
 RATE = 12800.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition import Hit, infer_window
-from tests.modal.test_uncertainty import tap
+from tests.modal.test_hit_scatter import tap
 
 
 def under(hit: Hit, time_constant: float) -> Hit:

@@ -10,7 +10,7 @@ from acquisition import Hit, HitFlags, check_hit, evaluate_hit, read_hits
 from acquisition.hit_quality.double_hit import find_second_input
 from acquisition.hits.free_decay import extract_free_decay
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
-from tests.modal.test_uncertainty import PRE_TRIGGER, RECORD, STRUCTURE
+from tests.modal.test_hit_scatter import PRE_TRIGGER, RECORD, STRUCTURE
 
 WIDTH = 0.65e-3
 

@@ -28,7 +28,7 @@ TRUTH = {"front": 9e8, "middle": 6e8, "rear": 4e8, "holder": 3e8}
 
 
 def surrogate(stiffness: Mapping[str, float]) -> Spindle:
-    """The stand-in of the OKADA VM500, with shear, in three groups of bearings and a joint behind the holder."""
+    """Return the stand-in of the OKADA VM500 with shear, three groups of bearings and a joint behind the holder."""
     with GEOMETRY.open(newline="") as file:
         rows = list(csv.DictReader(file))
     names = ("length_mm", "outer_diameter_mm", "bore_diameter_mm")
@@ -327,7 +327,7 @@ def test_an_interval_that_holds_too_little_is_told() -> None:
 
 
 def worn_six_and_four(front: float, rear: float) -> Spindle:
-    """The stand-in of the OKADA VM500 without shear, six bearings in front and four behind, of 1280 N/um at first."""
+    """Return the OKADA VM500 without shear, six bearings in front and four behind, initially 1280 N/um."""
     drawn = replace(surrogate(dict.fromkeys(TRUTH, 1.28e9)), joints=(), theory="euler-bernoulli")
     bearings = [replace(b, group="rear" if b.group == "rear" else "front") for b in drawn.bearings]
     return scale_groups(replace(drawn, bearings=bearings), {"front": front, "rear": rear})

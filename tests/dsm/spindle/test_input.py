@@ -232,6 +232,7 @@ def test_bad_arguments_are_refused(ask: Callable[[], object], message: str) -> N
         ask()
 
 
+@pytest.mark.quick
 def test_a_bearing_at_a_rounded_segment_end_makes_no_node_of_its_own() -> None:
     thirds = [Segment(0.1, 0.05)] * 3
     exact = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.1 + 0.1 + 0.1, 1e8)])

@@ -42,7 +42,7 @@ SPINDLE = Spindle(SHAFT, HELD)
 
 
 def mismatch(cone: Segment, ends: str, theory: Theory, frequency: float) -> float:
-    """Determinant of the end conditions at z = L; 0 at a natural frequency. State: u, t, moment, force."""
+    """Return the determinant of the end conditions at z = L; 0 at a natural frequency. State: u, t, moment, force."""
     w2 = (2 * math.pi * frequency) ** 2
     rigidity = STEEL.youngs_modulus * ring_second_moment(*cone.diameters_at(0.0))
     scale = np.array([1.0, 1 / LENGTH, rigidity / LENGTH**2, rigidity / LENGTH**3])[:, np.newaxis]
@@ -130,7 +130,7 @@ def test_a_free_shaft_of_another_material(name: str, theory: Theory) -> None:
 
 @pytest.mark.parametrize(("place", "share"), [(0.5, 48.0), (0.25, 256 / 3)])
 def test_a_mass_on_a_light_pinned_shaft(place: float, share: float) -> None:
-    """k = 3 EI L/(a^2 b^2): 48 EI/L^3 at the middle."""
+    """Compare with k = 3 EI L/(a^2 b^2): 48 EI/L^3 at the middle."""
     segment = Segment(1.0, 0.05)
     pins = [Bearing(0.0, math.inf), Bearing(1.0, math.inf)]
     shaft = Spindle([segment], pins, density=1e-6, masses=[LumpedMass(place, 20.0)])

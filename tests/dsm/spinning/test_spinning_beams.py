@@ -42,7 +42,7 @@ def angular(beam: SpinningBeam, count: int, spin: float) -> NDArray[np.float64]:
 
 
 def with_growing(beam: SpinningBeam, count: int, spin: float) -> tuple[NDArray[np.float64], tuple[int, int]]:
-    """The same of the modes that last, and how many grow: all in all, and proved."""
+    """Return the steady frequencies, and the number of growing modes: all, and proved."""
     try:
         return angular(beam, count, spin), (0, 0)
     except UnstableSpinError as exc:
@@ -189,8 +189,10 @@ def test_a_stiff_beam_on_springs_that_differ_by_axis() -> None:
 
 
 def finite_elements(beam: SpinningBeam, spin: float, parts: int) -> tuple[NDArray[np.float64], int]:
-    """w > 0 of the modes that last, ascending, and how many grow: M x.. + 2 W G x. + (K - W^2 M) x = 0 of Hermite
-    elements, all dofs of u before all dofs of v."""
+    """Return w > 0 of the steady modes, ascending, and the number of growing modes, by Hermite elements.
+
+    M x.. + 2 W G x. + (K - W^2 M) x = 0, all dofs of u before all dofs of v.
+    """
     n = parts * len(beam.segments)
     size, node = 2 * n + 2, [0.0]
     stiffness, mass = np.zeros((2, size, size)), np.zeros((size, size))

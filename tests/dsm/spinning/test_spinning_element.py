@@ -21,7 +21,7 @@ BEAM = (RIGIDITY_XX, RIGIDITY_YY, MASS, LENGTH)
 
 
 def literal(frequency: float, speed_rpm: float, digits: int = 60, detune: str = "0") -> NDArray[np.float64]:
-    """A B^-1: end forces (A) and end displacements (B) of the eight solutions exp(r z) of the coupled equations.
+    """Return A B^-1: end forces (A) and end displacements (B) of the eight solutions exp(r z) of the coupled equations.
 
     `detune` is added to the speed, as a share of it, where the literal form does not exist.
     """
@@ -50,7 +50,7 @@ def literal(frequency: float, speed_rpm: float, digits: int = 60, detune: str = 
 
 
 def planar(rigidity: float, w: float) -> NDArray[np.float64]:
-    """The element of a beam that does not spin, of one part."""
+    """Return the element of a beam at rest, of one part."""
     terms = element_series(np.array([rigidity]), np.array([MASS]), np.array([LENGTH]))[:, 0]
     a, b, c, d, e, f = terms @ (w**2) ** np.arange(terms.shape[1])
     return np.array([[a, b, d, e], [b, c, -e, f], [d, -e, a, -b], [e, f, -b, c]])
@@ -116,6 +116,7 @@ def test_symmetric_and_each_frequency_by_itself() -> None:
     assert np.array_equal(together, np.concatenate([spinning_element(*BEAM, [f], 20.0) for f in frequency]))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("name", "change"),
     [

@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from acquisition import Circumstances, Remark, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import app
 from lobewatch.show.modes import sort_modes
+from lobewatch.show.terminal.option_names import with_option_names
 from modal import Mode, Trust, assess_trust, synthesize_frf
 
 Shop = Any
@@ -143,7 +144,7 @@ def test_what_cannot_be_done_is_said_and_nothing_is_kept(shop: Shop, file: Path)
         (("--drop", "900", "--unit", "m/N"), "--unit: says how a file is read"),
     ):
         said = run("modes", shop.path, tap_id, *options)
-        assert words in str(said.exception)
+        assert words in with_option_names(str(said.exception))
     assert (shop.path / "journal.jsonl").read_bytes() == lines
     assert "no such tap test" in str(run("modes", shop.path, "zz", "--drop", "900").exception)
     assert "name a tap test" in str(run("modes", shop.path).exception)

@@ -16,7 +16,7 @@ from acquisition import Structure, infer_averages
 from lobewatch.cli import main
 from lobewatch.measurement import Window, fit_file_modes
 from modal import Mode, Trust, assess_trust, synthesize_frf
-from tests.modal.test_remarks import MODE, noisy
+from tests.modal.quality.test_assess_mode import MODE, noisy
 
 FREQUENCY, DAMPING, STIFFNESS = 500.0, 0.005, 3e7
 STRUCTURE = Structure(np.array([FREQUENCY, 1400.0]), np.array([DAMPING, 0.03]), np.array([STIFFNESS, 5e7]))

@@ -9,7 +9,7 @@ import pytest
 
 from tests.lobewatch.commands.conftest import Run, refused
 from tests.lobewatch.logbook.test_replay_without_force import record
-from tests.modal.test_uncertainty import TRUTH
+from tests.modal.test_hit_scatter import TRUTH
 
 
 @pytest.fixture

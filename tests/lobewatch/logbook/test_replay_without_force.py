@@ -13,7 +13,7 @@ from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE as RATE
 from tests.lobewatch.conftest import Shop
-from tests.modal.test_uncertainty import TRUTH, tap
+from tests.modal.test_hit_scatter import TRUTH, tap
 
 WITHOUT = '[tap]\nhammer = "none"\n'
 

@@ -14,7 +14,7 @@ LENGTH, DIAMETER, BORE = 0.8, 0.06, 0.02
 
 
 def beam(stiffness: float = math.inf, diameter: float = DIAMETER) -> Spindle:
-    """A uniform ring on two bearings at its ends, of two segments."""
+    """Return a uniform ring on two bearings at its ends, of two segments."""
     segment = Segment(LENGTH / 2, diameter, diameter * BORE / DIAMETER)
     return Spindle([segment, segment], [Bearing(0.0, stiffness), Bearing(LENGTH, stiffness)])
 

@@ -20,7 +20,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.speed_pockets import find_speed_pockets
 from tests.lobewatch.commands.test_listen import recording
 from tests.lobewatch.conftest import Shop
-from tests.modal.test_uncertainty import tap
+from tests.modal.test_hit_scatter import tap
 
 PROGRAM = ("A", 12800.0, 2.0)
 

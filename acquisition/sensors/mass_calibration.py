@@ -76,8 +76,8 @@ class MassCalibration:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """Remarks on what is wrong, empty if the mass is rigid and both sensitivities agree."""
-        doubts = (self._phase_remark, self._sign_remark, self._size_remark)
-        return tuple(remark for remark in (*doubts, *self._mistakes) if remark is not None)
+        remarks = (self._phase_remark, self._sign_remark, self._size_remark)
+        return tuple(remark for remark in (*remarks, *self._mistakes) if remark is not None)
 
     @property
     def _phase_remark(self) -> Remark | None:

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
@@ -94,7 +94,7 @@ class FileSource(ClosedOnExit):
             yield from _split_blocks(codes[:, middle:], hit.overload, hit.lost_scans)
         yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
 
-    def _codes(self, hit: Hit) -> NDArray[np.int32]:
+    def _codes(self, hit: Hit) -> Codes:
         if hit.codes is not None:
             return hit.codes
         return np.stack([channel.encode(values) for channel, values in zip(self.channels, hit.signals, strict=True)])
@@ -109,14 +109,14 @@ def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
     return Channel(quantity, 1.0, full_scale or 1.0, REPLAY_ADC_BITS)
 
 
-def _extract_quiet_scans(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
+def _extract_quiet_scans(hit: Hit, codes: Codes) -> Codes:
     """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, channels)."""
     before = int(0.8 * count_pre_hit_samples(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])
 
 
-def _split_blocks(codes: NDArray[np.int32], overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
+def _split_blocks(codes: Codes, overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
     for first in range(0, codes.shape[1], REPLAY_BLOCK_SCANS):
         block = codes[:, first : first + REPLAY_BLOCK_SCANS]
         yield Block(0, block, overload, lost_before if first == 0 else 0)

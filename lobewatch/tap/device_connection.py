@@ -26,7 +26,7 @@ from acquisition import (
 )
 from acquisition.channel import ChannelQuantity
 from acquisition.devices import convert_driver_errors
-from acquisition.hits import TapInputs
+from acquisition.hit import TapInputs
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.setup_tables import DaqTable

@@ -208,7 +208,7 @@ def _slice_record(record: Hit, start: int, end: int) -> Hit:
         record.codes[:, start:end],
         None if record.cross_hit is None else _slice_record(record.cross_hit, start, end),
     )
-    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, beside=beside)
+    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, cross_hit=beside)
 
 
 REFERENCE_HITS = 10

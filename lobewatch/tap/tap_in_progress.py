@@ -27,6 +27,7 @@ from acquisition import (
 )
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
+from acquisition.hit_fault import HIT_FAULTS
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.tap.spool import (
@@ -45,9 +46,8 @@ def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
     try:
         return judge()
     except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
-        return HitVerdict.from_findings(
-            {HitFlags.NOT_EVALUATED: f"Judging it failed ({type(error).__name__}: {error})"}
-        )
+        failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
+        return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
 
 
 DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT)

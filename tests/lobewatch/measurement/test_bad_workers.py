@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
 
 from acquisition import Description
 from lobewatch import Logbook
 from lobewatch.logbook.rebuild_history import rebuild_history
 from lobewatch.logbook.replay_preview import preview_replay
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.measurement.share_work import WorkerPool, Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit
+from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
 
 SAID = Description(date_pattern="%Y-%m-%d")
 CLUSTER = Workers(scheduler="tcp://bad:1")
@@ -36,9 +36,9 @@ def spoiled(monkeypatch: pytest.MonkeyPatch) -> Callable[[Spoil], None]:
             return spoil(answer) if whole else (software, spoil(answer))
 
         @contextmanager
-        def cluster(_address: str) -> Iterator[Any]:
+        def cluster(_address: str) -> Iterator[WorkerPool]:
             with ThreadPoolExecutor(2) as pool:
-                yield pool, 2, result
+                yield WorkerPool(pool, 2, result)
 
         monkeypatch.setattr("lobewatch.measurement.share_work.connect_cluster", cluster)
 
@@ -46,7 +46,7 @@ def spoiled(monkeypatch: pytest.MonkeyPatch) -> Callable[[Spoil], None]:
 
 
 def forged(record: Any, **changes: Any) -> Any:
-    """A record as it comes from elsewhere: nothing looks at its values."""
+    """Return a record with unchecked values, as from another process."""
     new = object.__new__(type(record))
     new.__dict__.update(vars(record) | changes)
     return new

@@ -35,7 +35,7 @@ def run(*arguments: object) -> Result:
 
 
 def rows_of(shop: Shop, *conditions: Conditions) -> tuple[HistoryRow, ...]:
-    """The history of a spindle whose frequency is another one at each test, 12 % lower each."""
+    """Return the history of a spindle whose frequency drops by 12 % at each test."""
     for number, stated in enumerate(conditions):
         shop.tap(30 * number, 2100.0 * 0.88**number, conditions=stated)
     rows: tuple[HistoryRow, ...] = shop.logbook.history.rows
@@ -43,7 +43,7 @@ def rows_of(shop: Shop, *conditions: Conditions) -> tuple[HistoryRow, ...]:
 
 
 def series_of(rows: tuple[HistoryRow, ...]) -> list[int]:
-    """Number of the first test of the series of each."""
+    """Return the number of the first test of the series of each row."""
     ids = [row.tap_id for row in rows]
     return [ids.index(row.series) for row in rows]
 
@@ -66,14 +66,14 @@ def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Con
     (remark,) = [remark for remark in last.remarks if remark.code == "new-series"]
     assert remark.text.startswith(text)
     assert not last.questions
-    standing = shop.logbook.standing(shop.start + timedelta(days=61))
-    assert [series.is_first for series in standing.series] == [True]
+    standing = shop.logbook.status(shop.start + timedelta(days=61))
+    assert [series.is_baseline for series in standing.series] == [True]
     assert "frequency-alarm" not in [remark.code for remark in standing.remarks]
 
 
 def test_a_series_that_is_not_divided_alarms(shop: Shop) -> None:
     rows_of(shop, WARM, WARM)
-    assert shop.logbook.standing(shop.start + timedelta(days=31)).light == "alarm"
+    assert shop.logbook.status(shop.start + timedelta(days=31)).status == "alarm"
 
 
 def test_what_is_unknown_divides_nothing(shop: Shop) -> None:
@@ -93,8 +93,8 @@ def test_an_earlier_series_goes_on(shop: Shop) -> None:
     rows = rows_of(shop, WARM, cold, WARM, cold)
     assert series_of(rows) == [0, 1, 0, 1]
     assert [codes(row) for row in rows[1:]] == [{"new-series"}, {"earlier-series"}, {"earlier-series"}]
-    (series,) = shop.logbook.standing(shop.start + timedelta(days=91)).series
-    assert series.fall.value == pytest.approx(100 * (1 - 0.88**2), abs=0.1)
+    (series,) = shop.logbook.status(shop.start + timedelta(days=91)).series
+    assert series.drop.value == pytest.approx(100 * (1 - 0.88**2), abs=0.1)
 
 
 def test_directions_of_two_series_are_no_assembly(shop: Shop) -> None:
@@ -148,7 +148,7 @@ def test_the_stick_out_is_that_of_one_tool_and_a_tap_file_says_its_own(shop: Sho
     copy.write_bytes(file.read_bytes())
     (entry,) = shop.folder.taps()
     shop.folder.journal.path.unlink()
-    shop.folder.journal.copy.unlink()
+    shop.folder.journal.copy_path.unlink()
     file.unlink()
     run("replay", shop.path, copy, "--date", "2026-02-01", "--note", "x")
     (again,) = shop.folder.taps()

@@ -20,7 +20,7 @@ TRUE = Mode(1713.0, 0.03, 3.5e7)
 
 @pytest.fixture
 def machine() -> Machine:
-    """The example without a band, so that any mode may be followed."""
+    """Return the example without a band, so that any mode may be followed."""
     text = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
     return parse_machine_file(text.replace("band_hz", "# band_hz"))
 

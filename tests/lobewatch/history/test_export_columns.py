@@ -17,10 +17,10 @@ def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: 
     shop.tap(0, 1713.0)
     newest = shop.tap(30, 1650.0)
     logbook = shop.logbook
-    rulings = logbook.rulings(newest)
+    rulings = logbook.stored_verdicts(newest)
     columns = make_export_columns(logbook.history, logbook.machine).columns
     expected = [rulings[name].limit for name in "ABC"]
     assert np.all(np.isfinite(expected))
     assert np.asarray(columns["program_limit"])[1] == pytest.approx(expected)
     assert np.all(np.isnan(np.asarray(columns["program_limit"])[0]))
-    assert list(columns["program_verdict"]) == ["", "\n".join(rulings[name].word for name in "ABC")]
+    assert list(columns["program_verdict"]) == ["", "\n".join(rulings[name].stability for name in "ABC")]

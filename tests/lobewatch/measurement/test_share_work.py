@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster, Security
-from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
 from typer.testing import CliRunner
 
 from acquisition import DataError, Description
@@ -25,6 +24,7 @@ from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.measurement.share_work import Workers, scheduler_remarks, share_work
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from tests.lobewatch.authority import certify
+from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
 
 PAGE = (Path(__file__).parents[4] / "docs" / "performance-replay.md").read_text("utf-8")
 SAID = Description(date_pattern="%Y-%m-%d")
@@ -95,7 +95,7 @@ def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCl
         assert "2 of 2 machines rebuilt" in said
         histories.append([repr(row) for name in ("a", "b") for row in Logbook.open(plant / name).history.rows])
     assert len(histories[0]) == 3
-    assert "rulings=None" not in histories[0][0]
+    assert "verdicts=None" not in histories[0][0]
     assert histories[0] == histories[1]
     (plant / "b" / "machine.toml").write_text("[machine")
     with pytest.raises(DataError, match=r"1 of 2 machines cannot be rebuilt\n.*machine\.toml"):
@@ -103,10 +103,10 @@ def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCl
 
 
 def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="--jobs 2 and --scheduler tcp://x: give one of them"):
+    with pytest.raises(ValueError, match="Workers.jobs 2 and Workers.scheduler tcp://x: give one of them"):
         Workers(2, "tcp://x")
     monkeypatch.setattr("lobewatch.measurement.share_work.SCHEDULER_TIMEOUT", 0.3)
-    with pytest.raises(DataError, match=r"--scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):
+    with pytest.raises(DataError, match=r"Workers.scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):
         [*share_work(abs, [1], Workers(scheduler="tcp://127.0.0.1:9"))]
     monkeypatch.setattr("lobewatch.measurement.share_work.SCHEDULER_TIMEOUT", 10.0)
     workers = Workers(scheduler=cluster.scheduler_address)
@@ -121,7 +121,7 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
 
 @pytest.mark.parametrize("address", ["", "x", "foo://h:1", "tls://", "tcp://[::1", "tcp://h:port", "inproc://x"])
 def test_what_is_no_address_of_a_scheduler_is_one_sentence(address: str) -> None:
-    with pytest.raises(DataError, match=rf"^--scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"):
+    with pytest.raises(DataError, match=rf"^Workers.scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"):
         scheduler_remarks(address)
     with pytest.raises(DataError, match="is no address"):
         [*share_work(abs, [1], Workers(scheduler=address or "/"))]
@@ -139,7 +139,7 @@ def test_who_answers_and_is_no_scheduler_is_one_sentence() -> None:
         stranger = threading.Thread(target=refuse)
         stranger.start()
         address = f"127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(DataError, match=f"^--scheduler {address}: no Dask scheduler answers there"):
+        with pytest.raises(DataError, match=f"^Workers.scheduler {address}: no Dask scheduler answers there"):
             [*share_work(abs, [1], Workers(scheduler=address))]
         stranger.join()
 
@@ -147,7 +147,7 @@ def test_who_answers_and_is_no_scheduler_is_one_sentence() -> None:
 @pytest.mark.parametrize("address", ["tcp://10.0.0.5:8786", "mill-pc:8786", "tcp://[fd00::1]:8786", "ws://mill-pc:80"])
 def test_a_scheduler_elsewhere_without_encryption_is_remarked(address: str) -> None:
     (remark,) = Workers(scheduler=address).remarks
-    assert (remark.code, remark.about) == ("scheduler-open", f"--scheduler {address}")
+    assert (remark.code, remark.about) == ("scheduler-open", f"Workers.scheduler {address}")
 
 
 @pytest.mark.parametrize(

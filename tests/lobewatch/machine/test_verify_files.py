@@ -51,7 +51,7 @@ def rename(folder: MachineFolder) -> None:
 
 
 def cut_both(folder: MachineFolder) -> None:
-    """The last line, off both files at its boundary."""
+    """Cut the last line off both files."""
     for name in ("journal.jsonl", "journal.copy.jsonl"):
         path = folder.path / name
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
@@ -149,7 +149,7 @@ def test_one_sound_copy_has_all_corrections(folder: MachineFolder) -> None:
 
 
 def copied(folder: MachineFolder, early: list[str], target: Path, write: Callable[[], object]) -> None:
-    """A copy of the folder, these files of it from before a writing, all others from after."""
+    """Copy the folder with some files from before a write and all others from after it."""
     before = {name: (folder.path / name).read_bytes() for name in early}
     write()
     shutil.copytree(folder.path, target)
@@ -213,7 +213,7 @@ def test_the_commands_say_it(folder: MachineFolder) -> None:
 
 
 def newest_rows(path: Path) -> dict[int, bytes]:
-    """The bytes of each row by its number; a later one stands for an earlier one."""
+    """Return the bytes of each row by its number; later rows replace earlier ones."""
     return {msgspec.msgpack.decode(row)[0]: row for row in read_rows(path / "history.rows").rows[1:]}
 
 
@@ -221,11 +221,11 @@ def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) 
     shop.run(("A", 12900, 1.0))  # type: ignore[attr-defined]
     for days in (0, 30):
         shop.tap_both(days)  # type: ignore[attr-defined]
-        shop.logbook.standing()  # type: ignore[attr-defined]
+        shop.logbook.status()  # type: ignore[attr-defined]
     path: Path = shop.path  # type: ignore[attr-defined]
     logbook = shop.logbook  # type: ignore[attr-defined]
     for tap in logbook.taps:
-        logbook.rulings(tap.id)
+        logbook.stored_verdicts(tap.id)
     before = newest_rows(path)
     said = CliRunner().invoke(app, ["rebuild", str(path)], catch_exceptions=False)
     assert said.stdout.endswith("history.rows: made anew from 4 tap test(s)\n")
@@ -304,7 +304,7 @@ def test_the_rest_of_the_spool_of_a_saved_test_is_no_damage(full: Path) -> None:
 
 
 def results_of(folder: MachineFolder) -> list[bytes]:
-    """What all results follow from."""
+    """Return the content of all files behind results."""
     found = MachineFolder(folder.path)
     taps = found.taps()
     return [*(found.read(entry).required_frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]

@@ -133,7 +133,7 @@ def test_the_page_lists_the_ranges_that_a_slip_of_1000_may_stay_in() -> None:
 
 
 def machine_of(**changes: Any) -> Machine:
-    """The full machine with changes to its first program."""
+    """Return the full machine with changes to its first program."""
     tables = copy.deepcopy(TABLES)
     tables["program"][0] |= changes
     return parse_machine_file(text_of(tables))
@@ -175,7 +175,7 @@ def test_what_the_template_holds_is_nobodys() -> None:
     tables["spindle"]["bearing_stiffness_n_per_um"] = 500.0
     tables["program"][0] |= {"tangential_n_per_mm2": 700, "radial_n_per_mm2": 250}
     machine = parse_machine_file(text_of(tables))
-    assert [doubted.code for doubted in find_all_questions(machine)] == ["setting-guessed"]
+    assert [doubted.fault for doubted in find_all_questions(machine)] == ["setting-guessed"]
     guessed = find_template_bearings(machine)
     assert guessed is not None
     assert guessed.key == "bearing_stiffness_n_per_um"

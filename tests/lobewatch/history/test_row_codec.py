@@ -74,7 +74,7 @@ def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_opened_anew(shop
     assert [round(row.frequency.value) for row in logbook.history.rows] == [1713, 1712, 1710, 1700, 1690]
     known = values(logbook)
     assert known == values(shop.logbook)
-    shop.folder.history.unlink()
+    shop.folder.history_path.unlink()
     assert known == values(shop.logbook)
 
 

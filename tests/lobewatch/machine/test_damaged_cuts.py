@@ -30,7 +30,7 @@ CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 
 @pytest.fixture
 def heard(shop: Shop) -> Path:
-    """A tapped machine with two cuts that were recorded."""
+    """Return a tapped machine with two recorded cuts."""
     shop.run(("A", 12000, 2.0))
     shop.tap_both()
     for speed in (12000.0, 11000.0):
@@ -57,7 +57,7 @@ def damage(file: Path, chance: random.Random) -> None:
 
 
 def forget(path: Path) -> None:
-    """The journal is lost: recordings are entered from what stands in them."""
+    """Enter recordings from their own data after the journal is lost."""
     for name in ("journal.jsonl", "journal.copy.jsonl"):
         (path / name).unlink()
 

@@ -25,8 +25,8 @@ from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_c
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, open_device
-from lobewatch.tap.evaluated_hits import StatePublisher
 from lobewatch.tap.live_curves import find_extremes
+from lobewatch.tap.state import StatePublisher
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""

@@ -86,7 +86,7 @@ def busy(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
         (break_rights, "port /dev/ttyACM0", "hinders", "usermod -aG dialout"),
         (slow_latency, "latency of ttyUSB0", "note", "echo 1 | sudo tee"),
         (full_disk, "disk of", "hinders", "make room"),
-        (no_browser, "browser", "note", "--listen 0.0.0.0"),
+        (no_browser, "browser", "note", "ScreenServer.listen 0.0.0.0"),
         (busy, "processor", "note", "close other programs"),
     ],
 )

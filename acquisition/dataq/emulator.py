@@ -126,36 +126,36 @@ class DataqEmulator(EmulatorThread):
             self._start()
 
     def serve_once(self) -> bool:
-        lines, self._received = split_lines(self._received + self.wire.exchange(self._patience()))
+        lines, self._received = split_lines(self._received + self.wire.exchange(self._wait_time()))
         for line in [] if self._faults.ignores_commands else lines:
-            self._obey(line)
+            self._execute(line)
         if self.streaming:
             self._stream()
         limit = self._faults.unplug_after
         return limit is None or not self.streaming or self._scan < limit
 
-    def _patience(self) -> float:
+    def _wait_time(self) -> float:
         """Return how long to wait for the host (s)."""
         if not self.streaming:
             return 0.05
         return 0.002 if self._realtime or not self._has_room() else 0.0
 
-    def _obey(self, line: str) -> None:
+    def _execute(self, line: str) -> None:
         if self.streaming:
             if line == "stop":
                 self.streaming = False
                 time.sleep(self._traits.stop_delay)
                 if self._traits.echoes_stop:
-                    self._say(line)
+                    self._reply(line)
             return
         name, *arguments = line.split() or [""]
         if name == "start":
             self._start()
             return
         try:
-            self._say(self._answer(name, arguments, line))
+            self._reply(self._answer(name, arguments, line))
         except (ValueError, LookupError):
-            self._say(INVALID_PARAMETER_REPLY)
+            self._reply(INVALID_PARAMETER_REPLY)
 
     def _answer(self, name: str, arguments: list[str], line: str) -> str:
         """Return the echo with its additions. ValueError or LookupError for invalid arguments."""
@@ -184,7 +184,7 @@ class DataqEmulator(EmulatorThread):
             raise ValueError(position)
         self._scan_list[position:] = [code]
 
-    def _say(self, line: str) -> None:
+    def _reply(self, line: str) -> None:
         self.wire.pending += line.encode() + (b"\r\0" if self._traits.trailing_nul else b"\r")
 
     def _start(self) -> None:
@@ -192,7 +192,7 @@ class DataqEmulator(EmulatorThread):
         self._rate = setting.rate(int(self._info[9])) * (0.5 if self._faults.halved_rate else 1.0)
         self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.is_multiplexed else 1))
         self._started, self._scan, self._sent = self._clock(), 0, 0
-        self._waiting = b""
+        self._unsent = b""
         self.streaming = True
 
     def _stream(self) -> None:
@@ -206,11 +206,11 @@ class DataqEmulator(EmulatorThread):
         if self._realtime:
             due = min(int((self._clock() - self._started) * self._rate) - self._scan, MAX_SCANS_PER_STEP)
         if due > 0:
-            self._waiting += self._scans(due).tobytes()
+            self._unsent += self._scans(due).tobytes()
         size = packet_bytes(self._settings["ps"])
-        while len(self._waiting) >= size:
-            self._send(self._waiting[:size])
-            self._waiting = self._waiting[size:]
+        while len(self._unsent) >= size:
+            self._send(self._unsent[:size])
+            self._unsent = self._unsent[size:]
         limit = self._faults.overflow_after
         if limit is not None and self._scan >= limit and self._may_overflow:
             self._may_overflow = False

@@ -245,8 +245,8 @@ class DataqCommandLink:
             self._link.write(encode_command(command))
             unfinished = b""
             deadline = time.monotonic() + DATAQ_ECHO_TIMEOUT
-            while (left := deadline - time.monotonic()) > 0:
-                lines, unfinished = split_lines(unfinished + self._link.read(left))
+            while (remaining := deadline - time.monotonic()) > 0:
+                lines, unfinished = split_lines(unfinished + self._link.read(remaining))
                 for line in lines:
                     answer = parse_answer(command, line)
                     if answer is not None and not any(refusal in answer for refusal in REFUSAL_REPLIES):
@@ -273,9 +273,9 @@ def probe_dataq(link: SerialLink) -> DeviceIdentity | None:
     DeviceIdentity or None
         Identity of the device, None if no DATAQ device answers.
     """
-    dialogue = DataqCommandLink(link, tries=1)
+    commands = DataqCommandLink(link, tries=1)
     try:
-        dialogue.halt()
-        return dialogue.identify().identity
+        commands.halt()
+        return commands.identify().identity
     except DeviceError:
         return None

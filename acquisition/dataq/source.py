@@ -93,11 +93,11 @@ class DataqSource(ClosedOnExit):
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
         self._has_sent = False
-        self._heard = 0.0
+        self._last_arrival = 0.0
         self._link = SerialLink(port)
-        self._dialogue = DataqCommandLink(self._link)
+        self._commands = DataqCommandLink(self._link)
         try:
-            self._dialogue.halt()
+            self._commands.halt()
             device = self._identify()
             self.identity = device.identity
             self.sample_rate = self._configure(
@@ -110,16 +110,16 @@ class DataqSource(ClosedOnExit):
     def start(self) -> None:
         """Start an endless stream."""
         if self._has_sent:
-            self._dialogue.synchronize()
+            self._commands.synchronize()
         self._has_sent, self._next_scan = True, 0
-        self._heard = time.monotonic()
+        self._last_arrival = time.monotonic()
         self._decoder.begin()
         self._link.write(encode_command("start"))  # no echo: the stream begins
         self.status = DataqStatus.SCANNING
 
     def stop(self) -> None:
         self.status = DataqStatus.STOPPED
-        self._dialogue.halt()
+        self._commands.halt()
 
     def close(self) -> None:
         """Stop the device if it still answers, and close the port."""
@@ -137,23 +137,23 @@ class DataqSource(ClosedOnExit):
         After an overflow of the device's buffer, or of ours because nobody read the blocks in time, scanning is
         restarted. The clock gives the length of the gap.
         """
-        since = time.monotonic()
+        last_progress = time.monotonic()
         while self.status != DataqStatus.STOPPED:
             data = self._link.read(0.1)
             if self._link.overruns > self._overruns or (not data and self._decoder.has_overflowed()):
                 if self.status == DataqStatus.SCANNING:
-                    since = time.monotonic()
+                    last_progress = time.monotonic()
                 self._start_again()
                 continue
-            for piece in self._decoder.feed(data):
+            for block in self._decoder.feed(data):
                 self.status = DataqStatus.SCANNING
-                yield self._block(piece)
-                since = self._heard = time.monotonic()
-            if time.monotonic() - since > DATAQ_SILENCE_TIMEOUT:
+                yield self._block(block)
+                last_progress = self._last_arrival = time.monotonic()
+            if time.monotonic() - last_progress > DATAQ_SILENCE_TIMEOUT:
                 raise self._failed(bool(data))
 
-    def _block(self, piece: CodeBlock) -> Block:
-        codes, lost = piece
+    def _block(self, block: CodeBlock) -> Block:
+        codes, lost = block
         first = self._next_scan + lost
         self._next_scan = first + codes.shape[1]
         return Block(first, codes, lost_before=lost)
@@ -161,11 +161,11 @@ class DataqSource(ClosedOnExit):
     def _start_again(self) -> None:
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
-        self._dialogue.halt()
-        self._dialogue.synchronize()
+        self._commands.halt()
+        self._commands.synchronize()
         self._link.write(encode_command("start"))
         self._overruns = self._link.overruns
-        self._decoder.begin(lost=max(round((time.monotonic() - self._heard) * self.sample_rate), 1))
+        self._decoder.begin(lost=max(round((time.monotonic() - self._last_arrival) * self.sample_rate), 1))
 
     def _failed(self, sends: bool) -> DeviceError:
         if sends:
@@ -179,7 +179,7 @@ class DataqSource(ClosedOnExit):
         )
 
     def _identify(self) -> DataqInfo:
-        identity = self._dialogue.identify()
+        identity = self._commands.identify()
         version = parse_firmware(identity.firmware)
         if version is not None and version < MIN_FIRMWARE_VERSION:
             raise DeviceError(
@@ -197,9 +197,13 @@ class DataqSource(ClosedOnExit):
             codes.append(DIGITAL_INPUTS_CODE)
         setting = choose_rate(wanted, device.dividend)
         rate = setting.rate(device.dividend)
-        commands = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
-        commands += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
-        for command in (*commands, f"ps {choose_packet_code(2 * len(codes) * rate)}"):
-            self._dialogue.send_command(command)
-        self._dialogue.drain()  # a NUL after the last echo would be taken for the first byte of the stream
+        setup = [
+            "encode 0",
+            *(f"slist {position} {code}" for position, code in enumerate(codes)),
+            "filter * 0",
+        ]
+        setup += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
+        for command in (*setup, f"ps {choose_packet_code(2 * len(codes) * rate)}"):
+            self._commands.send_command(command)
+        self._commands.drain()  # a NUL after the last echo would be taken for the first byte of the stream
         return rate

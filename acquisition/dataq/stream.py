@@ -28,7 +28,7 @@ class DigitalClock:
     """Square wave on digital input 0 whose periods show the loss of whole scans."""
 
     def __init__(self) -> None:
-        self._learning: list[int] = []
+        self._measured_periods: list[int] = []
         self._period = 0.0
         self.restart()
 
@@ -57,25 +57,27 @@ class DigitalClock:
                 self._high = False
                 return at, missing
             self._edge, self._waited = at, -at
-        self._go_on(high)
+        self._advance(high)
         return high.size, 0
 
     def _missing(self, scans: int) -> int:
         """Return the number of scans missing between two edges this far apart."""
         if not self._period:
-            self._learn(scans)
+            self._measure_period(scans)
             return 0
         if abs(scans - self._period) <= CLOCK_PERIOD_TOLERANCE:
             return 0
         missing = -scans % self._period
         return round(missing if missing > CLOCK_PERIOD_TOLERANCE else missing + self._period)
 
-    def _learn(self, scans: int) -> None:
-        self._learning.append(scans)
-        if len(self._learning) < CLOCK_TRAINING_PERIODS:
+    def _measure_period(self, scans: int) -> None:
+        self._measured_periods.append(scans)
+        if len(self._measured_periods) < CLOCK_TRAINING_PERIODS:
             return
         even = [
-            length for length in self._learning if abs(length - np.median(self._learning)) <= CLOCK_PERIOD_TOLERANCE
+            length
+            for length in self._measured_periods
+            if abs(length - np.median(self._measured_periods)) <= CLOCK_PERIOD_TOLERANCE
         ]
         self._period = float(np.mean(even))
         if (
@@ -84,7 +86,7 @@ class DigitalClock:
         ):
             raise _make_clock_error()
 
-    def _go_on(self, high: Flags) -> None:
+    def _advance(self, high: Flags) -> None:
         self._high = bool(high[-1])
         self._waited += high.size
         if self._edge is not None:
@@ -126,7 +128,7 @@ class ScanDecoder:
     def __init__(self, n_channels: int, digital_word: bool, clock: bool = False) -> None:
         self._n_channels, self._checked = n_channels, digital_word
         self._clock = DigitalClock() if clock else None
-        self._steady = ~CLOCK_BIT if clock else -1
+        self._mask = ~CLOCK_BIT if clock else -1
         self._scan_bytes = 2 * (n_channels + digital_word)
         self.begin()
 
@@ -141,19 +143,19 @@ class ScanDecoder:
     def feed(self, data: bytes) -> list[CodeBlock]:
         """Return the scans that these bytes complete."""
         self._bytes += data
-        pieces = []
-        while (piece := self._next_piece()) is not None:
-            pieces.append(piece)
-        return pieces
+        blocks = []
+        while (block := self._next_block()) is not None:
+            blocks.append(block)
+        return blocks
 
     def has_overflowed(self) -> bool:
         """Return whether the stream ends with the overflow reply of the device."""
         return OVERFLOW_REPLY in self._bytes[-HELD_BACK_BYTES:]
 
-    def _next_piece(self) -> CodeBlock | None:
+    def _next_block(self) -> CodeBlock | None:
         """Return the scans up to the next gap, None until more bytes arrive."""
         while (count := (len(self._bytes) - HELD_BACK_BYTES) // self._scan_bytes) > 0:
-            intact = self._intact(count)
+            intact = self._count_intact(count)
             if intact:
                 return self._take(intact)
             if count < SYNC_WINDOW_SCANS + 2:
@@ -161,13 +163,13 @@ class ScanDecoder:
             self._find_word()
         return None
 
-    def _intact(self, count: int) -> int:
+    def _count_intact(self, count: int) -> int:
         """Count the next scans that have the digital word in its place."""
         if not self._checked:
             return count
         if not self._in_place:
             return 0
-        wrong = np.flatnonzero(self._digital_words(0, count) & self._steady != self._word)
+        wrong = np.flatnonzero(self._digital_words(0, count) & self._mask != self._word)
         self._in_place = wrong.size == 0
         return count if self._in_place else int(wrong[0])
 
@@ -192,12 +194,12 @@ class ScanDecoder:
 
     def _find_word(self) -> None:
         """Move the next scan to the head of the buffer. If it cannot be located, drop one scan."""
-        shift = self._shift()
+        shift = self._find_shift()
         if shift is None:
             self._bytes = self._bytes[self._scan_bytes :]
             self._lost += 1
             return
-        word = int(self._digital_words(shift, 1)[0]) & self._steady
+        word = int(self._digital_words(shift, 1)[0]) & self._mask
         if shift or word == self._word:  # not a new word in the old place: the next scan may be made of two
             self._lost += (shift + self._scan_bytes + self._missing_bytes(shift)) // self._scan_bytes
             self._bytes = self._bytes[shift + self._scan_bytes :]
@@ -208,7 +210,7 @@ class ScanDecoder:
         if self._clock:
             self._clock.restart()
 
-    def _shift(self) -> int | None:
+    def _find_shift(self) -> int | None:
         """Return the bytes to the next scan: by the known word, else a new one in the old place, else anywhere."""
         words = {shift: self._steady_word(shift) for shift in range(self._scan_bytes)}
         steady = [shift for shift, word in words.items() if word is not None]
@@ -218,7 +220,7 @@ class ScanDecoder:
         return next(iter(same or steady), None)
 
     def _steady_word(self, shift: int) -> int | None:
-        words = self._digital_words(shift, SYNC_WINDOW_SCANS) & self._steady
+        words = self._digital_words(shift, SYNC_WINDOW_SCANS) & self._mask
         first = int(words[0])
         return first if first & 0x80FF == 0 and np.all(words == first) else None
 

@@ -136,7 +136,7 @@ class HammeredStructure:
         while self._next_hit < first_scan + n_scans:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
             self._waves.append(self._hit(self._next_hit))
-        signals = self._noise_of(n_scans)
+        signals = self._draw_noise(n_scans)
         self._waves = [(start, wave) for start, wave in self._waves if start + wave.shape[1] > first_scan]
         for start, wave in self._waves:
             low, high = max(start, first_scan), min(start + wave.shape[1], first_scan + n_scans)
@@ -144,12 +144,12 @@ class HammeredStructure:
                 signals[:, low - first_scan : high - first_scan] += wave[:, low - start : high - start]
         return signals
 
-    def _noise_of(self, n_scans: int) -> Floats:
+    def _draw_noise(self, n_scans: int) -> Floats:
         rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.cross_structures))]
         pieces, rest = divmod(n_scans, NOISE_BLOCK_SCANS)
-        whole = self._noise.standard_normal((pieces, len(rms), NOISE_BLOCK_SCANS))
-        drawn = np.concatenate([*whole, self._noise.standard_normal((len(rms), rest))], axis=1)
-        return np.asarray(np.array(rms)[:, np.newaxis] * drawn)
+        blocks = self._noise.standard_normal((pieces, len(rms), NOISE_BLOCK_SCANS))
+        noise = np.concatenate([*blocks, self._noise.standard_normal((len(rms), rest))], axis=1)
+        return np.asarray(np.array(rms)[:, np.newaxis] * noise)
 
     def _hit(self, scan: float) -> tuple[int, Floats]:
         peak = self.random.uniform(*self.hammering.force_range)
@@ -158,19 +158,21 @@ class HammeredStructure:
         if fault > 1 - self.hammering.overloads:
             peak *= 20
         start = int(np.ceil(scan))
-        time = (start - scan + np.arange(self._length(width))) / self.sample_rate
+        time = (start - scan + np.arange(self._response_length(width))) / self.sample_rate
         wave = peak * self._pulse(time, width)
         if fault < self.hammering.double_hits:
             delay = self.random.uniform(4, 12) * width
             wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
         return start, wave
 
-    def _length(self, width: float) -> int:
+    def _response_length(self, width: float) -> int:
         """Return the samples until the slowest mode has decayed to a millionth."""
-        felt = (self.structure, *self.cross_structures)
-        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in felt)
+        structures = (self.structure, *self.cross_structures)
+        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in structures)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
     def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
-        return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.cross_structures))])
+        return np.stack(
+            [force, *(structure.response(time, width) for structure in (self.structure, *self.cross_structures))]
+        )

@@ -50,8 +50,8 @@ class Housing:
             r = frequency / natural
             total += share / (1 - r**2 + 2j * zeta * r)
         r = frequency / SENSOR_MOUNT_FREQUENCY
-        heard: Complexes = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
-        return heard
+        transfer: Complexes = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
+        return transfer
 
 
 def make_random_housing(random: np.random.Generator, speed_rpm: float) -> Housing:
@@ -110,8 +110,8 @@ def sample_housing(
     ndarray, shape (n,)
         Acceleration (m/s^2).
     """
-    sound = HousingSignal(motion, housing, speed_rpm, sample_rate, random)
-    return np.asarray(sound(0, sound.n_scans)[1])
+    signal = HousingSignal(motion, housing, speed_rpm, sample_rate, random)
+    return np.asarray(signal(0, signal.n_scans)[1])
 
 
 @dataclass(eq=False)
@@ -161,7 +161,7 @@ class HousingSignal:
 def _housing_acceleration(motion: TipMotion, housing: Housing) -> Floats:
     """Return the oversampled acceleration of the housing caused by the tip."""
     n = motion.acceleration.shape[1]
-    long = math.ceil(n / FFT_LENGTH_STEP) * FFT_LENGTH_STEP
-    spectrum = np.fft.rfft(np.array(housing.gain) @ motion.acceleration, long)
-    spectrum *= housing.transfer(np.fft.rfftfreq(long, 1 / motion.sample_rate))
-    return HOUSING_OVERSAMPLING * np.fft.irfft(spectrum, HOUSING_OVERSAMPLING * long)[: HOUSING_OVERSAMPLING * n]
+    length = math.ceil(n / FFT_LENGTH_STEP) * FFT_LENGTH_STEP
+    spectrum = np.fft.rfft(np.array(housing.gain) @ motion.acceleration, length)
+    spectrum *= housing.transfer(np.fft.rfftfreq(length, 1 / motion.sample_rate))
+    return HOUSING_OVERSAMPLING * np.fft.irfft(spectrum, HOUSING_OVERSAMPLING * length)[: HOUSING_OVERSAMPLING * n]

@@ -148,8 +148,8 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
         modes, teeth = build_tables(members, max(map(count_steps_needed, members)))
         cutting, swing = _simulate_group(members, modes, teeth, passage)
         for place, number in enumerate(group):
-            turn = len(teeth.root) * cuts[number].teeth
-            yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage, turn)
+            steps_per_turn = len(teeth.root) * cuts[number].teeth
+            yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage, steps_per_turn)
 
 
 def _simulate_uneven_cut(cut: MillingCut, passage: Passage) -> TipMotion:
@@ -193,8 +193,8 @@ def _simulate_group(
         push, rub = teeth.chip_gain, teeth.edge_gain * depth[..., np.newaxis]
         if np.any(depth < 1):
             push = push * depth[..., np.newaxis, np.newaxis]
-        room = teeth.rigid_chip + teeth.root * stands_out - surface
-        swings, gains, chips = _step_tooth_period(swing, modes.flight, teeth.reach, push, rub, room)
+        clearance = teeth.rigid_chip + teeth.root * stands_out - surface
+        swings, gains, chips = _step_tooth_period(swing, modes.flight, teeth.reach, push, rub, clearance)
         surface += chips - teeth.rigid_chip
         swing = swings[-1]
         record[period * steps : (period + 1) * steps] = _tip_acceleration(swings, gains, modes)
@@ -202,17 +202,17 @@ def _simulate_group(
 
 
 def _step_tooth_period(
-    swing: Complexes, flight: Complexes, reach: Floats, push: Floats, rub: Floats, room: Floats
+    swing: Complexes, flight: Complexes, reach: Floats, push: Floats, rub: Floats, clearance: Floats
 ) -> tuple[Complexes, Floats, Floats]:
     """Step one tooth period: mode states after each step, their gains in it (s, c, m), and chips (s, c, e)."""
-    swings = np.empty((len(room), *swing.shape), dtype=complex)
-    gains, chips = np.empty(swings.shape), np.empty(room.shape)
+    swings = np.empty((len(clearance), *swing.shape), dtype=complex)
+    gains, chips = np.empty(swings.shape), np.empty(clearance.shape)
     columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], chips[..., np.newaxis])
-    rows = zip(swings, swings.real, gains, chips, room, reach, push, rub, *columns, strict=True)
-    for now, speed, gain, chip, left, to, by, edge, place, gained, cut in rows:
+    rows = zip(swings, swings.real, gains, chips, clearance, reach, push, rub, *columns, strict=True)
+    for now, speed, gain, chip, remaining, to, by, edge, place, gained, cut in rows:
         np.multiply(swing, flight, out=now)
         np.matmul(to, place, out=cut)
-        np.add(chip, left, out=chip)
+        np.add(chip, remaining, out=chip)
         np.maximum(chip, 0.0, out=chip)
         np.matmul(by, cut, out=gained)
         np.add(gain, edge, out=gain)
@@ -231,22 +231,22 @@ def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Fl
 
 
 def _assemble_motion(
-    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage, turn: int
+    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage, steps_per_turn: int
 ) -> TipMotion:
     """Put one cut between rest and free decay. turn: steps per turn."""
     step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]
     n = round((passage.cutting + passage.after) / step)
-    left = step * np.arange(1, n - len(cutting) + 1)
-    ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, left)))
+    remaining = step * np.arange(1, n - len(cutting) + 1)
+    ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, remaining)))
     still = np.zeros((2, round(passage.before / step)))
     full = cutting[: round((passage.ramp + passage.steady) / step)]
-    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _nonperiodic_share(full, turn))
+    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _nonperiodic_share(full, steps_per_turn))
 
 
-def _nonperiodic_share(acceleration: NDArray[np.float32], turn: int) -> float:
+def _nonperiodic_share(acceleration: NDArray[np.float32], steps_per_turn: int) -> float:
     """Return the share of the rms by which the last turns differ from their mean. 0 for less than two."""
-    number = min(COMPARED_TURNS, len(acceleration) // turn)
+    number = min(COMPARED_TURNS, len(acceleration) // steps_per_turn)
     if number < 2:
         return 0.0
-    turns = acceleration[-number * turn :].reshape(number, -1).astype(float)
+    turns = acceleration[-number * steps_per_turn :].reshape(number, -1).astype(float)
     return float(np.sqrt(np.mean((turns - np.mean(turns, axis=0)) ** 2) / np.mean(turns**2)))

@@ -311,21 +311,18 @@ def _shift_back(record: Floats, samples: float) -> Floats:
     return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
 
 
-def _check_record(values: ArrayLike, name: str) -> Floats:
-    record = np.asarray(values, dtype=np.float64)
-    if record.ndim != 1 or record.size < MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES or not np.all(np.isfinite(record)):
-        raise ValueError(
-            f"the {name} record has shape {record.shape} or holds NaN or inf; "
-            f"at least {MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES} finite samples are needed"
-        )
-    return record - np.mean(record)
-
-
 def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
-    records = [_check_record(first, "first"), _check_record(second, "second")]
+    records = [np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)]
+    n_least = MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES
+    for record, name in zip(records, ("first", "second"), strict=True):
+        if record.ndim != 1 or record.size < n_least or not np.all(np.isfinite(record)):
+            raise ValueError(
+                f"the {name} record has shape {record.shape} or holds NaN or inf; "
+                f"at least {n_least} finite samples are needed"
+            )
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
-    return np.stack(records)
+    return np.stack([record - np.mean(record) for record in records])
 
 
 def _segment_spectra(records: Floats) -> tuple[Complexes, Floats]:

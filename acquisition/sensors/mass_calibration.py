@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,44 +76,32 @@ class MassCalibration:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """Remarks on what is wrong, empty if the mass is rigid and both sensitivities agree."""
-        doubts = (self._phase_remark, self._sign_remark, self._size_remark)
-        return tuple(remark for remark in (*doubts, *self._mistakes) if remark is not None)
+        return tuple(self._find_faults())
 
-    @property
-    def _phase_remark(self) -> Remark | None:
-        if abs(self.phase) <= MAX_RIGID_PHASE:
-            return None
-        return Remark(
-            "phase-not-rigid",
-            "",
-            f"the phase of {self.phase:+.1f} deg is not that of a rigid mass",
-            "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass",
-        )
-
-    @property
-    def _sign_remark(self) -> Remark | None:
-        if not self.inverted:
-            return None
-        cure = "turn the accelerometer or negate its sensitivity"
-        return Remark("opposite-signs", "", "force and acceleration have opposite signs", cure)
-
-    @property
-    def _size_remark(self) -> Remark | None:
+    def _find_faults(self) -> Iterator[Remark]:
+        if abs(self.phase) > MAX_RIGID_PHASE:
+            yield Remark(
+                "phase-not-rigid",
+                "",
+                f"the phase of {self.phase:+.1f} deg is not that of a rigid mass",
+                "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass",
+            )
+        if self.inverted:
+            cure = "turn the accelerometer or negate its sensitivity"
+            yield Remark("opposite-signs", "", "force and acceleration have opposite signs", cure)
         if self.sizes_agree:
-            return None
+            return
         large, share = ("force", self.ratio - 1) if self.ratio > 1 else ("acceleration", 1 / self.ratio - 1)
         much = f"{share:.1%}" if share < 1 else f"{1 + share:.4g} times"
         wrong = "large" if self.ratio > 1 else "small"
-        return Remark(
+        yield Remark(
             "sensitivities-disagree",
             "",
             f"against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}",
             "before you change one: is the mass the total that moves, with accelerometer and mount?",
         )
-
-    @property
-    def _mistakes(self) -> tuple[Remark | None, ...]:
-        return () if self.sizes_agree else (unit_mistake_remark(self.ratio),)
+        if mistake := unit_mistake_remark(self.ratio):
+            yield mistake
 
     def __str__(self) -> str:
         """Return all results, one sentence per line."""

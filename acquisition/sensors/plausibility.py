@@ -90,11 +90,11 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
     """
     low, high, unit, usual = SENSITIVITY_LIMITS[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
-    doubts = []
+    remarks = []
     sensitivity = abs(channel.sensitivity) * unit
     if not low / SENSITIVITY_SPREAD <= sensitivity <= high * SENSITIVITY_SPREAD:
         text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
-        doubts.append(
+        remarks.append(
             Remark(
                 "sensitivity-not-believed",
                 channel.name,
@@ -104,12 +104,12 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
         )
     if not FULL_SCALE_LIMITS[0] <= channel.full_scale <= FULL_SCALE_LIMITS[1]:
         text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
-        doubts.append(
+        remarks.append(
             Remark(
                 "input-range-not-believed", channel.name, text, _explain_slip(channel.full_scale, *FULL_SCALE_LIMITS)
             )
         )
-    return tuple(doubts)
+    return tuple(remarks)
 
 
 def _explain_slip(value: float, low: float, high: float) -> str:

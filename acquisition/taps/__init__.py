@@ -2,17 +2,12 @@
 
 from acquisition.taps.bridge import TapsBridge
 from acquisition.taps.emulator import TapsEmulator, TapsFaults
-from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_frame
 from acquisition.taps.source import TapsSource, probe_taps
 
 __all__ = [
-    "Frame",
-    "FrameDecoder",
-    "MessageType",
     "TapsBridge",
     "TapsEmulator",
     "TapsFaults",
     "TapsSource",
-    "encode_frame",
     "probe_taps",
 ]

@@ -168,11 +168,11 @@ class _BridgeSession:
         info = build_info(device.identity, device.channels, device.sample_rate, follows_clock=device.follows_clock)
         return info | {"serial": info["serial"] or NO_SERIAL_NUMBER}
 
-    def _configure(self, wish: dict[str, Any]) -> None:
+    def _configure(self, config: dict[str, Any]) -> None:
         if self._streaming:
             raise ValueError("CONFIG while streaming; send STOP first")
-        self._bits = parse_sample_bits(wish, self._device.channels, self._device.sample_rate)
-        self._per_frame = int(wish["samples_per_frame"])
+        self._bits = parse_sample_bits(config, self._device.channels, self._device.sample_rate)
+        self._per_frame = int(config["samples_per_frame"])
 
     def _start(self, n_scans: int) -> None:
         self._stop()

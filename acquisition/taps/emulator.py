@@ -139,8 +139,8 @@ class TapsEmulator(EmulatorThread):
         self._realtime, self._faults = realtime, faults or TapsFaults()
         self._clock = 0
         self._restarted = False
-        self._pressed: deque[Event] = deque()
-        self._standing: dict[tuple[int, int | None], Event] = {}
+        self._pending_events: deque[Event] = deque()
+        self._active_faults: dict[tuple[int, int | None], Event] = {}
         self._power_on()
 
     def _power_on(self) -> None:
@@ -174,13 +174,13 @@ class TapsEmulator(EmulatorThread):
         event
             Pressed button or cable fault.
         """
-        self._pressed.append(event)
+        self._pending_events.append(event)
 
     def serve_once(self) -> bool:
         for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
             self._send(*DeviceCommands(self._info, self._configure, self._start, self._stop).answer(frame))
-        while self._pressed:
-            self._tell(self._pressed.popleft())
+        while self._pending_events:
+            self._send_now(self._pending_events.popleft())
         if self._streaming:
             self._stream()
         if self._faults.unplug_after is None or self._scan < self._faults.unplug_after:
@@ -206,19 +206,19 @@ class TapsEmulator(EmulatorThread):
             encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
         self.wire.pending += encoded
 
-    def _tell(self, event: Event) -> None:
+    def _send_now(self, event: Event) -> None:
         if event.kind != EventKind.BUTTON:
-            self._standing[event.kind, event.channel] = event
+            self._active_faults[event.kind, event.channel] = event
         self._send(MessageType.EVENT, encode_event(replace(event, scan=self._scan)))
 
     def _info(self) -> dict[str, Any]:
         return build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
 
-    def _configure(self, wish: dict[str, Any]) -> None:
+    def _configure(self, config: dict[str, Any]) -> None:
         if self._streaming:
             raise ValueError("CONFIG while streaming; send STOP first")
-        self._bits = parse_sample_bits(wish, self._channels, self._rate)
-        self._per_frame = int(wish["samples_per_frame"])
+        self._bits = parse_sample_bits(config, self._channels, self._rate)
+        self._per_frame = int(config["samples_per_frame"])
 
     def _stop(self) -> None:
         self._streaming = False
@@ -229,12 +229,12 @@ class TapsEmulator(EmulatorThread):
         self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
         self._sent = self._overruns = self._peak = 0
         self._started = self._status_due = time.monotonic()
-        self._pressed.extend(event for event in self._standing.values() if event.begins)
+        self._pending_events.extend(event for event in self._active_faults.values() if event.begins)
 
     def _stream(self) -> None:
         """Send the frames that are due, drop them if the host is late, report from time to time."""
         now = time.monotonic()
-        if self._is_hindered():
+        if self._is_blocked():
             return
         due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
         while self._scan + self._per_frame <= due:
@@ -247,7 +247,7 @@ class TapsEmulator(EmulatorThread):
         if self._realtime:
             time.sleep(0.5 * self._per_frame / self._rate)
 
-    def _is_hindered(self) -> bool:
+    def _is_blocked(self) -> bool:
         faults = self._faults
         if faults.restart_after is not None and self._scan >= faults.restart_after and not self._restarted:
             self._restarted = True

@@ -320,8 +320,8 @@ def build_info(
     }
 
 
-def parse_sample_bits(wish: dict[str, Any], channels: Sequence[Channel], rate: float) -> int:
+def parse_sample_bits(config: dict[str, Any], channels: Sequence[Channel], rate: float) -> int:
     """Return the sample bits that a CONFIG requests. ValueError if the device does not support the CONFIG."""
-    if wish["fs"] != rate or wish["channels"] != list(range(len(channels))):
-        raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
-    return SAMPLE_BITS[wish["format"]]
+    if config["fs"] != rate or config["channels"] != list(range(len(channels))):
+        raise ValueError(f"CONFIG asks for what this device does not have: {config}")
+    return SAMPLE_BITS[config["format"]]

@@ -48,8 +48,8 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
     decoder = FrameDecoder()
     link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
     deadline = time.monotonic() + TAPS_PROBE_TIMEOUT
-    while (left := deadline - time.monotonic()) > 0:
-        for frame in decoder.feed(link.read(left)):
+    while (remaining := deadline - time.monotonic()) > 0:
+        for frame in decoder.feed(link.read(remaining)):
             if frame.type == MessageType.INFO:
                 return _parse_identity_json(frame.body)
     return None
@@ -208,15 +208,15 @@ class TapsSource(ClosedOnExit):
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged."""
-        heard = time.monotonic()
+        last_arrival = time.monotonic()
         while self._stream is not None and self._streaming:
             frame = self._next_frame(0.1)
             if frame is not None and frame.type == MessageType.DATA:
                 block = self._stream.accept(frame)
                 if block is not None:
                     yield block
-                    heard = time.monotonic()  # not before: a slow consumer is no silent device
-            if time.monotonic() - heard > TAPS_SILENCE_TIMEOUT:
+                    last_arrival = time.monotonic()  # not before: a slow consumer is no silent device
+            if time.monotonic() - last_arrival > TAPS_SILENCE_TIMEOUT:
                 raise self._silent()
 
     def _silent(self) -> DeviceError:
@@ -253,13 +253,13 @@ class TapsSource(ClosedOnExit):
         form = next(form for form, bits in enumerate(SAMPLE_BITS) if self._info["adc_bits"] <= bits)
         channels = [entry["i"] for entry in self._info["channels"]]
         fit = (MAX_FRAME - FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
-        wish = {
+        config = {
             "fs": rate,
             "channels": channels,
             "format": form,
             "samples_per_frame": min(max(MIN_SCANS_PER_FRAME, round(self._frame_time * rate)), fit),
         }
-        self._command(MessageType.CONFIG, json.dumps(wish).encode())
+        self._command(MessageType.CONFIG, json.dumps(config).encode())
         return float(rate)
 
     def _encode(self, kind: MessageType, body: bytes = b"") -> bytes:
@@ -271,8 +271,8 @@ class TapsSource(ClosedOnExit):
         for _ in range(TAPS_COMMAND_TRIES):
             self._link.write(self._encode(kind, body))
             deadline = time.monotonic() + TAPS_ANSWER_TIMEOUT
-            while (left := deadline - time.monotonic()) > 0:
-                frame = self._next_frame(left)
+            while (remaining := deadline - time.monotonic()) > 0:
+                frame = self._next_frame(remaining)
                 if frame is not None and self._answers(frame, answer):
                     return frame
         raise DeviceError(

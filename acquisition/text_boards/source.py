@@ -40,10 +40,10 @@ def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
     decoders = {count: LineDecoder((count,)) for count in range(1, MAX_NUMBERS_PER_LINE + 1)}
     lines = dict.fromkeys(decoders, 0)
     deadline = time.monotonic() + BOARD_LISTEN_TIME
-    while max(lines.values()) < MIN_NUMBER_LINES and (left := deadline - time.monotonic()) > 0:
-        heard = link.read(left)
+    while max(lines.values()) < MIN_NUMBER_LINES and (remaining := deadline - time.monotonic()) > 0:
+        received = link.read(remaining)
         for count, decoder in decoders.items():
-            for printed in decoder.feed(heard):
+            for printed in decoder.feed(received):
                 lines[count] = len(printed.rows) + (0 if printed.broken_before else lines[count])
     likeliest = max(lines, key=lambda count: lines[count])
     if lines[likeliest] < MIN_NUMBER_LINES:
@@ -122,7 +122,7 @@ class TextBoardSource(ClosedOnExit):
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks as they arrive. DeviceError if the board is unplugged or prints no samples."""
-        scan, heard, overruns = 0, time.monotonic(), self._link.overruns
+        scan, last_arrival, overruns = 0, time.monotonic(), self._link.overruns
         while self._running:
             runs = [
                 run for printed in self._decoder.feed(self._link.read(0.2)) for run in self._counter.split_runs(printed)
@@ -132,8 +132,8 @@ class TextBoardSource(ClosedOnExit):
                 lost = max(run.lost_before, late)
                 scan += lost
                 yield Block(scan, self._codes(run.values), lost_before=lost)
-                scan, heard = scan + run.values.shape[1], time.monotonic()
-            if time.monotonic() - heard > BOARD_SILENCE_TIMEOUT:
+                scan, last_arrival = scan + run.values.shape[1], time.monotonic()
+            if time.monotonic() - last_arrival > BOARD_SILENCE_TIMEOUT:
                 wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
                 raise DeviceError(
                     f"the board on {self._link.port} has printed no samples for {BOARD_SILENCE_TIMEOUT:g} s",

@@ -152,7 +152,7 @@ class AudioReader(LibraryReader):
         """Open the device with this index. numbers: its inputs in order. full_scales: of these inputs (V)."""
         self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
         self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
-        self._pieces = queue.SimpleQueue[VoltageBlock]()
+        self._blocks = queue.SimpleQueue[VoltageBlock]()
         self._stream = library.InputStream(
             rate, round(rate * AUDIO_BLOCK_TIME), index, max(numbers) + 1, "int32", callback=self._keep
         )
@@ -165,12 +165,12 @@ class AudioReader(LibraryReader):
             )
 
     def start(self) -> None:
-        self._pieces = queue.SimpleQueue()
+        self._blocks = queue.SimpleQueue()
         self._stream.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         try:
-            return self._pieces.get(timeout=timeout)
+            return self._blocks.get(timeout=timeout)
         except queue.Empty:
             return None
 
@@ -182,7 +182,7 @@ class AudioReader(LibraryReader):
 
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts
-        self._pieces.put(VoltageBlock(volts, lost_before=int(bool(status.input_overflow))))
+        self._blocks.put(VoltageBlock(volts, lost_before=int(bool(status.input_overflow))))
 
 
 def _make_address(entry: dict[str, Any]) -> DeviceAddress:

@@ -115,22 +115,22 @@ class LjmReader(LibraryReader):
         self.stop()
 
     def start(self) -> None:
-        self._lost, self._pieces = 0, deque[VoltageBlock]()
+        self._lost, self._blocks = 0, deque[VoltageBlock]()
         size = round(self.rate * T7_BLOCK_TIME)
         self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
 
     def read(self, _timeout: float) -> VoltageBlock | None:
         """Return the next block. LJM waits by itself, and raises its error if nothing arrives."""
-        if not self._pieces:
-            self._pieces.extend(self._runs(np.array(self._library.eStreamRead(self._handle)[0])))
-        return self._pieces.popleft() if self._pieces else None
+        if not self._blocks:
+            self._blocks.extend(self._split_runs(np.array(self._library.eStreamRead(self._handle)[0])))
+        return self._blocks.popleft() if self._blocks else None
 
-    def _runs(self, values: Floats) -> Iterator[VoltageBlock]:
+    def _split_runs(self, values: Floats) -> Iterator[VoltageBlock]:
         """Yield the runs of scans without a skipped sample."""
         volts = values.reshape(-1, len(self._inputs)).T
-        whole = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)
-        for run in np.split(np.arange(whole.size), np.flatnonzero(np.diff(whole)) + 1):
-            if whole[run[0]]:
+        is_complete = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)
+        for run in np.split(np.arange(is_complete.size), np.flatnonzero(np.diff(is_complete)) + 1):
+            if is_complete[run[0]]:
                 yield VoltageBlock(volts[:, run], self._lost)
                 self._lost = 0
             else:

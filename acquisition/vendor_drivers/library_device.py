@@ -130,18 +130,18 @@ class LibraryDevice(ClosedOnExit):
     @property
     def fault(self) -> str:
         """Sentence on a sensor fault while it lasts."""
-        with self._named():
+        with self._convert_errors():
             return self.reader.fault()
 
     def start(self) -> None:
-        with self._named():
+        with self._convert_errors():
             self.reader.start()
         self._running = True
 
     def stop(self) -> None:
         """End the stream. `blocks` ends too."""
         self._running = False
-        with self._named():
+        with self._convert_errors():
             self.reader.stop()
 
     def close(self) -> None:
@@ -153,15 +153,15 @@ class LibraryDevice(ClosedOnExit):
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks as they arrive. DeviceError if the device goes away or falls silent."""
-        scan, heard = 0, time.monotonic()
+        scan, last_arrival = 0, time.monotonic()
         while self._running:
-            with self._named():
-                piece = self.reader.read(LIBRARY_READ_TIMEOUT)
-            if piece is not None:
-                scan += piece.lost_before
-                yield Block(scan, self._codes(piece.volts), lost_before=piece.lost_before)
-                scan, heard = scan + piece.volts.shape[1], time.monotonic()
-            elif time.monotonic() - heard > LIBRARY_SILENCE_TIMEOUT:
+            with self._convert_errors():
+                block = self.reader.read(LIBRARY_READ_TIMEOUT)
+            if block is not None:
+                scan += block.lost_before
+                yield Block(scan, self._codes(block.volts), lost_before=block.lost_before)
+                scan, last_arrival = scan + block.volts.shape[1], time.monotonic()
+            elif time.monotonic() - last_arrival > LIBRARY_SILENCE_TIMEOUT:
                 raise DeviceError(
                     f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s",
                     "unplug it and plug it in again",
@@ -172,12 +172,12 @@ class LibraryDevice(ClosedOnExit):
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 
     @contextmanager
-    def _named(self) -> Iterator[None]:
+    def _convert_errors(self) -> Iterator[None]:
         """Convert errors of the library to DeviceError with the address."""
         try:
             yield
         except self.reader.errors as error:
-            words = " ".join(str(error).split())
+            text = " ".join(str(error).split())
             raise DeviceError(
-                f"the DAQ {self.address} has failed ({words})", "check its cable and that no other program uses it"
+                f"the DAQ {self.address} has failed ({text})", "check its cable and that no other program uses it"
             ) from error

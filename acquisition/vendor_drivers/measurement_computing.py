@@ -243,13 +243,13 @@ class UldaqReader(LibraryReader):
 
     def read(self, timeout: float) -> VoltageBlock | None:
         deadline = time.monotonic() + timeout
-        while (come := self._inputs.get_scan_status()[1].current_scan_count) == self._read:
+        while (count := self._inputs.get_scan_status()[1].current_scan_count) == self._read:
             if time.monotonic() > deadline:
                 return None
             time.sleep(ULDAQ_POLL_INTERVAL)
-        lost = max(come - self._read - self._size // 2, 0)  # half of the ring: the rest may be written meanwhile
-        places = np.arange(self._read + lost, come) % self._size
-        self._read = come
+        lost = max(count - self._read - self._size // 2, 0)  # half of the ring: the rest may be written meanwhile
+        places = np.arange(self._read + lost, count) % self._size
+        self._read = count
         volts: Floats = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
         return VoltageBlock(volts, lost)
 

@@ -36,8 +36,7 @@ from lobewatch.screen.live_feed import (
 )
 from lobewatch.show.terminal.tap_printer import RunningTest
 from lobewatch.tap.cut_recording import CutState
-from lobewatch.tap.evaluated_hits import StatePublisher
-from lobewatch.tap.state import TapState
+from lobewatch.tap.state import StatePublisher, TapState
 
 STATIC_CONTENT_TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
 """Content types of the files of pages, by the ending of their names."""

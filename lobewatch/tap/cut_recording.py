@@ -25,8 +25,8 @@ from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_c
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, open_device
-from lobewatch.tap.evaluated_hits import StatePublisher
 from lobewatch.tap.live_curves import find_extremes
+from lobewatch.tap.state import StatePublisher
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""
@@ -138,23 +138,23 @@ class _SignalBuffer:
         self.codes: list[NDArray[np.int32]] = []
         self.marks: list[tuple[int, int]] = []
         self.count = 0
-        self.heard = 0
+        self.received = 0
 
     def add(self, block: Block) -> None:
         """Keep a block and drop what is too old."""
         codes = block.codes[self.row]
         overloaded = bool(block.overload >> self.row & 1)
         if block.lost_before or overloaded:
-            self.marks.append((self.heard, block.lost_before or -1))
+            self.marks.append((self.received, block.lost_before or -1))
         self.codes.append(codes)
-        self.heard, self.count = self.heard + codes.size, self.count + codes.size
+        self.received, self.count = self.received + codes.size, self.count + codes.size
         while self.count - self.codes[0].size > KEPT_SIGNAL_SECONDS * self.rate:
             self.count -= self.codes.pop(0).size
 
     @property
     def signal(self) -> CutSignal:
         """Signal that is kept."""
-        codes, first = np.concatenate(self.codes), self.heard - self.count
+        codes, first = np.concatenate(self.codes), self.received - self.count
         marks = [mark for place, mark in self.marks if place > first]
         lost = sum(mark for mark in marks if mark > 0)
         return CutSignal(
@@ -183,34 +183,34 @@ def _ignore_state(**_: Any) -> None:
 def record_cut(
     device: Device,
     turn: float,
-    patience: float,
+    time_limit: float,
     show: Callable[[str], None],
-    picture: Callable[..., None] = _ignore_state,
+    publish: Callable[..., None] = _ignore_state,
 ) -> CutSignal:
     """Record the next whole cut of a started device, from the air before it to the air after it.
 
-    turn: time of a spindle revolution (s). patience: time limit for the end of the cut (s). show: called with what is
-    awaited. picture: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
+    turn: time of a spindle revolution (s). time_limit: longest wait for the end of the cut (s). show: called with what
+    is awaited. publish: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
     detected in time, DeviceError if the sensor is dead.
     """
-    ear, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+    buffer, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
     show(BEGIN_CUT_TEXT)
-    for signal in _iterate_signals(device, ear, patience, picture):
+    for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
         if _has_ended(parts, signal) and parts.reason:
-            ear.forget()
+            buffer.forget()
             show(CUT_TOO_SHORT_TEXT)
             waiting = {"word": CutStep.AGAIN, "reason": f"{CUT_TOO_SHORT_TEXT.capitalize()}."}
-            picture(**waiting, cut_seconds=None)
+            publish(**waiting, cut_seconds=None)
         elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > MAX_CUT_SECONDS):
             return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
         elif np.isfinite(parts.begin):
-            picture(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
-        elif ear.heard >= SENSOR_CHECK_DELAY * ear.rate:
-            picture(**waiting, cut_seconds=None)
+            publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
+        elif buffer.received >= SENSOR_CHECK_DELAY * buffer.rate:
+            publish(**waiting, cut_seconds=None)
     raise DataError(
-        f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
-        "more record_cut.patience"
+        f"no cut was heard in {time_limit:g} s; begin to listen with the spindle turning in air, then cut, or give "
+        "more record_cut.time_limit"
     )
 
 
@@ -222,29 +222,29 @@ def _make_buffer(device: Device) -> _SignalBuffer:
 
 
 def _iterate_signals(
-    device: Device, ear: _SignalBuffer, patience: float, picture: Callable[..., None]
+    device: Device, buffer: _SignalBuffer, time_limit: float, publish: Callable[..., None]
 ) -> Iterator[CutSignal]:
     """Yield the signal so far, again and again."""
     next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
     for block in device.blocks():
-        ear.add(block)
-        seconds = ear.heard / ear.rate
+        buffer.add(block)
+        seconds = buffer.received / buffer.rate
         if not checked and seconds >= SENSOR_CHECK_DELAY:
-            _check_sensor_signal(ear)
+            _check_sensor_signal(buffer)
             checked = True
         if seconds >= next_level:
             next_level = seconds + LEVEL_WINDOW
-            picture(level=ear.level, left=max(patience - seconds, 0.0))
+            publish(level=buffer.level, left=max(time_limit - seconds, 0.0))
         if seconds >= next_look:
             next_look = seconds + CUT_SEARCH_INTERVAL
-            yield ear.signal
-        if seconds > patience:
+            yield buffer.signal
+        if seconds > time_limit:
             return
 
 
-def _check_sensor_signal(ear: _SignalBuffer) -> None:
-    codes = np.concatenate(ear.codes)
-    low, high = ear.channel.rails
+def _check_sensor_signal(buffer: _SignalBuffer) -> None:
+    codes = np.concatenate(buffer.codes)
+    low, high = buffer.channel.rails
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
         raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
     if np.ptp(codes) == 0:
@@ -262,15 +262,15 @@ def acquire_cut(
     setting: CutSetting,
     file: Path | None,
     port: str,
-    patience: float,
+    time_limit: float,
     description: Description,
     show: Callable[[str], None],
-    picture: Callable[..., None],
+    publish: Callable[..., None],
 ) -> CutSignal:
     """Read a cut from a file, or record one with the device of machine.toml.
 
-    file: replaces the device. description: what the file does not state itself. patience: time limit for a cut (s).
-    show: called with what to do. picture: as in record_cut. ValueError without a port, DataError for a file without
+    file: replaces the device. description: what the file does not state itself. time_limit: longest wait for a cut (s).
+    show: called with what to do. publish: as in record_cut. ValueError without a port, DataError for a file without
     such a recording or if no cut is detected, DeviceError if no device answers.
     """
     if file is not None:
@@ -287,9 +287,9 @@ def acquire_cut(
     with open_device(folder.machine.daq, port) as device:
         with folder.locked():
             check_device_rate(folder, device)
-        picture(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        publish(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
         device.start()
-        return record_cut(device, 60 / setting.speed_rpm, patience, show, picture)
+        return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
 
 
 def check_sensor_kind(sensor: str, file: Path | None) -> str:
@@ -314,23 +314,23 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
     """Publish states from the move of the sensor on. An error raised within becomes the last state."""
     cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
     title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
-    pictures = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
+    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
     try:
-        yield pictures
+        yield publisher
     except KeyboardInterrupt:
-        pictures.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
+        publisher.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
         raise
     except (OSError, RuntimeError, ValueError) as error:
-        pictures.show(word=CutStep.FAILED, reason=format_error(error), level=None, left=None)
+        publisher.show(word=CutStep.FAILED, reason=format_error(error), level=None, left=None)
         raise
 
 
 def evaluate_live_cut(
-    logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: StatePublisher[CutState]
+    logbook: Logbook, setting: CutSetting, signal: CutSignal, publisher: StatePublisher[CutState]
 ) -> list[CutComparison]:
     """Evaluate a recording and show the result of its last cut."""
-    pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
+    publisher.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
     comparisons = compare_cuts(logbook, setting, signal)
     last = comparisons[-1]
-    pictures.show(word=get_result_step(last), reason="", comparison=last, plots=build_cut_curves(last))
+    publisher.show(word=get_result_step(last), reason="", comparison=last, plots=build_cut_curves(last))
     return comparisons

@@ -84,9 +84,13 @@ LEVEL_WINDOW = 0.05
 
 def describe_device(device: Device) -> str:
     """Describe model, serial number, firmware and loss detection, as far as known."""
-    who = device.identity
-    details = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
-    return ", ".join([who.model, *(name + value for name, value in details.items() if value)])
+    identity = device.identity
+    details = {
+        "serial number ": identity.serial,
+        "firmware ": identity.firmware,
+        "loss detection: ": device.loss_detection,
+    }
+    return ", ".join([identity.model, *(name + value for name, value in details.items() if value)])
 
 
 class LiveSignal:

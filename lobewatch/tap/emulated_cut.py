@@ -141,19 +141,19 @@ def emulate_cut(
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Return the modes of the tip that a cut moves."""
     damping_ratio = get_spindle_table(folder).damping_ratio
-    whole = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
-    softest = int(np.argmin(whole.stiffness))
-    moved = (whole.stiffness < MAX_MODE_STIFFNESS_RATIO * whole.stiffness[softest]) & (
-        whole.frequency < MAX_EMULATED_MODE_FREQUENCY
+    structure = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
+    softest = int(np.argmin(structure.stiffness))
+    is_moved = (structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]) & (
+        structure.frequency < MAX_EMULATED_MODE_FREQUENCY
     )
-    moved[softest] = True
-    return Structure(whole.frequency[moved], whole.damping_ratio[moved], whole.stiffness[moved])
+    is_moved[softest] = True
+    return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
 
 
 def _normalize_gain(housing: Housing) -> Housing:
     """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
-    loudest = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
-    return replace(housing, gain=(housing.gain[0] / loudest, housing.gain[1] / loudest))
+    largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
+    return replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
 
 
 def _build_true_cut(
@@ -186,12 +186,12 @@ def _build_true_cut(
 def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
     """Return the stable depth limit by semi-discretization (m)."""
     x, y = (
-        [Mode(*figures) for figures in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
+        [Mode(*values) for values in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
         for side in (cut.x, cut.y)
         if side is not None
     )
-    pushed = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
-    return program_limit(Program(pushed, cut.speed_rpm, cut.depth), x, y).limit
+    true_cut = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
+    return program_limit(Program(true_cut, cut.speed_rpm, cut.depth), x, y).limit
 
 
 def draw_hidden_truth(seed: int) -> HiddenTruth:

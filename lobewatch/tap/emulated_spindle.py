@@ -90,12 +90,12 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
             "modes along x and y show nothing across; give another angle"
         )
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
-    seen = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
+    visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
     return Structure(
-        frequency=np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in seen]),
-        damping_ratio=np.tile(spindle.damping_ratio, len(seen)),
-        stiffness=np.concatenate([spindle.stiffness * stiff / share for share, stiff in seen]),
-        residual=sum(spindle.residual * share / stiff for share, stiff in seen),
+        frequency=np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible]),
+        damping_ratio=np.tile(spindle.damping_ratio, len(visible)),
+        stiffness=np.concatenate([spindle.stiffness * stiff / share for share, stiff in visible]),
+        residual=sum(spindle.residual * share / stiff for share, stiff in visible),
     )
 
 
@@ -121,14 +121,14 @@ def open_synchronized_device(
     Device and host work in turns: two threads that work at once switch the interpreter at each step, and the reader of
     a port would collect data during the evaluation of a hit, most of which would be discarded.
     """
-    hammered, wanted = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
+    hammered, requested = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
 
     def signal(first_scan: int, n_scans: int) -> Floats:
-        wanted.acquire(timeout=HOST_WAIT_TIME)
+        requested.acquire(timeout=HOST_WAIT_TIME)
         return hammered(first_scan, n_scans)
 
     with TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=False, tcp=tcp) as device:
-        yield lambda: _SynchronizedSource(device.port, wanted)
+        yield lambda: _SynchronizedSource(device.port, requested)
 
 
 class _SynchronizedSource(TapsSource):
@@ -136,9 +136,9 @@ class _SynchronizedSource(TapsSource):
 
     _frame_time = 0.06
 
-    def __init__(self, port: str, wanted: threading.Semaphore) -> None:
+    def __init__(self, port: str, requested: threading.Semaphore) -> None:
         super().__init__(port)
-        self._wanted = wanted
+        self._wanted = requested
 
     def blocks(self) -> Iterator[Block]:
         for block in super().blocks():
@@ -159,20 +159,20 @@ def emulate_machine(
     tcp: bool = False,
     spindle: Spindle | None = None,
     direction: TapDirection = "x",
-    askew: float | None = None,
+    axes_angle: float | None = None,
 ) -> EmulatedMachine:
     """Emulate a device of this kind on the spindle of a machine that is tapped again and again.
 
-    spindle: replaces that of machine.toml, with the same damping. askew: angle from x (deg) of its principal directions
-    as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no spindle,
-    or lacks the sensors of a device that does not describe them itself.
+    spindle: replaces that of machine.toml, with the same damping. axes_angle: angle from x (deg) of its principal
+    directions as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no
+    spindle, or lacks the sensors of a device that does not describe them itself.
     """
     built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
-    structure = _select_direction(built, askew, direction)
+    structure = _select_direction(built, axes_angle, direction)
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
-        cross = [_select_cross_direction(built, askew, direction)] if is_crossed else []
+        cross = [_select_cross_direction(built, axes_angle, direction)] if is_crossed else []
         return map_signal_to_inputs(inputs, HammeredStructure(structure, rate, random, Hammering(), cross), direction)
 
     device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
@@ -215,18 +215,22 @@ def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) 
     return build_structure(replacement or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
-def _select_direction(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
+def _select_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
     """Return the structure between hammer and sensor in a direction."""
-    return built if askew is None and direction != CROSS_TAP else rotate_structure(built, askew or 0.0, direction)
+    return (
+        built
+        if axes_angle is None and direction != CROSS_TAP
+        else rotate_structure(built, axes_angle or 0.0, direction)
+    )
 
 
-def _select_cross_direction(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
+def _select_cross_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
     """Return the structure between hammer and a perpendicular sensor: rigid without rotated axes."""
     if direction == CROSS_TAP:
-        return _select_direction(built, askew, "x")
-    if askew is None or not 0 < askew < 90:
+        return _select_direction(built, axes_angle, "x")
+    if axes_angle is None or not 0 < axes_angle < 90:
         return replace(built, stiffness=np.full(built.stiffness.shape, RIGID_STIFFNESS), residual=0.0)
-    return _select_direction(built, askew, CROSS_TAP)
+    return _select_direction(built, axes_angle, CROSS_TAP)
 
 
 def map_signal_to_inputs(

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any
 
 from acquisition import Hit, HitFlags, HitVerdict, RunningMean, evaluate_hit
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
 from lobewatch.machine.settings.machine_file import Machine
-from lobewatch.tap.state import TapState
+from lobewatch.tap.state import StatePublisher, TapState
 from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
 
 MIN_HITS_FOR_MEAN = 3
@@ -45,7 +43,7 @@ class EvaluatedHits:
 
     def evaluate(self, hit: Hit) -> HitVerdict:
         """Evaluate a hit, also against the mean if that has enough hits. A good one is then part of the mean."""
-        return evaluate_safely(lambda: self._judge(hit))
+        return evaluate_safely(lambda: self._evaluate(hit))
 
     def add(self, hit: Hit, verdict: HitVerdict) -> None:
         """Store a hit. It is on the disk when this returns."""
@@ -74,7 +72,7 @@ class EvaluatedHits:
                 return number, verdict
         return None
 
-    def _judge(self, hit: Hit) -> HitVerdict:
+    def _evaluate(self, hit: Hit) -> HitVerdict:
         mean = self.mean.frf if len(self.mean.hits) >= MIN_HITS_FOR_MEAN else None
         verdict = evaluate_hit(hit, mean, self._band)
         if not verdict.flags:
@@ -88,50 +86,6 @@ class EvaluatedHits:
     def _take_out(self, number: int, verdict: HitVerdict) -> None:
         self.tap.exclude(number, verdict.flags, verdict.text)
         self.mean.remove(self.tap.hits[number])
-
-
-class LiveState(Protocol):
-    """State of a live test: a frozen dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def revision(self) -> int:
-        """Number that increases with every change."""
-
-
-State = TypeVar("State", bound=LiveState)
-
-
-class StatePublisher(Generic[State]):
-    """Publisher of the state of a live test.
-
-    The thread of the test replaces the state, never changes it. Any thread may read it.
-    """
-
-    def __init__(self, first: State, clock: Callable[[], float]) -> None:
-        """Publish the first state. clock: monotonic time (s)."""
-        self._state: State = first
-        self._clock, self._shown_at = clock, clock()
-        self.wakes: set[Callable[[], None]] = set()
-        """Functions called after every change by the thread of the test. None may take time."""
-
-    @property
-    def state(self) -> State:
-        """Newest state."""
-        return self._state
-
-    @property
-    def age(self) -> float:
-        """Time since the last change (s)."""
-        return self._clock() - self._shown_at
-
-    def show(self, **changes: Any) -> None:
-        """Replace the state by one with these changed fields."""
-        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
-        self._shown_at = self._clock()
-        for wake in tuple(self.wakes):
-            wake()
 
 
 class TapPublisher(StatePublisher[TapState]):

@@ -54,22 +54,24 @@ class OperatorRequests:
 class HitLoop:
     """Loop that captures, evaluates and shows hits, and handles requests between two blocks."""
 
-    def __init__(self, hits: EvaluatedHits, publisher: TapPublisher, wishes: OperatorRequests, *, guided: bool) -> None:
+    def __init__(
+        self, hits: EvaluatedHits, publisher: TapPublisher, requests: OperatorRequests, *, guided: bool
+    ) -> None:
         """Set up the loop. guided False omits the curves and the time to take back the last hit."""
-        self._hits, self._publisher, self._wishes, self._guided = hits, publisher, wishes, guided
+        self._hits, self._publisher, self._requests, self._guided = hits, publisher, requests, guided
         self._verdict = TapStep.TAP
-        self._heard = 0
+        self._scan_count = 0
         self._verdict_at: int | None = None
 
     def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
         """Yield the blocks of the device. Handle requests and show levels in between."""
         for block in connection.blocks():
-            self._heard += block.codes.shape[1]
+            self._scan_count += block.codes.shape[1]
             for _ in range(connection.count_presses()):
                 self._undo(" by the button")
             self.handle_requests()
-            if news := connection.poll_fault_text():
-                self._publisher.show(reason=news)
+            if fault_text := connection.poll_fault_text():
+                self._publisher.show(reason=fault_text)
             yield block
             if self._publisher.age >= LEVEL_WINDOW:
                 self._publisher.show(levels=connection.signal.levels)
@@ -78,37 +80,37 @@ class HitLoop:
 
     def handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
-        if self._wishes.stopping:
+        if self._requests.stopping:
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
-        while self._wishes.take_undo():
+        while self._requests.take_undo():
             self._undo()
 
     def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
         """Yield hits as they come, and None after every block. The shown step follows the trigger."""
         search = HitSearch(connection.channels, connection.sample_rate, trigger, connection.direction)
-        early = 0
+        n_early = 0
         for block in self.blocks(connection):
             yield from search.feed(block)
             yield None
-            if search.too_early > early:
-                early = search.too_early
+            if search.too_early > n_early:
+                n_early = search.too_early
                 self._publisher.show(
                     reason="That hit came while the tool still moved and does not count: wait for TAP."
                 )
-            self._follow(search, connection.sample_rate)
+            self._show_trigger_step(search, connection.sample_rate)
 
     def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
         """Take hits until enough are good and the time to take back the last one has passed."""
-        grace = LAST_HIT_UNDO_TIME if self._guided else 0.0
+        undo_time = LAST_HIT_UNDO_TIME if self._guided else 0.0
         for hit in self.hits(connection, trigger):
             if self._hits.missing and hit is not None:
                 self._take(hit)
-            elif not self._hits.missing and self._verdict_age(connection.sample_rate) >= grace:
+            elif not self._hits.missing and self._verdict_age(connection.sample_rate) >= undo_time:
                 return
 
     def show_verdict(self, flags: HitFlags, reason: str, *, trial: bool = False) -> None:
         """Show the verdict on a hit."""
-        self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._heard
+        self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._scan_count
         self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
 
     def show_curves(self, hit: Hit) -> None:
@@ -123,13 +125,13 @@ class HitLoop:
 
     def _verdict_age(self, sample_rate: float) -> float:
         """Return how long the verdict has been shown (s), inf if none is."""
-        return float("inf") if self._verdict_at is None else (self._heard - self._verdict_at) / sample_rate
+        return float("inf") if self._verdict_at is None else (self._scan_count - self._verdict_at) / sample_rate
 
-    def _follow(self, search: HitSearch, sample_rate: float) -> None:
+    def _show_trigger_step(self, search: HitSearch, sample_rate: float) -> None:
         """Show the step that matches the trigger."""
         word = TapStep.TAP if search.armed else TapStep.WAIT
-        fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._hits.missing
-        if self._verdict_at is not None and fresh and not search.recording:
+        is_fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._hits.missing
+        if self._verdict_at is not None and is_fresh and not search.recording:
             word = self._verdict
         if word != self._publisher.state.word:
             self._publisher.show(word=word)
@@ -141,11 +143,11 @@ class HitLoop:
         self._hits.add(hit, verdict)
         self._publisher.show_hits(self._hits)
         self.show_curves(hit)
-        misfit = None if verdict.flags else self._hits.recheck_first_hits()
-        if misfit is not None:
-            number, why = misfit
-            reason = f"Hit {number + 1} does not fit the others and counts no more. {why.text}"
-            self._show_taken_out(why.flags, reason)
+        outlier = None if verdict.flags else self._hits.recheck_first_hits()
+        if outlier is not None:
+            number, verdict_now = outlier
+            reason = f"Hit {number + 1} does not fit the others and counts no more. {verdict_now.text}"
+            self._show_taken_out(verdict_now.flags, reason)
 
     def _undo(self, means: str = "") -> None:
         number = self._hits.undo()

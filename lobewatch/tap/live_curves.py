@@ -73,11 +73,7 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
         force=None,
         acceleration=hit.acceleration[shown],
         frequency=spectrum.frequency[lines],
-        mean=None,
         last=size[lines],
-        coherence=None,
-        force_spectrum=None,
-        usable_band=None,
     )
 
 

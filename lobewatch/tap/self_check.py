@@ -80,19 +80,19 @@ def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple
 
 def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
     """Check sensitivities and calibration dates."""
-    doubts = sensor_remarks(channels, datetime.now(UTC).date(), interval_months)
-    return Check("calibration", not doubts, "; ".join(map(str, doubts)) or "dates known and not too old")
+    remarks = sensor_remarks(channels, datetime.now(UTC).date(), interval_months)
+    return Check("calibration", not remarks, "; ".join(map(str, remarks)) or "dates known and not too old")
 
 
 def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
     """Return remarks on implausible sensitivities and ranges and on old, unknown or impossible calibrations."""
-    doubts: list[Remark] = []
+    remarks: list[Remark] = []
     for channel in channels:
-        doubts += channel_remarks(channel)
+        remarks += channel_remarks(channel)
         calibration = calibration_remark(channel, today, interval_months)
         if calibration is not None:
-            doubts.append(calibration)
-    return doubts
+            remarks.append(calibration)
+    return remarks
 
 
 def _check_samples(baseline: Hit) -> Check:
@@ -123,8 +123,8 @@ def _check_force_noise(rms: float, level: float | None) -> Check:
     if level is None or level >= MIN_TRIGGER_NOISE_RATIO * rms:
         against = "" if level is None else f", trigger at {level:g} N"
         return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
-    least = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
-    cure = f"set trigger_n above {least}, or find the source of the noise"
+    amplitude = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
+    cure = f"set trigger_n above {amplitude}, or find the source of the noise"
     return Check(
         "force noise", False, f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}"
     )
@@ -228,17 +228,19 @@ def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
     """
     rate, band = baseline.sample_rate, machine.tap.sensor_band_hz or math.inf
     highest, noise = min(MAX_DECAY_FREQUENCY_RATIO * rate, band), float(np.std(baseline.acceleration))
-    heard = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
+    detectable = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
     frequency, where = _find_expected_frequency(machine, tool)
     if frequency is None:
-        return Check("band", True, f"{heard}; whether the mode of this machine lies there nobody says", is_notable=True)
+        return Check(
+            "band", True, f"{detectable}; whether the mode of this machine lies there nobody says", is_notable=True
+        )
     if frequency > highest:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
-        return Check("band", False, f"{heard}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
-    least = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
-    needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(least, digits=2)} m/s^2"
+        return Check("band", False, f"{detectable}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
+    amplitude = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
+    needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(amplitude, digits=2)} m/s^2"
     error = f"{needed} tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
-    return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
+    return Check("band", True, f"{detectable}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
 
 
 def min_decay_amplitude(frequency: float, damping_ratio: float, density: float) -> float:

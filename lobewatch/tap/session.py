@@ -82,7 +82,7 @@ class TapSession:
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
-        self._publisher, self._wishes = TapPublisher(first, clock), OperatorRequests()
+        self._publisher, self._requests = TapPublisher(first, clock), OperatorRequests()
         self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
         self.unasked: Sequence[str] = ()
@@ -111,11 +111,11 @@ class TapSession:
 
     def undo(self) -> None:
         """Take back the last good hit. Again: the one before."""
-        self._wishes.undo()
+        self._requests.undo()
 
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
-        self._wishes.stop()
+        self._requests.stop()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Reject a choice: nothing comes after a single test.
@@ -153,7 +153,7 @@ class TapSession:
                 hits = self._begin()
                 hits.tap.reserve = reserve
                 if hits.missing:
-                    loop = HitLoop(hits, self._publisher, self._wishes, guided=self._guided)
+                    loop = HitLoop(hits, self._publisher, self._requests, guided=self._guided)
                     TapPhases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
                 reserve.release()
                 return self._finish(hits)

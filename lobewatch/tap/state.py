@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 from acquisition import HitFlags
 from lobewatch.arrays import Floats
@@ -78,17 +78,17 @@ class LiveCurves:
     """Acceleration of the last hit (m/s^2), shape (n,)."""
     frequency: Floats
     """Frequencies (Hz), shape (m,)."""
-    mean: Floats | None
+    mean: Floats | None = None
     """Receptance magnitude of the mean of the good hits (m/N), shape (m,). None before the first good one."""
-    last: Floats | None
+    last: Floats | None = None
     """Receptance magnitude of the last hit (m/N), shape (m,). None without a pulse. Without a force that of its
     free decay, up to a factor.
     """
-    coherence: Floats | None
+    coherence: Floats | None = None
     """Coherence of the good hits (-), shape (m,). None for fewer than 3."""
-    force_spectrum: Floats | None
+    force_spectrum: Floats | None = None
     """Spectrum of the force of the last hit (dB below its largest value), shape (m,)."""
-    usable_band: tuple[float, float] | None
+    usable_band: tuple[float, float] | None = None
     """Band that the force excites (Hz)."""
 
 
@@ -181,3 +181,47 @@ class TapState:
         if self.word is not TapStep.REFUSED or not self.verdict:
             return self.word.value
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()
+
+
+class LiveState(Protocol):
+    """State of a live test: a frozen dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def revision(self) -> int:
+        """Number that increases with every change."""
+
+
+State = TypeVar("State", bound=LiveState)
+
+
+class StatePublisher(Generic[State]):
+    """Publisher of the state of a live test.
+
+    The thread of the test replaces the state, never changes it. Any thread may read it.
+    """
+
+    def __init__(self, first: State, clock: Callable[[], float]) -> None:
+        """Publish the first state. clock: monotonic time (s)."""
+        self._state: State = first
+        self._clock, self._shown_at = clock, clock()
+        self.wakes: set[Callable[[], None]] = set()
+        """Functions called after every change by the thread of the test. None may take time."""
+
+    @property
+    def state(self) -> State:
+        """Newest state."""
+        return self._state
+
+    @property
+    def age(self) -> float:
+        """Time since the last change (s)."""
+        return self._clock() - self._shown_at
+
+    def show(self, **changes: Any) -> None:
+        """Replace the state by one with these changed fields."""
+        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
+        self._shown_at = self._clock()
+        for wake in tuple(self.wakes):
+            wake()

@@ -180,11 +180,11 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     folder.refuse_damage()
     clean_spool(folder)
     _remove_committed(folder)
-    damaged, left = list[Path](), list[str]()
-    interrupted = _find_interrupted(folder, circumstances, resume, damaged, left)
+    damaged, not_resumed = list[Path](), list[str]()
+    interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
     tap_id = new_tap_id(circumstances)
     tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
-    tap.damaged, tap.not_resumed = damaged, left
+    tap.damaged, tap.not_resumed = damaged, not_resumed
     return tap
 
 
@@ -199,7 +199,7 @@ def _remove_committed(folder: MachineFolder) -> None:
 
 
 def _find_interrupted(
-    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], left: list[str]
+    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], not_resumed: list[str]
 ) -> TapInProgress | None:
     """Return the newest test of the same tool and direction, if wished. Add all others to `left`."""
     committed, newest = folder.committed_ids, None
@@ -220,7 +220,9 @@ def _find_interrupted(
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            left.append(f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed")
+            not_resumed.append(
+                f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed"
+            )
     return newest
 
 
@@ -244,23 +246,25 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
     affect the other test.
     """
-    felt = [(hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None]
-    if not felt:
+    cross_hits = [
+        (hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None
+    ]
+    if not cross_hits:
         return None
-    hits, firsts = [hit for hit, _ in felt], [flags for _, flags in felt]
-    verdicts = [flags or evaluate_safely(partial(_evaluate_cross_hit, hit)).flags for hit, flags in felt]
-    good, wanted = verdicts.count(HitFlags.OK), firsts.count(HitFlags.OK)
-    faults = {flags.words for flags, first in zip(verdicts, firsts, strict=True) if flags and not first}
-    part = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
+    hits, driving_point_flags = [hit for hit, _ in cross_hits], [flags for _, flags in cross_hits]
+    verdicts = [flags or evaluate_safely(partial(_evaluate_cross_hit, hit)).flags for hit, flags in cross_hits]
+    good, wanted = verdicts.count(HitFlags.OK), driving_point_flags.count(HitFlags.OK)
+    faults = {flags.words for flags, first in zip(verdicts, driving_point_flags, strict=True) if flags and not first}
+    used = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
     if good < MIN_CROSS_TAP_HITS:
-        return _make_unsaved_result(f"of use are {part}; check the sensor along y")
+        return _make_unsaved_result(f"of use are {used}; check the sensor along y")
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
         test = average_hits(new_tap_id(about), about, hits, verdicts)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
         return _make_unsaved_result(format_os_error(error) if isinstance(error, OSError) else str(error))
-    return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {part}.")
+    return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {used}.")
 
 
 def _make_unsaved_result(why: str) -> CrossTapResult:

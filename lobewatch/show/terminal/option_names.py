@@ -96,7 +96,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "folder_files.make_machine_folder.template": "lobewatch init --example",
     "plan_session.port": "--port",
     "plan_session.resume=False": "--new",
-    "record_cut.patience": "--seconds",
+    "record_cut.time_limit": "--seconds",
     "rotate_structure.degrees": "--askew",
     "rotate_structure.direction": "--direction",
     "screen.ScreenServer": "--screen",

@@ -17,6 +17,8 @@ from acquisition.dataq.protocol import (
     split_lines,
 )
 
+pytestmark = pytest.mark.quick
+
 Pair = tuple[bytes, bytes]
 INPUTS = (
     SensorInput(0, Channel("force", 2.25e-3, 5.0)),

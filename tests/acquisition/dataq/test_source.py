@@ -134,6 +134,7 @@ def test_what_a_slow_device_sends_after_its_stop_is_not_taken_for_the_next_strea
             source.stop()
 
 
+@pytest.mark.quick
 def test_without_the_digital_word_scans_arrive_too(emulated: Make, signal_at: SignalAt) -> None:
     with emulated() as device, DataqSource(device.port, INPUTS, RATE, digital_word=False) as source:
         assert source.loss_detection == "none"

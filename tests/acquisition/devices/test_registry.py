@@ -23,6 +23,8 @@ from acquisition import (
 from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.ports import SerialLink
 
+pytestmark = pytest.mark.quick
+
 PLUGINS = Path(__file__).parents[2] / "plugins"
 Install = Callable[[str, str], None]
 

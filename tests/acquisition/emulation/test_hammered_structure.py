@@ -31,6 +31,7 @@ def test_residual_alone_follows_the_second_derivative_of_the_force() -> None:
     assert structure.response(time, width) == pytest.approx(2e-9 * curvature, abs=2e-9 * 1e-4 * np.max(curvature))
 
 
+@pytest.mark.quick
 def test_blocks_of_any_size_give_the_same_signal(tapper: Callable[..., HammeredStructure]) -> None:
     quiet = {"force_noise": 0.0, "response_noise": 0.0}
     whole = tapper(**quiet)(0, 40_000)

@@ -65,6 +65,7 @@ def read_until(link: SerialLink, n: int) -> bytes:
     return data
 
 
+@pytest.mark.quick
 def test_what_comes_together_is_handed_over_together(cable: Cable, link: SerialLink) -> None:
     for _ in range(50):
         os.write(cable.master, bytes(2000))
@@ -120,6 +121,7 @@ def test_two_programs_on_one_port(cable: Cable) -> None:
 
 
 @pytest.mark.parametrize("state", ["idle", "streaming", "writing"])
+@pytest.mark.quick
 def test_a_pulled_cable_is_one_error_with_its_cure(state: str, cable: Cable, link: SerialLink) -> None:
     if state == "streaming":
         write_all(cable.master, b"some bytes")

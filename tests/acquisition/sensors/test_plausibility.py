@@ -24,6 +24,8 @@ from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement import measure
 from modal import Mode, synthesize_frf
 
+pytestmark = pytest.mark.quick
+
 HAMMER = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")
 TODAY = date(2026, 11, 1)
 

@@ -19,6 +19,8 @@ from acquisition.taps.protocol import (
     encode_frame,
 )
 
+pytestmark = pytest.mark.quick
+
 SCANS = np.array([[0, -1, 256], [1, 32767, 32767]], np.int32)
 VECTORS = {
     "HELLO seq 0": (Frame(MessageType.HELLO), "02 01 01 01 01 01 01 01 05 f7 df 88 a9 00"),

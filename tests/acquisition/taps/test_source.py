@@ -63,6 +63,7 @@ def test_scans_arrive_unchanged_and_complete(device: TapsEmulator, tapper: Tappe
     assert not any(block.lost_before for block in received)
 
 
+@pytest.mark.quick
 def test_start_after_stop_begins_a_new_session_at_scan_zero(device: TapsEmulator) -> None:
     with TapsSource(device.port) as source:
         for _ in range(3):

@@ -121,6 +121,7 @@ def test_a_counter_tells_what_is_lost(printing: OutputFormat | None, traits: Tex
     assert 8 <= len(gaps) <= 11
 
 
+@pytest.mark.quick
 def test_without_a_counter_a_broken_line_is_seen_and_a_lost_one_is_not() -> None:
     with printed(None, TextBoardTraits(counter_bits=0, garble_every=700)) as source:
         assert 8 <= sum(block.lost_before for block in take(source, 7000)) <= 11
@@ -222,6 +223,7 @@ def test_an_unplugged_board_is_a_device_error() -> None:
         ("dataq", DeviceSettings(RATE, INPUTS, printing=OutputFormat()), r"\[daq.printing\] is for driver = .lines."),
     ],
 )
+@pytest.mark.quick
 def test_settings_that_no_such_board_has(driver: str, settings: DeviceSettings, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         check_settings(find_driver(driver), settings)

@@ -18,6 +18,8 @@ from acquisition import Channel, DeviceError, DeviceSettings, SensorInput, find_
 from acquisition.devices import scan_ports
 from acquisition.vendor_drivers import LibraryDevice, parse_name_calibration
 
+pytestmark = pytest.mark.quick
+
 NAME = "485B39 201234508460000846000260115"
 """A 485B39 with the serial number 012345, 846000 counts a volt: 9.9156 V of full scale."""
 AUDIO_SCALE = 2**23 / 846000

@@ -24,7 +24,7 @@ from lobewatch.screen.dashboard_server import LiveTest
 from lobewatch.screen.web_server import WebServerThread
 from lobewatch.tap.cut_recording import CutState, CutStep
 from lobewatch.tap.emulated_spindle import build_structure, make_emulator
-from lobewatch.tap.evaluated_hits import StatePublisher
+from lobewatch.tap.state import StatePublisher
 
 TOKEN, WATCH = "a-token-of-the-test", "another-token-to-watch"
 START = "/machines/mill/start"

@@ -186,7 +186,7 @@ def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
     session_of: OpenSession,
 ) -> None:
     module = "acquisition.estimation.estimate_frf.estimate_frf_from_spectra"
-    monkeypatch.setattr(module, failing_at({4}, estimate_frf_from_spectra))
+    monkeypatch.setattr(module, failing_at({8}, estimate_frf_from_spectra))
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
     assert [i for i, flags in enumerate(tap.flags, 1) if flags] == [4]
     assert tap.flags[3] == HitFlags.NOT_EVALUATED
@@ -244,6 +244,6 @@ def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(
 
     with TapsEmulator(tapper(), channels, RATE, realtime=True) as device:
         tap = session_of(MachineFolder(folder.path), lambda: Counting(device.port)).run()
-    assert slowed.count("write_hit") == slowed.count("plots_of") == len(tap.hits) >= 3
+    assert slowed.count("write_hit") == slowed.count("build_curves") == len(tap.hits) >= 3
     assert sum(lost) == 0
     assert len(lost) > 3 * 0.4 * RATE / 512

@@ -9,6 +9,8 @@ from acquisition import Hit
 from acquisition.estimation.estimate_frf import RunningMean
 from lobewatch.tap.live_curves import build_curves
 
+pytestmark = pytest.mark.quick
+
 RATE = 25600.0
 
 

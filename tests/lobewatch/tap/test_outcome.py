@@ -107,18 +107,18 @@ def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
     assert soft.next_step.startswith("Do not run these programs. Tap direction y of the same tool too")
     both = tapped(folder, 0.1, 1700.0, "y", stiffness=3e6)
     assert both.status == "alarm"
-    assert "lobewatch check names a safe speed and depth" in both.next_step
+    assert "Logbook.verdicts names a safe speed and depth" in both.next_step
 
 
 def test_a_doubtful_program_warns_and_says_where_to_ask(shop: Any) -> None:
     shop.run(("sure", 8700, 0.4), ("unsure", 12900, 3))
     shop.tap_both()
     logbook = shop.logbook
-    found = build_outcome(logbook, logbook.measurement(logbook.newest().id))
+    found = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
     assert found.status == "warn"
     assert "unsure: doubtful." in found.texts
     assert not any("sure: stable" in text for text in found.texts)
-    assert found.next_step == "See with lobewatch check what would settle it, and where to go until then."
+    assert found.next_step == "See with Logbook.verdicts what would settle it, and where to go until then."
 
 
 def test_a_test_without_the_mode_asks_for_another(folder: MachineFolder) -> None:

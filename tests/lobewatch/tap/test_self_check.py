@@ -11,6 +11,8 @@ from lobewatch.tap.device_connection import estimate_resting_rms
 from lobewatch.tap.self_check import find_quiet_part, run_self_check
 from lobewatch.tap.state import Check
 
+pytestmark = pytest.mark.quick
+
 RATE = 25600.0
 Pair = tuple[Channel, Channel]
 Signal = NDArray[np.float64] | float

@@ -11,6 +11,8 @@ from acquisition import Channel, Hit, HitFlags, estimate_decay_time
 from lobewatch.machine.settings.setup_tables import TapTable
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
+pytestmark = pytest.mark.quick
+
 RATE = 5120.0
 Pair = tuple[Channel, Channel]
 

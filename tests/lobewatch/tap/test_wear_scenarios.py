@@ -15,6 +15,7 @@ from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.monitoring.change_detection import SeriesChange
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, TapValue, Trend, days_since_epoch, fit_trend
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.demo import PlannedTap, plan_taps
 from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, build_mounted_spindle
 
@@ -98,7 +99,7 @@ def test_where_nothing_happens_nothing_is_said(folder: MachineFolder, seed: int)
 
 
 def test_a_swing_of_the_temperature_is_recorded_and_no_decay(folder: MachineFolder) -> None:
-    taps = planned(folder, WearScenario.NONE, scatter=0.0002, swing=10.0)
+    taps = planned(folder, WearScenario.NONE, scatter=0.0002, temperature_swing=10.0)
     frequencies = np.array([tap.truth.frequency for tap in taps])
     warmth = np.array([tap.conditions.temperature_c for tap in taps], float)
     assert warmth[[0, 6]] == pytest.approx([12.0, 32.0])
@@ -109,7 +110,7 @@ def test_a_swing_of_the_temperature_is_recorded_and_no_decay(folder: MachineFold
 def test_bad_clampings_are_lower_and_as_many_as_asked(folder: MachineFolder) -> None:
     plain, bad = (
         planned(folder, WearScenario.NONE, scatter=0.0),
-        planned(folder, WearScenario.NONE, scatter=0.0, bad=0.3),
+        planned(folder, WearScenario.NONE, scatter=0.0, bad_share=0.3),
     )
     shifts = np.array([one.truth.frequency / other.truth.frequency - 1 for one, other in zip(bad, plain, strict=True)])
     assert set(np.round(shifts, 6)) == {0.0, -0.02}
@@ -155,7 +156,7 @@ def test_a_story_that_cannot_be_is_refused(folder: MachineFolder, options: list[
     out = folder.path / "new"
     told = CliRunner().invoke(app, ["demo", "--out", str(out), *options])
     assert told.exit_code != 0
-    assert said in f"{told.output}{told.exception}"
+    assert said in with_option_names(f"{told.output}{told.exception}")
     assert not out.exists()
 
 

@@ -55,15 +55,15 @@ Sensors = Callable[..., Said]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """A machine that was tapped before: the emulator is known, however fast it sends."""
+    """Make a machine tapped before, whose emulator is known at any speed."""
     make_machine_folder(tmp_path / "mill", "new_machine.toml")
     return MachineFolder(tmp_path / "mill")
 
 
 @pytest.fixture
 def sensors(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Sensors:
-    """Runs the command on an emulated device: exit code, stdout, stderr."""
-    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
+    """Run the command on an emulated device: exit code, stdout, stderr."""
+    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_MEASUREMENT_SECONDS", 3.0)
 
     def run(
         signal: SignalFunction,
@@ -156,7 +156,7 @@ def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
 def test_a_device_at_half_its_rate_is_refused(
     folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
+    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_MEASUREMENT_SECONDS", 3.0)
     folder.toml.write_text(folder.toml.read_text("utf-8").replace("[daq]", DATAQ), "utf-8")
     inputs = tuple(table.build() for table in MachineFolder(folder.path).machine.daq.channel)
     with DataqEmulator(lambda _: silence, inputs, faults=DataqFaults(halved_rate=True)) as device:

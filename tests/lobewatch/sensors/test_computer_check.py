@@ -25,12 +25,12 @@ NOW = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 
 @pytest.fixture
 def healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A computer on which nothing is wrong; the folder that stands for /sys."""
+    """Return a healthy computer, and the folder that replaces /sys."""
     monkeypatch.chdir(tmp_path)
     answer = DeviceAnswer("taps", DeviceIdentity("BOARD-1", "7"))
     survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 0x2E8A), answer),))
     monkeypatch.setattr(EXAMINE, "scan_ports", lambda: survey)
-    monkeypatch.setattr(EXAMINE, "LATENCY_TIMERS", tmp_path)
+    monkeypatch.setattr(EXAMINE, "LATENCY_TIMER_FOLDER", tmp_path)
     monkeypatch.setattr("webbrowser.get", lambda: SimpleNamespace())
     monkeypatch.setattr("os.getloadavg", lambda: (0.1, 0.1, 0.1))
     monkeypatch.setattr(shutil, "disk_usage", lambda _folder: SimpleNamespace(free=50 << 30))
@@ -41,6 +41,7 @@ def worst(machine: MachineFolder | None = None, now: float = NOW) -> list[Findin
     return [finding for finding in check_computer(machine, now) if finding.state != "fine"]
 
 
+@pytest.mark.quick
 def test_nothing_is_said_of_a_healthy_computer(healthy: Path) -> None:
     assert worst() == []
     text = {finding.subject: finding.text for finding in check_computer(None, NOW)}
@@ -85,7 +86,7 @@ def busy(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
         (break_rights, "port /dev/ttyACM0", "hinders", "usermod -aG dialout"),
         (slow_latency, "latency of ttyUSB0", "note", "echo 1 | sudo tee"),
         (full_disk, "disk of", "hinders", "make room"),
-        (no_browser, "browser", "note", "--listen 0.0.0.0"),
+        (no_browser, "browser", "note", "ScreenServer.listen 0.0.0.0"),
         (busy, "processor", "note", "close other programs"),
     ],
 )

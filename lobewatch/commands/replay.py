@@ -74,7 +74,7 @@ def replay(
     """
     from acquisition import Conditions, DataError
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.operator_entries import reject_edits, store_edits
+    from lobewatch.logbook.operator_entries import store_edits
     from lobewatch.logbook.recordings.recorded_files import find_recordings
     from lobewatch.logbook.recordings.store_recordings import format_rejections
     from lobewatch.logbook.replay_preview import preview_replay
@@ -95,7 +95,9 @@ def replay(
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
-        reject_edits(edits)
+        if edits:
+            text = "with --dry-run nothing is kept; lobewatch modes FILE shows what becomes of it"
+            raise ValueError(f"{edits}: {text}")
         with ReplayProgress() as bar:
             previews = preview_replay(logbook, recordings, description, bar, workers)
         emit_preview(previews, passed, as_json=as_json)

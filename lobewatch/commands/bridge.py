@@ -27,13 +27,13 @@ def bridge(
     tcp_port: Annotated[int, typer.Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
     as_json: Json = False,
 ) -> None:
-    """Any device as a TAPS/1 device on TCP: plugged in here, used by lobewatch on another computer. Ctrl-C ends it.
+    """Serve a device as a TAPS/1 device on TCP.
 
     Lost scans, overloads and the button are carried through; while the device is unplugged the host waits for it.
     There is no password: whoever reaches the address can start and stop the device.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch bridge dataq mill-3 --port /dev/ttyACM0 --listen 0.0.0.0 --tcp-port 5025
       lobewatch tap mill-3 --port socket://10.0.0.5:5025  # on the other computer, with driver = "taps"
     """

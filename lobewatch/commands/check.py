@@ -37,7 +37,7 @@ def check(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
+    """Evaluate cutting programs on the newest tap tests.
 
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
     not stable what decides and where to go. fall left: how far the frequency may fall before it chatters, in the middle
@@ -46,8 +46,8 @@ def check(
     A program of machine.toml without a speed or a depth is recommended what it has not.
     A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch check trial
       lobewatch check trial --program A --json
       lobewatch check trial --speed 8000 --depth 2 --material 42CrMo4

@@ -28,15 +28,15 @@ def demo(
     tcp: Annotated[bool, typer.Option("--tcp", help="Through a TCP port of this computer.")] = False,
     as_json: Json = False,
 ) -> None:
-    """A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.
+    """Tap a simulated aging spindle, and write a report.
 
     Every test goes through a real serial port (a pseudo-terminal; TCP where there is none), byte by byte: ten good
     hits, FRF, HDF5, modes, bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves
     f_1 a little. What was emulated in that very test is printed beside what was found. The months end with this one,
     or the one before it.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch demo
       lobewatch demo --out trial --taps 12 --story step --bad-clampings 5
     """

@@ -30,14 +30,14 @@ def export(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """All tap tests of all machines as one table for other programs: SQLite, CSV, Parquet, PostgreSQL.
+    """Export the tap tests of all machines as one table.
 
     The same again gives the same bytes. Excluded tap tests are left out. One that cannot be read is named, and the
     exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]"), PostgreSQL by psycopg (pip install
     "lobewatch[postgres]"), with its password from PGPASSWORD or ~/.pgpass.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch export mills fleet.sqlite
       lobewatch export mills --append fleet
       lobewatch export mills --to postgresql://mills@db.example/plant

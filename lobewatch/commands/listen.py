@@ -48,14 +48,14 @@ def listen(
     file_options: FileOptions,
     as_json: Json = False,
 ) -> None:
-    """Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot be told.
+    """Record a cut and detect chatter.
 
     Begin with the spindle turning in air, then cut for a second or longer; no key is needed. The recording is kept
     beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again. --screen
     --listen 0.0.0.0 can be watched on a tablet; the page keeps the word when the command has ended.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2

@@ -85,7 +85,7 @@ def modes(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Natural frequency, damping ratio and stiffness from one recorded file.
+    """Fit the modes of a recorded file or a stored tap test.
 
     Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
     by the peak picking of Gaber & Hashemi (2015). Trusted modes come first, then doubtful ones with the reason; the
@@ -94,8 +94,8 @@ def modes(
     so of a file is only shown; of a tap test of a machine it is kept, in place of what was said of it before, and all
     that follows from it is worked out anew.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch modes acceleration.lvm
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01

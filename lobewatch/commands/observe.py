@@ -29,12 +29,12 @@ def observe(
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Write down what was heard of a test cut by ear: that it was stable, or that it chattered.
+    """Store whether a test cut was stable by ear.
 
     It is a line of the journal; lobewatch exclude takes it out again.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
       lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable --power 1.4

@@ -23,14 +23,14 @@ def pitch(
     direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal is as good.
+    """Propose unequal pitches for a cutter at one speed.
 
     Alternating and linear pitches, as tool makers grind them, whose teeth cut at most 20 % more or less than the mean.
     The limit of each kind's best is that of lobewatch check over all that is not known, beside equal pitch on the same
     spindles. What is not said of the cut is taken from the programs of its tool where they agree.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch pitch trial --tool reference --speed 6200
       lobewatch pitch trial --speed 9000 --radial 5 --material 42CrMo4 --json
     """

@@ -27,14 +27,14 @@ def rebuild(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """The history anew from the tap tests, and the journal where that is damaged; nothing is deleted.
+    """Rebuild the history, and a damaged journal.
 
     What is damaged is put into a folder named damaged. Tap files that were renamed or swapped get their names back,
     whole ones that are in no journal are entered. A tap test whose file is lost is gone on without; put back from a
     backup, it counts again. Of a folder of machines each is rebuilt; one that cannot be costs only itself.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch rebuild mill-3
       lobewatch rebuild mills --scheduler tls://10.0.0.5:8786
     """

@@ -30,13 +30,13 @@ def recommend(
     save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
 ) -> None:
-    """A speed and a depth for a tool and a material, no program needed; exit code 1 where none is safe.
+    """Recommend a speed and a depth for a tool and a material.
 
     The most chips a minute of all that lobewatch check would call stable, with room on all sides; at --depth where
     that is given. Tool, material and teeth that are not given are those of the tool's programs where they agree.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch recommend trial --tool reference --material 42CrMo4
       lobewatch recommend trial --material "AA 6061" --radial 4 --direction down --save "bracket, finish"
       lobewatch recommend trial --depth 1.5 --json

@@ -22,12 +22,12 @@ def report(
     direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",
     as_json: Json = False,
 ) -> None:
-    """One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.
+    """Write the report of a machine or of a folder of machines.
 
     Of a folder of machine folders: a line for each of them, worst first.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch report trial
       lobewatch report trial --out spindle.html --tool reference --direction x
     """

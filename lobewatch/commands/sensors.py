@@ -20,12 +20,12 @@ def sensors(
     skew: Annotated[bool, typer.Option("--skew", help="Measure the skew: both inputs joined, one signal.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hammer, accelerometer and DAQ: what they are, and whether they are right.
+    """Check hammer, accelerometer and DAQ.
 
     Without an option: channels, dates, what is not plausible, and the sample rate against this computer's clock.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch sensors mill-3 --port /dev/ttyACM0
       lobewatch sensors mill-3 --mass-kg 1.052
       lobewatch sensors mill-3 --skew

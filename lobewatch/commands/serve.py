@@ -22,10 +22,10 @@ def serve(
     watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
-    """Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. Ctrl-C ends it.
+    """Serve the dashboard of machines.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch serve mills
       lobewatch serve mills --listen 0.0.0.0 --http-port 8080
     """

@@ -41,13 +41,13 @@ def status(
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
-    """How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.
+    """Show the status of all machines in a folder.
 
     Exit code 1 where one of them is on alarm or cannot be judged, so that a scheduler can tell; else 2 where --notify
     could not tell a broker.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch status mills
       lobewatch status mills --due
     """

@@ -44,7 +44,7 @@ def tap(
     details: Annotated[bool, typer.Option("--details", help="All modes, the model and the doubt, too.")] = False,
     as_json: Json = False,
 ) -> None:
-    """The live tap test: hit until ten hits are good, then see what has changed.
+    """Run a live tap test.
 
     At a terminal, or with --screen, x is tapped, then y; then you say what comes next: another test, the next tool, or
     that you are done. With --direction, --json, or where nobody sits, it is one test. Keys: u or Page Up takes the last
@@ -52,8 +52,8 @@ def tap(
     on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0 can be watched on a tablet; --port
     file:RECORDING takes recorded hits as if they were made now.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch tap mill-3 --port /dev/ttyACM0
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
       lobewatch tap mill-3 --screen --listen 0.0.0.0

@@ -135,7 +135,7 @@ def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(s
     told = json.loads(run(shop, *arguments, "--json").stdout)
     assert (told["word"], told["reason"]) == ("cannot tell", "unexplained-tone")
     assert told["unexplained_tone_hz"] == pytest.approx(1712.3, abs=0.1)
-    assembly = shop.logbook.ask(Analysis.assembly_or_reason, "reference")
+    assembly = shop.logbook.query(Analysis.assembly_or_reason, "reference")
     modes = [mode.frequency for mode in (*assembly.x, *assembly.y)]
     nearest = min(modes, key=lambda mode: abs(mode - 1712.3))
     said = run(shop, *arguments).stdout.splitlines()[0]

@@ -17,7 +17,7 @@ def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: 
     shop.tap(0, 1713.0)
     newest = shop.tap(30, 1650.0)
     logbook = shop.logbook
-    rulings = logbook.rulings(newest)
+    rulings = logbook.stored_verdicts(newest)
     columns = make_export_columns(logbook.history, logbook.machine).columns
     expected = [rulings[name].limit for name in "ABC"]
     assert np.all(np.isfinite(expected))

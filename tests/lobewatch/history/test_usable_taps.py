@@ -79,7 +79,7 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     assert "tap again" in said.stdout
     logbook = tapped.logbook
     assert [one.word for one in logbook.verdicts()] == [Stability.DOUBTFUL]
-    assert [one.word for one in logbook.rulings(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
+    assert [one.word for one in logbook.stored_verdicts(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
     bad.write_bytes(content)
     assert [one.word for one in tapped.logbook.verdicts()] == [Stability.STABLE]
     flip(bad)
@@ -88,7 +88,7 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
 
 
 def test_one_that_is_found_damaged_late_is_left_out_too(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
-    tapped.logbook.standing()
+    tapped.logbook.status()
     monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_BYTES", 0)
     bad = file_of(tapped, -1)
     flip(bad)
@@ -102,7 +102,7 @@ def test_where_none_is_left_that_is_said(tapped: Shop) -> None:
         path.unlink()
     said = CliRunner().invoke(app, ["check", str(tapped.path)])
     assert "no tap test that can be used: taps/" in str(said.exception)
-    assert tapped.logbook.standing().light == "unknown"
+    assert tapped.logbook.status().light == "unknown"
 
 
 def test_a_damaged_journal_does_not_stop_reading(tapped: Shop) -> None:

@@ -103,9 +103,9 @@ def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
             damping_ratio=0.029 * (1 + 0.002 * (-1) ** i) * (1.2 if i > 8 else 1),
             stiffness=3.5e7 * (1 + 0.002 * (-1) ** i) * (0.9 if i > 9 else 1),
         )
-    found = shop.logbook.standing(shop.logbook.history.rows[-1].time)
+    found = shop.logbook.status(shop.logbook.history.rows[-1].time)
     said = [str(remark) for remark in found.remarks if remark.code == "value-changed"]
-    assert found.light == "good"
+    assert found.status == "good"
     assert any("damping ratio rose at once before 2026-05-30, by 19." in one for one in said)
     assert any("stiffness K fell at once before 2026-06-14, by 10." in one for one in said)
     assert not any("bearing" in one for one in said)

@@ -65,12 +65,12 @@ def test_a_clock_at_1970_makes_no_new_baseline_until_it_is_accepted(shop: Shop) 
     tap_id = live(shop.logbook, began, began, 1650.0)
     logbook = shop.logbook
     assert logbook.questions == {tap_id: ("clock-behind", "clock-before-release")}
-    standing = logbook.standing(shop.start + timedelta(days=1))
+    standing = logbook.status(shop.start + timedelta(days=1))
     assert standing.light == "warn"
     assert "lobewatch replay" in standing.next_step
     assert standing.series_of("reference", "x").first == shop.start
     assert logbook.accept([tap_id], ["clock-behind", "clock-before-release"]) == []
-    standing = shop.logbook.standing(shop.start + timedelta(days=1))
+    standing = shop.logbook.status(shop.start + timedelta(days=1))
     assert (standing.light, standing.series_of("reference", "x").first) == ("good", began)
 
 
@@ -86,7 +86,7 @@ def test_the_question_stands_in_the_journal_and_outlives_the_history(shop: Shop)
 def test_a_test_of_2031_is_said_once_the_clock_is_right(shop: Shop) -> None:
     then = datetime(2031, 1, 1, tzinfo=UTC)
     tap_id = live(shop.logbook, then, then)
-    found = shop.logbook.standing(shop.start + timedelta(days=30))
+    found = shop.logbook.status(shop.start + timedelta(days=30))
     assert found.light == "warn"
     assert "tap-in-future" in [remark.code for remark in found.remarks]
     assert f"lobewatch exclude {shop.path} {tap_id}" in found.next_step

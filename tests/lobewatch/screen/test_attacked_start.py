@@ -215,10 +215,10 @@ def test_twenty_starts_at_once_after_a_failure_begin_one_test(tmp_path: Path, mo
             super().__init__(*args, **options)
 
     monkeypatch.setattr("lobewatch.screen.dashboard_server.LiveTest", Counted)
-    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(1.0))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server._release_memory", lambda: time.sleep(1.0))
     with DashboardServer(tmp_path, token=TOKEN) as server, ThreadPoolExecutor(20) as pool:
         assert ask(server, "POST", START, X)[0] == 200
-        while begun[0].running:
+        while begun[0].is_running:
             time.sleep(0.02)
         answers = [*pool.map(lambda _: ask(server, "POST", START, X), range(20))]
         assert answers == [(200, {"url": "/tap/mill/"})] * 20

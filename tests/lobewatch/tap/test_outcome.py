@@ -114,7 +114,7 @@ def test_a_doubtful_program_warns_and_says_where_to_ask(shop: Any) -> None:
     shop.run(("sure", 8700, 0.4), ("unsure", 12900, 3))
     shop.tap_both()
     logbook = shop.logbook
-    found = build_outcome(logbook, logbook.measurement(logbook.newest().id))
+    found = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
     assert found.status == "warn"
     assert "unsure: doubtful." in found.texts
     assert not any("sure: stable" in text for text in found.texts)

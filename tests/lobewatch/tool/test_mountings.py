@@ -66,14 +66,14 @@ def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Con
     (remark,) = [remark for remark in last.remarks if remark.code == "new-series"]
     assert remark.text.startswith(text)
     assert not last.questions
-    standing = shop.logbook.standing(shop.start + timedelta(days=61))
+    standing = shop.logbook.status(shop.start + timedelta(days=61))
     assert [series.is_first for series in standing.series] == [True]
     assert "frequency-alarm" not in [remark.code for remark in standing.remarks]
 
 
 def test_a_series_that_is_not_divided_alarms(shop: Shop) -> None:
     rows_of(shop, WARM, WARM)
-    assert shop.logbook.standing(shop.start + timedelta(days=31)).light == "alarm"
+    assert shop.logbook.status(shop.start + timedelta(days=31)).light == "alarm"
 
 
 def test_what_is_unknown_divides_nothing(shop: Shop) -> None:
@@ -93,7 +93,7 @@ def test_an_earlier_series_goes_on(shop: Shop) -> None:
     rows = rows_of(shop, WARM, cold, WARM, cold)
     assert series_of(rows) == [0, 1, 0, 1]
     assert [codes(row) for row in rows[1:]] == [{"new-series"}, {"earlier-series"}, {"earlier-series"}]
-    (series,) = shop.logbook.standing(shop.start + timedelta(days=91)).series
+    (series,) = shop.logbook.status(shop.start + timedelta(days=91)).series
     assert series.fall.value == pytest.approx(100 * (1 - 0.88**2), abs=0.1)
 
 

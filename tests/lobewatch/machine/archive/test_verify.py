@@ -221,11 +221,11 @@ def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) 
     shop.run(("A", 12900, 1.0))  # type: ignore[attr-defined]
     for days in (0, 30):
         shop.tap_both(days)  # type: ignore[attr-defined]
-        shop.logbook.standing()  # type: ignore[attr-defined]
+        shop.logbook.status()  # type: ignore[attr-defined]
     path: Path = shop.path  # type: ignore[attr-defined]
     logbook = shop.logbook  # type: ignore[attr-defined]
     for tap in logbook.taps:
-        logbook.rulings(tap.id)
+        logbook.stored_verdicts(tap.id)
     before = newest_rows(path)
     said = CliRunner().invoke(app, ["rebuild", str(path)], catch_exceptions=False)
     assert said.stdout.endswith("history.rows: made anew from 4 tap test(s)\n")

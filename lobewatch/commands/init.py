@@ -90,7 +90,7 @@ def init(
 
 
 def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
-    """Draft with the answers of options and of whoever sits at the terminal."""
+    """Make the draft from the answers in options and at the terminal."""
     from lobewatch.machine.setup_questions.draft import MachineDraft
     from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
     from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import FileOptions, add_file_options
+from lobewatch.commands.shared_options import CutPower, FileOptions, add_file_options
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
 
@@ -23,10 +23,7 @@ def listen(
         float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
-    power: Annotated[
-        float | None,
-        typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
-    ] = None,
+    power: CutPower = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
@@ -50,5 +51,5 @@ def _write_for_fleet(folder: Path, out: Path | None) -> Path:
     from lobewatch.show.fleet.fleet_status import fleet_rows
     from lobewatch.show.report.report import write_fleet_report
 
-    rows = fleet_rows(Fleet(find_machines(folder)).assess_machines())
+    rows = fleet_rows(Fleet(find_machines(folder), with_option_names).assess_machines())
     return write_fleet_report(rows, folder, out, datetime.now().astimezone())

@@ -25,7 +25,7 @@ NOW = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 
 @pytest.fixture
 def healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A computer on which nothing is wrong; the folder that stands for /sys."""
+    """Return a healthy computer, and the folder that replaces /sys."""
     monkeypatch.chdir(tmp_path)
     answer = DeviceAnswer("taps", DeviceIdentity("BOARD-1", "7"))
     survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 0x2E8A), answer),))

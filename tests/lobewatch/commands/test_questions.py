@@ -49,7 +49,7 @@ def run(*arguments: object) -> Result:
 
 
 def refused(*arguments: object) -> str:
-    """The one sentence of an error."""
+    """Return the one sentence of an error."""
     with pytest.raises(ValueError, match="--accept") as said:
         run(*arguments)
     return str(said.value)

@@ -55,14 +55,14 @@ Sensors = Callable[..., Said]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """A machine that was tapped before: the emulator is known, however fast it sends."""
+    """Make a machine tapped before, whose emulator is known at any speed."""
     make_machine_folder(tmp_path / "mill", "new_machine.toml")
     return MachineFolder(tmp_path / "mill")
 
 
 @pytest.fixture
 def sensors(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Sensors:
-    """Runs the command on an emulated device: exit code, stdout, stderr."""
+    """Run the command on an emulated device: exit code, stdout, stderr."""
     monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
 
     def run(

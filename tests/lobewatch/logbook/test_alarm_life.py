@@ -26,7 +26,7 @@ LONG_AGO = -1500.0
 
 
 def tap_months(shop: Shop, falls: list[float], begin: int = 0) -> list[str]:
-    """A test a month in x, fallen by so much (%) each; their identities."""
+    """Add one test a month in x with these frequency drops (%), and return their identities."""
     return [
         shop.tap(LONG_AGO + MONTH * (begin + i), 1713.0 * (1 - (fall + WIGGLE[(begin + i) % 5]) / 100))
         for i, fall in enumerate(falls)

@@ -66,7 +66,7 @@ Shop = Any
 
 @pytest.fixture
 def path(shop: Shop) -> Path:
-    """The example machine, with few speeds and programs that are safe when it is new."""
+    """Make the example machine with few speeds and programs that are stable when it is new."""
     folder: Path = shop.path
     return folder
 

@@ -49,7 +49,7 @@ def worn(shop: Shop) -> Shop:
 
 
 def words_after(shop: Shop, fall: float) -> dict[str, Stability]:
-    """The words with both directions fallen by so much of what they are now."""
+    """Return the verdicts after both directions have dropped by these shares."""
     shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
     return {one.program.name: one.word for one in shop.logbook.verdicts()}
 
@@ -266,7 +266,7 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
 
 
 def printed_of(shop: Shop, tap_id: str) -> str:
-    """What is printed of a tap test."""
+    """Return the printed text on a tap test."""
     return "\n".join(map(str, measurement_texts(shop.logbook.measurement(tap_id), shop.logbook)))
 
 

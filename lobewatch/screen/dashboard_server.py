@@ -24,7 +24,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.prometheus import PROMETHEUS_CONTENT_TYPE, format_prometheus
 from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.access_control import HAS_FULL_ACCESS, PUBLIC_ROUTE_PREFIX, WATCH_ROUTE_PREFIX
-from lobewatch.screen.machine_table import MachineTable
+from lobewatch.screen.dashboard_table import DashboardTable
 from lobewatch.screen.web_server import WebServerThread, add_pages, add_session, read_body
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
@@ -145,7 +145,7 @@ class DashboardServer(WebServerThread):
             If there is no machine.
         """
         super().__init__(listen, port, token, watch_token)
-        self._table = MachineTable(Path(path))
+        self._table = DashboardTable(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
         self._end = threading.Event()

@@ -16,7 +16,7 @@ from acquisition import Circumstances, Hit, HitFlags, TapDirection, TapTest, fro
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.screen import machine_table as board
+from lobewatch.screen import dashboard_table as board
 from modal import Mode, synthesize_frf
 
 Browser = Any

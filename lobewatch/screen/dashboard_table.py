@@ -36,7 +36,7 @@ class _MachineRow(NamedTuple):
     """Number of the change that made this row."""
 
 
-class MachineTable:
+class DashboardTable:
     """Rows of all machines of a folder, most severe first, each with the number of its last change.
 
     Machines come and go with their folders. One poll serves all pages within MACHINE_POLL_INTERVAL.

@@ -15,7 +15,7 @@ import pytest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen import DashboardServer
 from lobewatch.screen.dashboard_server import LiveTest
-from tests.lobewatch.screen.test_dashboard import ask, hammered, machine
+from tests.lobewatch.screen.test_dashboard_server import ask, hammered, machine
 
 WINDOW = 20
 """Tap tests over which the median of the memory is taken: garbage comes and goes."""

@@ -36,6 +36,7 @@ from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_an
 from lobewatch.machine import BusyError
 from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.machine.journal.entries import FleetScatter
+from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.machine_status import SeriesStatus
@@ -146,7 +147,7 @@ def summarize_with_rows(path: Path, now: datetime, render_text: RenderText = str
         Rows of the history as in history.rows.
     """
     logbook = Logbook.open(path)
-    summary, hashes = summarize_machine(logbook, now, render_text), logbook.machine.program_hashes
+    summary, hashes = summarize_machine(logbook, now, render_text), hash_programs(logbook.machine)
     return summary, [encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)]
 
 

@@ -214,7 +214,7 @@ class Analysis:
         return verdicts
 
     def stored_verdicts(
-        self, tap_id: str, with_drops: bool = False, verdicts: Mapping[str, Verdict] | None = None
+        self, tap_id: str, drops: bool = False, verdicts: Mapping[str, Verdict] | None = None
     ) -> Mapping[str, StoredVerdict]:
         """Return the verdict on every program after a tap test, and store the new ones in the history.
 
@@ -222,17 +222,17 @@ class Analysis:
         ----------
         tap_id
             Identity of the tap test.
-        with_drops
+        drops
             Whether critical frequency drops are needed too.
         verdicts
             Verdicts evaluated elsewhere, by program.
         """
         row_verdicts = self.history.rows[number := self.files.place(tap_id).number].verdicts
         stored = dict(row_verdicts or {})
-        names = [table.name for table in self.machine.program if is_verdict_missing(stored.get(table.name), with_drops)]
+        names = [table.name for table in self.machine.program if is_verdict_missing(stored.get(table.name), drops)]
         if names or row_verdicts is None:
             new = [verdicts[name] for name in names] if verdicts else self.verdicts(tap_id, names)
-            stored |= {verdict.program.name: build_stored_verdict(verdict, with_drops) for verdict in new}
+            stored |= {verdict.program.name: build_stored_verdict(verdict, drops) for verdict in new}
             stored = {table.name: stored[table.name] for table in self.machine.program}
             history = self._history = self.history.with_verdicts(number, stored)
             self._cache.store(clear_newest_verdicts(history) if self.files.newest_damaged_remarks() else history)

@@ -78,8 +78,8 @@ def _newest_verdicts(analysis: Analysis, status: MachineStatus) -> Mapping[str, 
     """Return the verdicts after the newest tap test, with critical drops if any series has a forecast."""
     if not status.series:
         return {}
-    with_drops = any(series.trend is not None and series.trend.has_forecast for series in status.series)
-    return analysis.stored_verdicts(analysis.history.rows[-1].tap_id, with_drops)
+    drops = any(series.trend is not None and series.trend.has_forecast for series in status.series)
+    return analysis.stored_verdicts(analysis.history.rows[-1].tap_id, drops)
 
 
 def _forecast_limit(status: MachineStatus, percent: float) -> ThresholdDates:

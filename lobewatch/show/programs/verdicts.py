@@ -21,6 +21,7 @@ from lobewatch.verdicts import Stability, Verdict
 from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
 UNCERTAINTY_PAGE = "docs/lobes.md"
 """Page that says where the sizes come from."""
@@ -111,12 +112,12 @@ def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly,
         return
     missing = "y" if "x" in assembly.directions else "x"
     lacking = "usable" if missing in assembly.unusable else "tapped"
-    about = {"prediction": "by the prediction", "untapped": f"in {missing}, not {lacking}"}
-    for cause, widths in doubt.modes.items():
-        if cause == "clamping":
-            yield from _reclamping_parts(widths, assembly, given)
+    for name, widths in doubt.modes.items():
+        label = UNCERTAINTY_CAUSES[name].label.format(direction=missing, lacking=lacking)
+        if name == CLAMPING.name:
+            yield from _reclamping_parts(widths, label, assembly, given)
         elif np.any(widths > MIN_SHOWN_WIDTH):
-            yield f"{_widths_text(np.max(widths, axis=0))} {about.get(cause, 'by the tap test')}"
+            yield f"{_widths_text(np.max(widths, axis=0))} {label}"
     if doubt.axes is not None and doubt.axes.sign_count:
         yield "modes askew to either side (cross not tapped)"
     yield f"speed {_half_width_text(doubt.speed)}" + (
@@ -137,13 +138,13 @@ def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     yield f"speed {_half_width_text(speed)}"
 
 
-def _reclamping_parts(widths: Floats, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
+def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
     """Scatter from tap test to tap test, once where both directions have it alike."""
     places = {"x": 0, "y": len(assembly.x or ())}
     texts = {}
     for side in assembly.directions:
         texts[side] = (
-            f"{_widths_text(widths[places[side]])} from tap to tap ({_scatter_source_text(assembly, side, given)})"
+            f"{_widths_text(widths[places[side]])} {label} ({_scatter_source_text(assembly, side, given)})"
         )
     alike = len(set(texts.values())) == 1
     yield from list(texts.values())[:1] if alike else (f"in {side} {text}" for side, text in texts.items())

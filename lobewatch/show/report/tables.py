@@ -16,6 +16,7 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.alarm import Alarm
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
 from lobewatch.show.history import cut_result_text
@@ -60,7 +61,7 @@ def _series_row(series: SeriesStatus) -> list[str | TableCell]:
         "0" if trend is None else str(len(trend.points)),
         f"{series.time:%Y-%m-%d}",
         change_since_start_text(series),
-        "-" if trend is None else rate_text(trend) or "from 8 points on",
+        "-" if trend is None else rate_text(trend) or f"from {MIN_FORECAST_POINTS} points on",
     ]
 
 
@@ -150,6 +151,7 @@ NOT_DETECTED: Sequence[str] = (
     "what has happened since the newest tap test",
 )
 """What no tap test shows."""
+TOO_FEW_CLAMPINGS = f"no alarm by scatter below {MIN_MONITORED_POINTS} clampings"
 ALARM_CONFIDENCE = (
     "alarm: two clampings running, each with a chance of 1 in 2000 of being scatter alone; of 100 healthy series 5 "
     "raise one in 60 clampings"
@@ -173,7 +175,7 @@ def make_provenance(material: ReportData) -> list[Section]:
         ("failure mode watched", FAILURE_MODE),
         (
             "confidence",
-            f"{ALARM_CONFIDENCE if points > MIN_FORECAST_POINTS else 'no alarm by scatter below 9 clampings'}; {DATE_CONFIDENCE}",
+            f"{ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS}; {DATE_CONFIDENCE}",
         ),
         *[("alarm", _alarm_text(alarm)) for alarm in material.outlook.status.alarms],
         ("name, date, signature", ""),

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
+from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 
 from acquisition import Description
 from lobewatch import Logbook

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster, Security
-from tests.lobewatch.logbook.recordings.test_replaying import text_files, values
+from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 from typer.testing import CliRunner
 
 from acquisition import DataError, Description

@@ -63,7 +63,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "ProgramTable.teeth": "--teeth",
     "ProgramTable.tool_diameter_mm": "--diameter",
     "accept_settings.keys": "--accept",
-    "add_event": "event",
     "build_power_reading.power_kw": "--power",
     "choose_cut.cut": "--cut",
     "choose_cut.program": "--program",

@@ -37,7 +37,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.measurement import Estimate
-from lobewatch.screen.machine_table import MACHINE_POLL_INTERVAL, MachineTable
+from lobewatch.screen.dashboard_table import MACHINE_POLL_INTERVAL, DashboardTable
 from lobewatch.tool.tap_series import TapPlace
 from modal import Mode, synthesize_frf
 
@@ -128,7 +128,7 @@ def exported(table: Path, path: Path) -> float:
 
 def served(path: Path) -> None:
     """What the pages of lobewatch serve cost: the first, one where nothing has changed, one where one machine has."""
-    board = MachineTable(path)
+    board = DashboardTable(path)
     known = ""
     for name in ("first page", "nothing changed", "a machine changed"):
         if name == "a machine changed":

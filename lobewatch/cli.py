@@ -1,9 +1,10 @@
-"""The command line: each command is imported when it is asked for; errors in one sentence, exit code 2."""
+"""Run the command line: import each command when it is needed, and print errors as one sentence."""
 
 from __future__ import annotations
 
 import atexit
 import gc
+import inspect
 import io
 import os
 import signal
@@ -19,11 +20,11 @@ from lobewatch.commands import COMMANDS, GROUPS
 from lobewatch.commands.help_page import HelpCommand, HelpGroup, get_page_width
 
 GC_THRESHOLD = 100_000
-"""Objects made between two searches for unreachable ones; imports make 200 000, nearly all of which stay."""
+"""Number of new objects between two garbage collections. Imports make 200 000 objects that stay."""
 
 
 class _LazyCommands(Mapping[str, Any]):
-    """The commands by name; a look at one imports it."""
+    """Commands by name. Reading one imports it."""
 
     def __getitem__(self, name: str) -> Any:
         if name not in COMMANDS:
@@ -35,7 +36,7 @@ class _LazyCommands(Mapping[str, Any]):
                 registered.cls = HelpCommand
             holder.add_typer(command, name=name, cls=HelpGroup)
         else:
-            holder.command(name, cls=HelpCommand)(command)
+            holder.command(name, cls=HelpCommand, help=_help_text(name, command))(command)
         return typer.main.get_group(holder).commands[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -45,21 +46,27 @@ class _LazyCommands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
+def _help_text(name: str, command: Any) -> str:
+    """Compose the help of a command from its summary and the rest of its docstring."""
+    details = (inspect.getdoc(command) or "").partition("\n\n")[2]
+    return f"{COMMANDS[name]}\n\n{details}".replace("\nExamples\n--------\n", "\nExamples:\n\n").rstrip()
+
+
 class _RootGroup(HelpGroup):
-    """All commands, none of them imported before it is needed."""
+    """Group of all commands, which imports none before it is needed."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = cast(MutableMapping[str, Any], _LazyCommands())
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read these options where no command comes first: what reads them takes a while to import."""
+        """Skip the options of the group if a command comes first: their parser is slow to import."""
         if args and args[0][:1].isalnum():
             self.resolve_command(ctx, args)
             self.params = []
         return super().parse_args(ctx, args)
 
-    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (asked by the completion of the shell)
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (used by shell completion)
         return list(COMMANDS)
 
     def groups(self, ctx: Any) -> Mapping[str, Mapping[str, str]]:  # noqa: ARG002
@@ -76,8 +83,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_requested: bool) -> None:
+    if is_requested:
         from importlib.metadata import version
 
         typer.echo(f"lobewatch {version('lobewatch')}")
@@ -95,14 +102,14 @@ def _root_options(
 
 
 def main() -> None:
-    """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C or ended."""
+    """Run a command. Exit codes: 0 success, 1 not everything is stable, 2 error, 130 interrupted."""
     gc.set_threshold(GC_THRESHOLD)
-    atexit.register(gc.freeze)  # what is left goes with the process, searched or not
+    atexit.register(gc.freeze)  # no garbage collection at the end
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service is ended as by Ctrl-C
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM ends a service like Ctrl-C
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead
+            stream.reconfigure(errors="replace")  # show "?" for characters that the console lacks
     try:
         app(terminal_width=get_page_width())
     except BrokenPipeError:

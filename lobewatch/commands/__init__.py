@@ -1,4 +1,4 @@
-"""The commands of the command line, one a module."""
+"""Commands of the command line, one in each module."""
 
 GROUPS = {
     "Tap (measure a spindle)": {
@@ -61,6 +61,6 @@ GROUPS = {
         "Ctrl-C ends it.",
     },
 }
-"""What the commands are for, and what each does: the first line of its help. All are listed without importing any."""
+"""Commands by topic, each with the first line of its help. Listing them imports none."""
 COMMANDS = {name: summary for commands in GROUPS.values() for name, summary in commands.items()}
-"""The same without their groups."""
+"""First line of the help of each command."""

@@ -25,12 +25,12 @@ def ack(
     operator: Annotated[str, typer.Option(help="Who says so; the name of the login where not given.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Acknowledge alarms: they are known. It quiets repeats, never the light.
+    """Acknowledge alarms.
 
     An alarm is closed by the tap tests alone, or by a new baseline after a repair; one that is raised anew rings again.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch ack mill-3
       lobewatch ack mill-3 decay:reference:x --until 2026-12-01 --note "bearings ordered"
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -27,13 +28,13 @@ def bridge(
     tcp_port: Annotated[int, typer.Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
     as_json: Json = False,
 ) -> None:
-    """Any device as a TAPS/1 device on TCP: plugged in here, used by lobewatch on another computer. Ctrl-C ends it.
+    """Serve a device as a TAPS/1 device on TCP.
 
     Lost scans, overloads and the button are carried through; while the device is unplugged the host waits for it.
     There is no password: whoever reaches the address can start and stop the device.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch bridge dataq mill-3 --port /dev/ttyACM0 --listen 0.0.0.0 --tcp-port 5025
       lobewatch tap mill-3 --port socket://10.0.0.5:5025  # on the other computer, with driver = "taps"
     """
@@ -43,6 +44,7 @@ def bridge(
     from lobewatch.machine.settings.setup_tables import DaqTable
     from lobewatch.tap.device_connection import DeviceOpener
 
+    print_note = partial(notes.print, markup=False)
     folder, kind = None if machine is None else MachineFolder(machine), find_driver(driver)
     if folder is None and kind.sensor_data is None:
         raise DataError(
@@ -54,15 +56,11 @@ def bridge(
     port = port or daq.port
     if not port:
         raise ValueError("no port: give --port, or a machine folder with port in [daq]")
-    server = TapsBridge(DeviceOpener(daq, port).open, _print_note, address=listen, number=tcp_port)
+    server = TapsBridge(DeviceOpener(daq, port).open, print_note, address=listen, number=tcp_port)
     identity = server.device.identity
     results.print(json.dumps({"port": server.port}) if as_json else f"port {server.port}", markup=False)
     results.file.flush()
-    _print_note(
+    print_note(
         f"{identity.model} on {port}, {server.device.sample_rate:g} Hz; tap with --port {server.port} (Ctrl-C ends it)"
     )
     server.run()
-
-
-def _print_note(text: str) -> None:
-    notes.print(text, markup=False)

@@ -36,14 +36,14 @@ def calibrate(
     direction: Annotated[str | None, typer.Option(help="Of these tap tests, x or y; else that of the newest.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Stiffness of bearings and joints for measured natural frequencies; nothing is stored.
+    """Calibrate bearings and joints to measured natural frequencies.
 
     One frequency scales all bearings alike. Several find a factor for each group of bearings and joints. Two tools or
     more, tapped, find the joint between tool and spindle and the bearings together; what to write into machine.toml
     is printed. Exit code 1 where the tools do not fit one spindle.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch calibrate trial --frequency 1550 --frequency-std 0.4
       lobewatch calibrate trial --frequency 1550 --mode 1 --damping-ratio 0.03 --json
       lobewatch calibrate trial --frequency 1550 --frequency 2600 --group front --group rear

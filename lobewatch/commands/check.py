@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.shared_options import number
+from lobewatch.commands.shared_options import Flutes, Material, cut_fields, number
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
 PROGRESS_DELAY = 5.0
-"""Time after which a person is told how far it is (s)."""
+"""Delay before progress is shown (s)."""
 
 
 def check(
@@ -26,8 +26,8 @@ def check(
     ] = None,
     depth: Annotated[float | None, typer.Option(parser=number, help="Its axial depth, mm.")] = None,
     tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
-    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
-    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    material: Material = None,
+    teeth: Flutes = None,
     diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
     radial: Annotated[float | None, typer.Option(parser=number, help="Its radial depth, mm.")] = None,
     direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
@@ -37,7 +37,7 @@ def check(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
+    """Evaluate cutting programs on the newest tap tests.
 
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
     not stable what decides and where to go. fall left: how far the frequency may fall before it chatters, in the middle
@@ -46,8 +46,8 @@ def check(
     A program of machine.toml without a speed or a depth is recommended what it has not.
     A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch check trial
       lobewatch check trial --program A --json
       lobewatch check trial --speed 8000 --depth 2 --material 42CrMo4
@@ -66,21 +66,12 @@ def check(
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines
     from lobewatch.show.programs.verdicts import is_safe
 
-    said = {
-        "speed_rpm": speed,
-        "depth_mm": depth,
-        "tool": tool,
-        "material": material,
-        "teeth": teeth,
-        "tool_diameter_mm": diameter,
-        "radial_depth_mm": radial,
-        "direction": direction,
-    }
+    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     if accept:
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
-    verdicts, recommendations = evaluate_requested(logbook, program or (), said)
+    verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
     for verdict in verdicts:
         if not slow and monotonic() - begin > PROGRESS_DELAY:

@@ -23,13 +23,13 @@ def convert(
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, where the file does not say.")] = "",
     as_json: Json = False,
 ) -> None:
-    """A recorded file written for other programs: universal file, text table, MATLAB, SEP005.
+    """Convert a recorded file to another format.
 
     With frequency lines, FRF, coherence, averages, units, direction and date, in SI units; what is written is read
     back as the same.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch convert mill-3/taps/ID.h5 tap.uff
       lobewatch convert hit.lvm hit.json --hits
       lobewatch convert h.mat h.csv --unit g/N --response 2

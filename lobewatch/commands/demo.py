@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
 from lobewatch.show.terminal.output import Json, emit, notes
-
-WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 
 
 def demo(
@@ -18,8 +17,8 @@ def demo(
     taps: Annotated[
         int, typer.Option(min=2, max=120, help="How many months; each has one tap test in x and one in y.")
     ] = 24,
-    seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1,
-    scatter: Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")] = 0.1,
+    seed: Seed = 1,
+    scatter: ReclampingScatter = 0.1,
     story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings.")] = "steady",
     bad_clampings: Annotated[float, typer.Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
     temperature: Annotated[
@@ -28,15 +27,15 @@ def demo(
     tcp: Annotated[bool, typer.Option("--tcp", help="Through a TCP port of this computer.")] = False,
     as_json: Json = False,
 ) -> None:
-    """A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.
+    """Tap a simulated aging spindle, and write a report.
 
     Every test goes through a real serial port (a pseudo-terminal; TCP where there is none), byte by byte: ten good
     hits, FRF, HDF5, modes, bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves
     f_1 a little. What was emulated in that very test is printed beside what was found. The months end with this one,
     or the one before it.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch demo
       lobewatch demo --out trial --taps 12 --story step --bad-clampings 5
     """

@@ -15,12 +15,12 @@ def doctor(
     machine: Annotated[Path | None, typer.Argument(parser=to_folder_path, help="Machine folder.")] = None,
     as_json: Json = False,
 ) -> None:
-    """What of this computer stands in the way of a tap test: ports, rights, clock, disk, packages, browser.
+    """Examine this computer for tap tests.
 
     With a machine its port, its driver and its folder are looked at, too. Exit code 1 where something hinders.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch doctor
       lobewatch doctor mill-3 --json
     """

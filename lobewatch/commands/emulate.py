@@ -1,4 +1,4 @@
-"""lobewatch emulate: a command for every driver that can be emulated."""
+"""lobewatch emulate: one command for each driver with an emulator."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from typing import Annotated, Any, Literal, NamedTuple
 import typer
 
 import acquisition
+from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, notes, results
 
-WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
 SCENARIO_MONTHS = 24
-"""Length of a story (months)."""
+"""Length of a wear scenario (months)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EmulateOptions:
-    """Options of an emulator; the fields are the options, in the order of the help pages."""
+    """Options of an emulator, in the order of the help page."""
 
     machine: Annotated[
         Path,
@@ -34,19 +34,19 @@ class EmulateOptions:
     ]
     """Machine folder."""
     tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
-    """Whether a TCP port takes the place of the pseudo-terminal."""
+    """Whether to use a TCP port instead of a pseudo-terminal."""
     fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False
-    """Whether it runs ahead of real time; not every driver can."""
-    seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1
+    """Whether to run faster than real time; not every driver can."""
+    seed: Seed = 1
     """Seed of the random numbers."""
     story: Annotated[WearScenarioName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = (
         "none"
     )
-    """Story of the bearings."""
+    """Wear scenario of the bearings."""
     month: Annotated[int, typer.Option("--month", min=0, max=60, help="Of the story, in which it is tapped.")] = 0
-    """Month of the story."""
-    scatter: Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")] = 0.0
-    """Standard deviation of f_1 by remounting (%)."""
+    """Month of the wear scenario."""
+    scatter: ReclampingScatter = 0.0
+    """Reclamping repeatability of f1: standard deviation (%)."""
     bad: Annotated[
         float, typer.Option("--bad-clampings", help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")
     ] = 0.0
@@ -63,32 +63,32 @@ class EmulateOptions:
         float | None,
         typer.Option("--askew", help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
     ] = None
-    """Angle of the modes from x (deg); None where the spindle is round."""
+    """Angle of the principal directions from x (deg). None for a round spindle."""
     cut: Annotated[
         str | None, typer.Option("--cut", metavar="PROGRAM", help="It cuts this, and is heard on its housing.")
     ] = None
-    """Name of the program that is cut; None where the spindle is tapped."""
+    """Name of the program to cut. None for tap tests."""
     speed: Annotated[float | None, typer.Option("--speed", help="Of the cut, as it is told (rpm).")] = None
-    """Spindle speed of the cut (rpm); None for that of the program."""
+    """Spindle speed of the cut (rpm). None for that of the program."""
     depth: Annotated[float | None, typer.Option("--depth", help="Of the cut (mm).")] = None
-    """Axial depth of the cut (mm); None for that of the program."""
+    """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
-    """Whether the result is printed as JSON."""
+    """Whether to print the result as JSON."""
 
 
 class Emulation(NamedTuple):
-    """A device made of software, with what stands behind it."""
+    """Emulated device, with its true values."""
 
     device: acquisition.EmulatorThread
-    """Emulator that serves while its context lasts."""
+    """Emulator, which serves while its context lasts."""
     truth: Mapping[str, float | None]
-    """Figures of what is emulated, by the names that JSON has for them."""
+    """True values of the emulated spindle, by JSON key."""
     truth_text: str
-    """The same figures for people."""
+    """True values, as text."""
     command: str
-    """Command that a person gives next."""
+    """Name of the next command."""
     command_options: str = ""
-    """Options of that command beside its port."""
+    """Options of the next command, without its port."""
 
 
 def _add_commands() -> None:
@@ -98,7 +98,7 @@ def _add_commands() -> None:
     for name in list_driver_names():
         try:
             driver = find_driver(name)
-        except DataError as error:  # said here, and again by the command
+        except DataError as error:  # shown here, and raised again by the command
             emulate.command(name, help=f"{error}.")(_make_command(name, takes_fast=False))
             continue
         if driver.emulate is not None:
@@ -106,7 +106,7 @@ def _add_commands() -> None:
 
 
 def _make_command(name: str, takes_fast: bool) -> Callable[..., None]:
-    """The command that emulates a driver; takes_fast: whether --fast is among its options."""
+    """Make the command that emulates a driver, with --fast if the driver supports it."""
 
     def run(**values: Any) -> None:
         _run_emulator(name, EmulateOptions(**values))
@@ -127,7 +127,7 @@ def _format_help(name: str, title: str) -> str:
 
 
 def _run_emulator(name: str, options: EmulateOptions) -> None:
-    """Somebody taps, or cuts where a program was chosen; until Ctrl-C."""
+    """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 
@@ -152,7 +152,7 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
 
 
 def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
-    """The spindle tapped; shared: arguments that a cut takes too."""
+    """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
     from acquisition.devices import find_driver
@@ -167,7 +167,7 @@ def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) 
 
 
 def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
-    """The spindle cutting a program; shared: arguments that a tapped one takes too."""
+    """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
     from acquisition.devices import find_driver
@@ -185,7 +185,7 @@ def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mappi
 
 
 def _serve_until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
-    """Say where the device is and what is behind it, and serve until Ctrl-C."""
+    """Print the port and the true values, and serve until Ctrl-C."""
     with emulation.device as device:
         line = json.dumps({"port": device.port, **emulation.truth}) if options.as_json else f"port {device.port}"
         results.print(line, markup=False)

@@ -22,12 +22,12 @@ def event(
     withdraw: Annotated[str, typer.Option(help="Take back the event of this name; lobewatch history lists them.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Write down what was done to a machine; after a repair the following of the mode may begin anew.
+    """Store or withdraw a maintenance event.
 
     It is a line of the journal and stays there; --withdraw adds one that takes it back.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch event mill-3 "bearings replaced" --date 2026-11-02 --new-baseline
       lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30:00
       lobewatch event mill-3 --withdraw e2

@@ -20,12 +20,12 @@ def exclude(
     reason: Annotated[str, typer.Option(help="Why it does not count.")],
     as_json: Json = False,
 ) -> None:
-    """Take a tap test out of the series: all results are as if it had never been taken.
+    """Exclude a tap test or test cut from all results.
 
     Its file stays; lobewatch include takes it back.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch exclude mill-3 20261102T0914 --reason "wrong tool in the spindle"
     """
     from lobewatch.logbook import Logbook

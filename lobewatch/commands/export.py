@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FleetFolder
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def export(
-    folder: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
-    ],
+    folder: FleetFolder,
     file: Annotated[
         Path | None, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
     ] = None,
@@ -30,14 +29,14 @@ def export(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """All tap tests of all machines as one table for other programs: SQLite, CSV, Parquet, PostgreSQL.
+    """Export the tap tests of all machines as one table.
 
     The same again gives the same bytes. Excluded tap tests are left out. One that cannot be read is named, and the
     exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]"), PostgreSQL by psycopg (pip install
     "lobewatch[postgres]"), with its password from PGPASSWORD or ~/.pgpass.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch export mills fleet.sqlite
       lobewatch export mills --append fleet
       lobewatch export mills --to postgresql://mills@db.example/plant
@@ -50,7 +49,7 @@ def export(
     if [file, append, to].count(None) != 2:
         raise ValueError("give one of FILE, --append FOLDER and --to ADDRESS")
     machines, damaged = find_machines(folder), dict[str, str]()
-    tables = read_all_tables(machines, damaged)
+    tables = read_all_tables(machines, damaged, with_option_names)
     if file is not None:
         outcome = write_table(tables, file)
     elif append is not None:

@@ -1,4 +1,4 @@
-"""Help pages in plain text that fit any terminal; examples stay whole, so that they can be copied."""
+"""Format help pages as plain text for any terminal. Examples are not wrapped, so that they can be copied."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from typing import Any
 from typer.core import TyperCommand, TyperGroup
 
 MAX_PAGE_WIDTH = 100
-"""Characters a line; longer ones are hard to read."""
+"""Characters in a line at most; longer lines are hard to read."""
 MAX_NAME_COLUMN_WIDTH = 30
-"""Characters of the first column of a list, less on a narrow terminal."""
+"""Characters in the first column of a list at most; less on a narrow terminal."""
 
 
 class HelpCommand(TyperCommand):
-    """A command with such a page."""
+    """Command with a plain help page."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the page."""
+        """Write the help page."""
         formatter.write(_format_page(self, ctx, formatter.width, {}))
 
 
 class HelpGroup(TyperGroup):
-    """A group of commands with such a page."""
+    """Group of commands with a plain help page."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the page."""
+        """Write the help page."""
         formatter.write(_format_page(self, ctx, formatter.width, self.groups(ctx)))
 
     def groups(self, ctx: Any) -> Mapping[str, Mapping[str, str]]:
-        """Summaries of its commands under the headings of the page: the first paragraph of the help of each."""
+        """Return the summaries of the commands by heading."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         texts = {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
         return {"Commands": texts}
 
 
 def get_page_width() -> int:
-    """Characters a line, here and now."""
+    """Return the width of help pages in characters."""
     return min(shutil.get_terminal_size().columns, MAX_PAGE_WIDTH)
 
 
@@ -62,20 +62,20 @@ def _format_page(
 
 
 def _format_paragraphs(text: str, width: int) -> Iterator[str]:
-    """Paragraphs, wrapped; those that are indented (examples) as they are."""
+    """Wrap paragraphs, but not indented ones."""
     for paragraph in text.split("\n\n"):
         yield ""
         yield from paragraph.splitlines() if paragraph.startswith(" ") else _wrap_words(paragraph, width)
 
 
 def _find_longest_name(names: Collection[str], width: int) -> int:
-    """Characters of the longest name that has its text beside it; those that are longer do not count."""
+    """Return the length of the longest name that fits into the first column."""
     most = min(MAX_NAME_COLUMN_WIDTH, width // 3)
     return max((len(name) for name in names if len(name) <= most), default=most)
 
 
 def _format_list(rows: Collection[tuple[str, str]], width: int, longest: int) -> Iterator[str]:
-    """Names and texts side by side; a name that is too long for its column above its text."""
+    """Format names and texts in two columns. A name too long for its column gets a line of its own."""
     column = 4 + longest
     for name, text in rows:
         texts = _wrap_words(text, width - column) or [""]
@@ -87,7 +87,7 @@ def _format_list(rows: Collection[tuple[str, str]], width: int, longest: int) ->
 
 
 def _wrap_words(text: str, width: int, subsequent_indent: str = "") -> list[str]:
-    """Lines broken at spaces only: the name of an option stays whole."""
+    """Wrap text at spaces only, so that option names stay whole."""
     return textwrap.wrap(
         " ".join(text.split()),
         width,

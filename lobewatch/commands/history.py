@@ -19,12 +19,12 @@ def history(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.
+    """Show the history of a machine.
 
     Verdicts are those of the time after each test, where they were asked for; times are UTC in --csv and --json.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch history mill-3
       lobewatch history mill-3 --csv
       lobewatch history mill-3 --hdf5 history.h5

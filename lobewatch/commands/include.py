@@ -19,10 +19,10 @@ def include(
     ],
     as_json: Json = False,
 ) -> None:
-    """Take a tap test back into the series that lobewatch exclude has taken out.
+    """Include an excluded tap test or test cut again.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch include mill-3 20261102T0914
     """
     from lobewatch.logbook import Logbook

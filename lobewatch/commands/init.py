@@ -49,12 +49,12 @@ def init(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make a machine folder with a commented machine.toml: ten questions, or their answers as options.
+    """Make a machine folder with a commented machine.toml.
 
     At a terminal it asks; with --yes, and where nobody sits, it takes what options say and leaves the rest to fill in.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch init mill-3
       lobewatch init mill-3 --edit tool
       lobewatch init mill-3 --yes --daq COM3 --tool "4 20 30 80" --material 42CrMo4 --program "slot: 8000 2 20"
@@ -90,7 +90,7 @@ def init(
 
 
 def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
-    """Draft with the answers of options and of whoever sits at the terminal."""
+    """Make the draft from the answers in options and at the terminal."""
     from lobewatch.machine.setup_questions.draft import MachineDraft
     from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
     from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import FileOptions, add_file_options
+from lobewatch.commands.shared_options import CutPower, FileOptions, add_file_options
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
+
+if TYPE_CHECKING:
+    from acquisition.files.cut_file import CutSignal
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.cut_comparison import CutComparison
+    from lobewatch.tap.cut_recording import CutState
+    from lobewatch.tap.evaluated_hits import StatePublisher
 
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
@@ -23,10 +32,7 @@ def listen(
         float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
-    power: Annotated[
-        float | None,
-        typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
-    ] = None,
+    power: CutPower = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
@@ -48,14 +54,14 @@ def listen(
     file_options: FileOptions,
     as_json: Json = False,
 ) -> None:
-    """Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot be told.
+    """Record a cut and detect chatter.
 
     Begin with the spindle turning in air, then cut for a second or longer; no key is needed. The recording is kept
     beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again. --screen
     --listen 0.0.0.0 can be watched on a tablet; the page keeps the word when the command has ended.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
@@ -64,18 +70,9 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.cut_comparison import store_recorded_cuts
     from lobewatch.machine.settings.requested_cut import choose_cut
-    from lobewatch.notify.publish_status import publish_on_change
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
-    from lobewatch.show.history import saved_cut_remarks
-    from lobewatch.tap.cut_recording import (
-        acquire_cut,
-        check_sensor_kind,
-        check_tacho_options,
-        evaluate_live_cut,
-        publish_cut_states,
-    )
+    from lobewatch.tap import cut_recording as recorder
 
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
@@ -83,32 +80,49 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    description = file_options.description(
-        sensor=check_sensor_kind(sensor, file), **check_tacho_options(tacho, pulses, file)
-    )
-    with contextlib.ExitStack() as screens, publish_cut_states(logbook, setting) as pictures:
+    tacho_fields = recorder.check_tacho_options(tacho, pulses, file)
+    description = file_options.description(sensor=recorder.check_sensor_kind(sensor, file), **tacho_fields)
+    with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
-            from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen
+            from lobewatch.screen import CutScreenServer  # imports aiohttp
 
-            server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
+            server = CutScreenServer(publisher, listen=listen, token=token, watch_token=watch_token)
             screens.enter_context(serve_screen(server))
-        signal = acquire_cut(logbook.folder, setting, file, port, seconds, description, notes.print, pictures.show)
-        comparisons = evaluate_live_cut(logbook, setting, signal, pictures)
+        signal = recorder.acquire_cut(
+            logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
+        )
+        comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
         if out is not None:
-            from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # brings matplotlib
+            from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
 
             save_cut_spectrum(comparisons, out)
         if dry_run:
             emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
-            return
-        with publish_on_change(logbook):
-            earlier, kept = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
-            pictures.show(saved=kept[-1].id)
-            remarks = [saved_cut_remarks(logbook, cut, [*earlier, *kept[:number]]) for number, cut in enumerate(kept)]
-            stored_as = [
-                {"id": cut.id, "remarks": [r.code for r in said]} for cut, said in zip(kept, remarks, strict=True)
-            ]
-            emit(
-                recording_json(comparisons, stored_as), as_json, *recording_texts(comparisons, [cut.id for cut in kept])
-            )
-    print_remarks(remark for said in remarks for remark in said)
+        else:
+            _store(logbook, comparisons, signal, date, publisher, as_json)
+
+
+def _store(
+    logbook: Logbook,
+    comparisons: Sequence[CutComparison],
+    signal: CutSignal,
+    date: datetime | None,
+    publisher: StatePublisher[CutState],
+    as_json: bool,
+) -> None:
+    """Store the recorded cuts and show them."""
+    from lobewatch.logbook.cut_comparison import store_recorded_cuts
+    from lobewatch.notify.publish_status import publish_on_change
+    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+    from lobewatch.show.history import saved_cut_remarks
+
+    with publish_on_change(logbook):
+        earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
+        publisher.show(saved=stored[-1].id)
+        remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
+        rows = [
+            {"id": cut.id, "remarks": [remark.code for remark in cut_remarks]}
+            for cut, cut_remarks in zip(stored, remarks, strict=True)
+        ]
+        emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
+    print_remarks(itertools.chain.from_iterable(remarks))

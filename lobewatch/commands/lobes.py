@@ -27,14 +27,14 @@ def lobes(
     waterfall: Annotated[Path | None, typer.Option(help="Draw the limit over speed and time.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.
+    """Show stability lobes and stable pockets.
 
     A --tool that was never tapped is predicted by the model with the bearings of the newest tap test. Whatever the
     method of the chart, verdicts on programs are those of lobewatch check, and it would call each pocket stable.
     Of taps without a force sensor it lists the speeds of the pockets alone: no depth is known.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch lobes trial --figure lobes.png
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
     """

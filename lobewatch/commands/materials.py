@@ -15,12 +15,12 @@ def materials(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Materials that machine.toml may name, with their cutting coefficients, ranges and sources.
+    """List materials with their cutting coefficients.
 
     Each goes by any of its names: material = "42CrMo4", "1.7225" or "AISI 4140", case and blanks as you like.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch materials
       lobewatch materials 4140
       lobewatch materials S --json

@@ -20,12 +20,12 @@ def model(
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
     as_json: Json = False,
 ) -> None:
-    """The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is tapped.
+    """Show the spindle model.
 
     The bearings are those of the newest tap test, of machine.toml where there is none yet.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch model trial --figure model.png
       lobewatch model trial --tool "end mill 16" --modes 6 --json
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -18,6 +18,9 @@ from lobewatch.commands.shared_options import (
     reject_file_options,
 )
 from lobewatch.show.terminal.output import Json, emit
+
+if TYPE_CHECKING:
+    from modal import ModeEdits
 
 
 @add_file_options(without=["averages"])
@@ -82,7 +85,7 @@ def modes(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Natural frequency, damping ratio and stiffness from one recorded file.
+    """Fit the modes of a recorded file or a stored tap test.
 
     Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
     by the peak picking of Gaber & Hashemi (2015). Trusted modes come first, then doubtful ones with the reason; the
@@ -91,8 +94,8 @@ def modes(
     so of a file is only shown; of a tap test of a machine it is kept, in place of what was said of it before, and all
     that follows from it is worked out anew.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch modes acceleration.lvm
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
@@ -103,7 +106,7 @@ def modes(
       lobewatch modes mill-3 20261102T0914 --drop 412
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.operator_entries import read_tap_modes, resolve_edits
+    from lobewatch.logbook.operator_entries import read_tap_modes
     from lobewatch.machine.settings.setup_tables import SensorLoading
     from lobewatch.measurement import Window, fit_file_modes, list_comparison_files, match_modes_across_files
     from lobewatch.notify.publish_status import publish_on_change
@@ -117,7 +120,7 @@ def modes(
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
         reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
-        logbook, choice = Logbook.open(file), resolve_edits(edits, by_fit)
+        logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
         with nullcontext() if choice is None else publish_on_change(logbook):
             file_modes = read_tap_modes(logbook, tap, choice)
@@ -140,3 +143,10 @@ def modes(
 
         save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
+
+
+def _resolve_edits(edits: ModeEdits, by_fit: bool) -> ModeEdits | None:
+    """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
+    if edits and by_fit:
+        raise ValueError("--by-fit takes back all that is said by hand; leave --add, --drop and --fix out")
+    return edits if edits or by_fit else None

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.commands.shared_options import CutPower
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
@@ -22,19 +23,16 @@ def observe(
     stable: Annotated[bool, typer.Option("--stable", help="It ran quietly.")] = False,
     chatter: Annotated[bool, typer.Option("--chatter", help="It chattered.")] = False,
     frequency: Annotated[float | None, typer.Option(help="What it chattered at, Hz, where somebody knows.")] = None,
-    power: Annotated[
-        float | None,
-        typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
-    ] = None,
+    power: CutPower = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Write down what was heard of a test cut by ear: that it was stable, or that it chattered.
+    """Store whether a test cut was stable by ear.
 
     It is a line of the journal; lobewatch exclude takes it out again.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
       lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable --power 1.4

@@ -16,13 +16,13 @@ def paper(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """The numbers and figures of Gaber & Hashemi beside ours, with the reason of each difference.
+    """Compare lobewatch with Gaber & Hashemi.
 
     Computed in this run on a surrogate of their spindle: the spinning element as printed, finite elements, bearings,
     critical speeds, peak picking, tip stiffness, stability lobes new and old; then which of their claims hold.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch paper
       lobewatch paper --out paper
     """

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lobewatch.commands.shared_options import Flutes, Material, cut_fields
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit, notes
 
@@ -16,21 +17,21 @@ def pitch(
     speed: Annotated[float, typer.Option(help="Spindle speed, rpm: pitches are for one speed.")],
     tool: Annotated[str | None, typer.Option(help="Tool whose teeth are to be spaced.")] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth to be judged too, mm.")] = None,
-    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
-    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    material: Material = None,
+    teeth: Flutes = None,
     diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
     radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
     direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal is as good.
+    """Propose unequal pitches for a cutter at one speed.
 
     Alternating and linear pitches, as tool makers grind them, whose teeth cut at most 20 % more or less than the mean.
     The limit of each kind's best is that of lobewatch check over all that is not known, beside equal pitch on the same
     spindles. What is not said of the cut is taken from the programs of its tool where they agree.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch pitch trial --tool reference --speed 6200
       lobewatch pitch trial --speed 9000 --radial 5 --material 42CrMo4 --json
     """
@@ -38,19 +39,10 @@ def pitch(
     from lobewatch.logbook.requested_cuts import propose_requested_pitch
     from lobewatch.show.programs.recommendations import pitches_json, pitches_texts
 
-    said = {
-        "speed_rpm": speed,
-        "depth_mm": depth,
-        "tool": tool,
-        "material": material,
-        "teeth": teeth,
-        "tool_diameter_mm": diameter,
-        "radial_depth_mm": radial,
-        "direction": direction,
-    }
+    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     logbook = Logbook.open(machine)
     if notes.is_terminal:
         notes.print("judging pitches over all that is not known; this takes some seconds")
-    proposal = propose_requested_pitch(logbook, said)
+    proposal = propose_requested_pitch(logbook, cut)
     remarks = logbook.remarks
     emit(pitches_json(proposal, remarks, depth), as_json, *pitches_texts(proposal, remarks, depth))

@@ -13,12 +13,12 @@ def ports(
     port: Annotated[str, typer.Option(help="Ask only here; also a pseudo-terminal or socket://HOST:PORT.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Serial ports, and which DAQ answers there.
+    """List serial ports and the devices that answer.
 
     Only USB ports are asked, each question once, and only those that fit the vendor number.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch ports
       lobewatch ports --port /dev/pts/3
     """

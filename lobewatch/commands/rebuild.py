@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 if TYPE_CHECKING:
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 
 
 def rebuild(
-    machine: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
-    ],
+    machine: FleetFolder,
     jobs: Annotated[
         int, typer.Option(min=1, max=64, help="Processes that work at once; what they find is the same.")
     ] = 1,
@@ -27,14 +25,14 @@ def rebuild(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """The history anew from the tap tests, and the journal where that is damaged; nothing is deleted.
+    """Rebuild the history, and a damaged journal.
 
     What is damaged is put into a folder named damaged. Tap files that were renamed or swapped get their names back,
     whole ones that are in no journal are entered. A tap test whose file is lost is gone on without; put back from a
     backup, it counts again. Of a folder of machines each is rebuilt; one that cannot be costs only itself.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch rebuild mill-3
       lobewatch rebuild mills --scheduler tls://10.0.0.5:8786
     """
@@ -59,7 +57,7 @@ def rebuild(
     for folder in folders:
         try:
             outcomes[folder.name] = _rebuild_machine(folder, workers)
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must cost only itself
+        except Exception as error:  # noqa: BLE001 - a damaged machine must not stop the others
             refused.append(format_error(error))
     emit(folder_rebuild_json(outcomes), as_json, *folder_rebuild_texts(outcomes, len(folders)))
     if refused:
@@ -67,7 +65,7 @@ def rebuild(
 
 
 def _find_machine_folders(path: Path) -> list[Path]:
-    """The machine folders in a folder that is none itself."""
+    """Find the machine folders in a folder that is not a machine folder itself."""
     from lobewatch.machine.folder_contents import list_tap_files
 
     if (path / "machine.toml").is_file() or list_tap_files(path):
@@ -76,7 +74,7 @@ def _find_machine_folders(path: Path) -> list[Path]:
 
 
 def _rebuild_machine(path: Path, workers: Workers) -> MachineRebuild:
-    """Rebuild a machine, and tell whom it may concern."""
+    """Rebuild a machine and publish its status."""
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.rebuild_history import rebuild_history
     from lobewatch.machine.rebuild_files import rebuild_files

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.shared_options import number
+from lobewatch.commands.shared_options import Flutes, Material, cut_fields, number
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.output import Json, emit
 
@@ -15,7 +15,7 @@ from lobewatch.show.terminal.output import Json, emit
 def recommend(
     machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
     tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
-    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
+    material: Material = None,
     radial: Annotated[
         float | None, typer.Option(parser=number, help="Radial depth, mm; a slot where none is given.")
     ] = None,
@@ -24,19 +24,19 @@ def recommend(
     ] = None,
     depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
     speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
-    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    teeth: Flutes = None,
     diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
     feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
     save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
 ) -> None:
-    """A speed and a depth for a tool and a material, no program needed; exit code 1 where none is safe.
+    """Recommend a speed and a depth for a tool and a material.
 
     The most chips a minute of all that lobewatch check would call stable, with room on all sides; at --depth where
     that is given. Tool, material and teeth that are not given are those of the tool's programs where they agree.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch recommend trial --tool reference --material 42CrMo4
       lobewatch recommend trial --material "AA 6061" --radial 4 --direction down --save "bracket, finish"
       lobewatch recommend trial --depth 1.5 --json
@@ -46,21 +46,13 @@ def recommend(
     from lobewatch.machine.folder_updates import check_program_name, save_program
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
-    said = {
-        "speed_rpm": speed,
-        "depth_mm": depth,
-        "tool": tool,
-        "material": material,
-        "teeth": teeth,
-        "tool_diameter_mm": diameter,
-        "radial_depth_mm": radial,
-        "direction": direction,
-        "feed_per_tooth_mm": feed_per_tooth,
+    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction) | {
+        "feed_per_tooth_mm": feed_per_tooth
     }
     logbook = Logbook.open(machine)
     if save is not None:
         check_program_name(logbook.machine, save)
-    answer = recommend_requested(logbook, said, save)
+    answer = recommend_requested(logbook, cut, save)
     if save is not None and answer.setting is not None:
         save_program(logbook.folder, answer.program)
     saved = save if answer.setting is not None else None

@@ -58,15 +58,15 @@ def replay(
     reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Recorded files through the same pipeline as a live test; each is stored once.
+    """Store recorded files as tap tests.
 
     All files are read and judged before the first one is stored, in order of their dates. What a file does not say is
     asked for by the name of an option, never guessed. A recording that is implausible for the machine is stored too,
     and asked about; --accept answers, at once or later: then with the file of the tap test. --add, --drop and --fix
     are kept with each test (lobewatch modes MACHINE TAP shows and changes them).
 
-    Examples:
-
+    Examples
+    --------
       lobewatch replay mill-3 acceleration.lvm
       lobewatch replay mill-3 2024 --dry-run --unit g/N --date-pattern "%Y%m%d"
       lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
@@ -74,7 +74,7 @@ def replay(
     """
     from acquisition import Conditions, DataError
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.operator_entries import reject_edits, store_edits
+    from lobewatch.logbook.operator_entries import store_edits
     from lobewatch.logbook.recordings.recorded_files import find_recordings
     from lobewatch.logbook.recordings.store_recordings import format_rejections
     from lobewatch.logbook.replay_preview import preview_replay
@@ -95,7 +95,9 @@ def replay(
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
-        reject_edits(edits)
+        if edits:
+            text = "with --dry-run nothing is kept; lobewatch modes FILE shows what becomes of it"
+            raise ValueError(f"{edits}: {text}")
         with ReplayProgress() as bar:
             previews = preview_replay(logbook, recordings, description, bar, workers)
         emit_preview(previews, passed, as_json=as_json)

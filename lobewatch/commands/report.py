@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
@@ -22,12 +23,12 @@ def report(
     direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",
     as_json: Json = False,
 ) -> None:
-    """One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.
+    """Write the report of a machine or of a folder of machines.
 
     Of a folder of machine folders: a line for each of them, worst first.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch report trial
       lobewatch report trial --out spindle.html --tool reference --direction x
     """
@@ -50,5 +51,5 @@ def _write_for_fleet(folder: Path, out: Path | None) -> Path:
     from lobewatch.show.fleet.fleet_status import fleet_rows
     from lobewatch.show.report.report import write_fleet_report
 
-    rows = fleet_rows(Fleet(find_machines(folder)).assess_machines())
+    rows = fleet_rows(Fleet(find_machines(folder), with_option_names).assess_machines())
     return write_fleet_report(rows, folder, out, datetime.now().astimezone())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,12 +21,12 @@ def sensors(
     skew: Annotated[bool, typer.Option("--skew", help="Measure the skew: both inputs joined, one signal.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hammer, accelerometer and DAQ: what they are, and whether they are right.
+    """Check hammer, accelerometer and DAQ.
 
     Without an option: channels, dates, what is not plausible, and the sample rate against this computer's clock.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch sensors mill-3 --port /dev/ttyACM0
       lobewatch sensors mill-3 --mass-kg 1.052
       lobewatch sensors mill-3 --skew
@@ -35,7 +36,7 @@ def sensors(
     from lobewatch.show import sensors as show
     from lobewatch.tap.device_connection import open_device
 
-    folder = MachineFolder(machine)
+    folder, print_note = MachineFolder(machine), partial(notes.print, markup=False)
     port = port or folder.machine.daq.port
     if not port:
         raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
@@ -43,17 +44,13 @@ def sensors(
         raise ValueError("--mass-kg and --skew need different cabling; give one of them")
     with folder.locked(), open_device(folder.machine.daq, port) as device:
         if mass_kg is not None:
-            mass_check = check_mass(folder, port, device, mass_kg, _print_note)
+            mass_check = check_mass(folder, port, device, mass_kg, print_note)
             emit(show.mass_check_json(mass_check), as_json, *show.mass_check_texts(mass_check))
         elif skew:
-            skew_check = check_skew(folder, port, device, _print_note)
+            skew_check = check_skew(folder, port, device, print_note)
             emit(show.skew_check_json(skew_check), as_json, *show.skew_check_texts(skew_check))
         else:
-            sensor_list = list_sensors(folder, device, _print_note)
+            sensor_list = list_sensors(folder, device, print_note)
             emit(show.sensors_json(sensor_list), as_json, *show.sensors_texts(sensor_list))
             if sensor_list.errors:
                 raise typer.Exit(2)
-
-
-def _print_note(text: str) -> None:
-    notes.print(text, markup=False)

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show_address
 
 
 def serve(
-    folder: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
-    ],
+    folder: FleetFolder,
     listen: Listen = "127.0.0.1",
     http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
-    """Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. Ctrl-C ends it.
+    """Serve the dashboard of machines.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch serve mills
       lobewatch serve mills --listen 0.0.0.0 --http-port 8080
     """

@@ -1,4 +1,4 @@
-"""Options shared by several commands: facts about a file, edited modes, numbers."""
+"""Options shared by several commands: facts about a file, edited modes, cuts and numbers."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
 import acquisition
+from lobewatch.machine.folder_files import to_folder_path
 
 
 def number(text: str | float) -> float:
-    """A number as it is typed; typer.BadParameter for what is none, with the point for a decimal comma."""
+    """Parse a number. The error for a decimal comma shows the number with a point."""
     try:
         return float(text)
     except ValueError:
@@ -26,6 +27,18 @@ def number(text: str | float) -> float:
 
 
 Command = Callable[..., None]
+WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
+FleetFolder = Annotated[
+    Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
+]
+Seed = Annotated[int, typer.Option(help="Of the random numbers.")]
+ReclampingScatter = Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")]
+Material = Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")]
+Flutes = Annotated[int | None, typer.Option(help="Teeth of the tool.")]
+CutPower = Annotated[
+    float | None,
+    typer.Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
+]
 AddedModes = Annotated[
     list[str] | None, typer.Option(help="Fit a further mode near this frequency (Hz); may be repeated.")
 ]
@@ -39,7 +52,7 @@ FixedModes = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class FileOptions:
-    """Options on a recorded file; the fields are the options, in the order of the help pages."""
+    """Options on a recorded file, in the order of the help page."""
 
     columns: Annotated[
         str,
@@ -85,22 +98,19 @@ class FileOptions:
     """Sensitivities of the channels, separated by commas."""
 
     def description(self, **fields: Any) -> acquisition.Description:
-        """The description that these options make, with other fields; ValueError for a full scale that is no number."""
+        """Make the description of a file. ValueError for an invalid full scale."""
         try:
             scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()
         except ValueError as error:
             text = f'--full-scale {self.full_scale}: give a number for each channel, as in "500,50"'
             raise ValueError(text) from error
-        lists = {
-            "columns": _split_words(self.columns),
-            "full_scale": scales,
-            "sensitivity": _split_words(self.sensitivity),
-        }
+        columns, sensitivity = _split_words(self.columns), _split_words(self.sensitivity)
+        lists = {"columns": columns, "full_scale": scales, "sensitivity": sensitivity}
         return acquisition.Description(**vars(self) | lists | fields)
 
 
 def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Command]:
-    """Give a command these options in place of its keyword parameter `file_options: FileOptions`, but for some."""
+    """Replace the parameter `file_options: FileOptions` of a command by single options, except for some."""
     options = inspect.signature(FileOptions, eval_str=True).parameters
     shared = {name: option for name, option in options.items() if name not in without}
 
@@ -120,7 +130,7 @@ def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Comm
 
 
 def reject_file_options(options: FileOptions, **others: Any) -> None:
-    """ValueError where one of these options is given though nothing has to be said of a file."""
+    """Raise ValueError for any option on a file, because a stored tap test needs none."""
     for name, value in (vars(options) | others).items():
         if value is not None and value not in ("", False):
             raise ValueError(f"--{name.replace('_', '-')}: says how a file is read; a stored tap test says it itself")
@@ -128,3 +138,18 @@ def reject_file_options(options: FileOptions, **others: Any) -> None:
 
 def _split_words(text: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in text.split(",")) if text else ()
+
+
+def cut_fields(
+    speed: float | None,
+    depth: float | None,
+    tool: str | None,
+    material: str | None,
+    teeth: int | None,
+    diameter: float | None,
+    radial: float | None,
+    direction: str | None,
+) -> dict[str, Any]:
+    """Collect the options of a requested cut as fields of a [[program]]."""
+    names = ("speed_rpm", "depth_mm", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction")
+    return dict(zip(names, (speed, depth, tool, material, teeth, diameter, radial, direction), strict=True))

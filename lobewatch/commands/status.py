@@ -7,20 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FleetFolder
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, results
 
 if TYPE_CHECKING:
     from lobewatch.fleet.fleet import Fleet
 
 DASHBOARD_ONLY_KEYS = ("points", "limits", "limit", "word", "why")
-"""What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
+"""Keys that only the dashboard shows."""
 
 
 def status(
-    folder: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
-    ],
+    folder: FleetFolder,
     due: Annotated[bool, typer.Option("--due", help="Only machines whose tap test is due.")] = False,
     to_notify: Annotated[
         bool,
@@ -41,13 +40,13 @@ def status(
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
-    """How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.
+    """Show the status of all machines in a folder.
 
     Exit code 1 where one of them is on alarm or cannot be judged, so that a scheduler can tell; else 2 where --notify
     could not tell a broker.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch status mills
       lobewatch status mills --due
     """
@@ -60,17 +59,17 @@ def status(
     if forget and not to_notify:
         raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
     machines = find_machines(folder)
-    plant = Fleet(machines)
+    fleet = Fleet(machines, with_option_names)
     if jobs > 1 or scheduler:
-        _make_missing_summaries(plant, jobs, scheduler)
-    standings = plant.assess_machines()
-    rows = fleet_rows(standings)
+        _make_missing_summaries(fleet, jobs, scheduler)
+    assessed = fleet.assess_machines()
+    rows = fleet_rows(assessed)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
         results.out(fleet_csv(shown), end="", highlight=False)
     else:
-        lights = [row["light"] for row in rows]
-        counted = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
+        levels = [row["light"] for row in rows]
+        counted = ", ".join(f"{levels.count(level)} {level.value}" for level in StatusLevel if level in levels)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
         without_points = [
             {name: value for name, value in row.items() if name not in DASHBOARD_ONLY_KEYS} for row in shown
@@ -80,18 +79,18 @@ def status(
         from acquisition.file_io import atomic_write
         from lobewatch.notify.prometheus import format_prometheus
 
-        atomic_write(prometheus, format_prometheus(standings).encode())
+        atomic_write(prometheus, format_prometheus(assessed).encode())
     failures = 0
     if to_notify:
         from lobewatch.notify.publish_status import publish_folder
 
-        failures = len(publish_folder(folder, machines, standings, forget))
+        failures = len(publish_folder(folder, machines, assessed, forget))
     needs_care = any(row["light"] is StatusLevel.ALARM or not row["can_be_judged"] for row in rows)
     raise typer.Exit(1 if needs_care else 2 * (failures > 0))
 
 
-def _make_missing_summaries(plant: Fleet, jobs: int, scheduler: str) -> None:
-    """Have others make the standings that are missing."""
+def _make_missing_summaries(fleet: Fleet, jobs: int, scheduler: str) -> None:
+    """Make missing summaries in other processes."""
     from functools import partial
 
     from lobewatch.fleet.summarize import summarize_in_parallel
@@ -100,4 +99,4 @@ def _make_missing_summaries(plant: Fleet, jobs: int, scheduler: str) -> None:
 
     workers = Workers(jobs, scheduler)
     print_remarks(workers.remarks)
-    plant.make_missing_summaries(partial(summarize_in_parallel, workers=workers))
+    fleet.make_missing_summaries(partial(summarize_in_parallel, workers=workers, render_text=with_option_names))

@@ -17,13 +17,13 @@ def suggest(
     cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
     as_json: Json = False,
 ) -> None:
-    """The next test cut of a program: the one worth most, of those that are more likely stable than not.
+    """Suggest the next test cut of a program.
 
     Cuts that were heard (lobewatch observe) say what the spindle is like when it turns, and how hard the material is
     to cut. Says what was learnt of both, beside what was known before.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch suggest mill-3 --program A
       lobewatch suggest mill-3 --program A --cuts 8 --json
     """

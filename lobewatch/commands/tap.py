@@ -44,7 +44,7 @@ def tap(
     details: Annotated[bool, typer.Option("--details", help="All modes, the model and the doubt, too.")] = False,
     as_json: Json = False,
 ) -> None:
-    """The live tap test: hit until ten hits are good, then see what has changed.
+    """Run a live tap test.
 
     At a terminal, or with --screen, x is tapped, then y; then you say what comes next: another test, the next tool, or
     that you are done. With --direction, --json, or where nobody sits, it is one test. Keys: u or Page Up takes the last
@@ -52,8 +52,8 @@ def tap(
     on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0 can be watched on a tablet; --port
     file:RECORDING takes recorded hits as if they were made now.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch tap mill-3 --port /dev/ttyACM0
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
       lobewatch tap mill-3 --screen --listen 0.0.0.0
@@ -73,28 +73,27 @@ def tap(
 
     folder, finished = MachineFolder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
-    leads = screen or (notes.is_terminal and sys.stdin.isatty())
-    leads = leads and not (direction or as_json or port.startswith("file:"))
+    is_single = bool(direction or as_json or port.startswith("file:"))
+    is_guided = (screen or (notes.is_terminal and sys.stdin.isatty())) and not is_single
 
     def plan(tool: str, direction: TapDirection) -> TapSession:
-        named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
-        return plan_session(folder, **named, resume=not new, accept=accept or (), conditions=conditions)
+        fields = {"port": port, "tool": tool, "direction": direction, "operator": operator}
+        return plan_session(folder, **fields, resume=not new, accept=accept or (), conditions=conditions)
 
     def after(session: TapSession) -> None:
         finished.append(session)
         publish_status(Logbook(folder))
 
     tool = tool or folder.machine.tap.tool
-    first = parse_direction(direction) if direction else choose_first_direction(folder, tool) if leads else "x"
-    visit = TapVisit(plan, tool, first, leads=leads, after=after)
+    first = parse_direction(direction) if direction else choose_first_direction(folder, tool) if is_guided else "x"
+    visit = TapVisit(plan, tool, first, leads=is_guided, after=after)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
-                from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
+                from lobewatch.screen import ScreenServer  # imports aiohttp
 
-                screens.enter_context(
-                    serve_screen(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
-                )
+                server = ScreenServer(visit, listen=listen, token=token, watch_token=watch_token)
+                screens.enter_context(serve_screen(server))
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:

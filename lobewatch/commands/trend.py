@@ -18,12 +18,12 @@ def trend(
     as_csv: Annotated[bool, typer.Option("--csv", help="The points with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
-    """How the frequency has fallen, whether that is more than scatter, and until when each program holds.
+    """Show the frequency trend of a series.
 
     Exit code 1 where the machine's light is alarm.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch trend mill-3
       lobewatch trend mill-3 --direction y --json
     """

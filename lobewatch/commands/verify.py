@@ -15,14 +15,14 @@ def verify(
     machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
     as_json: Json = False,
 ) -> None:
-    """Every byte of a machine folder against what was written; exit code 1 where something is damaged.
+    """Verify every byte of a machine folder.
 
     Names every file that is altered, missing, extra, swapped, renamed or cut short, and what to do. A machine.toml that
     was edited is told, and is no damage. Nothing is changed, but that a tap test which an ended program had stored and
     not yet entered in the journal is entered.
 
-    Examples:
-
+    Examples
+    --------
       lobewatch verify mill-3
     """
     from lobewatch.machine.verify_files import DAMAGE_CODES

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-import lobewatch.fleet as plant
+import lobewatch.fleet as fleet
 import lobewatch.machine as machine
 from acquisition import DataError, Remark
 from acquisition.errors import format_error
@@ -24,68 +24,73 @@ from lobewatch.machine.folder_files import compute_change_mark, format_path
 from lobewatch.monitoring.status_rules import StatusLevel
 
 VERIFY_INTERVAL = 6 * 3600.0
-"""Time between two looks at every byte (s); chosen."""
+"""Time between two verifications of every byte (s); chosen."""
 MAX_RENEWALS_PER_POLL = 4
-"""Number of summaries made anew at a look for their age alone: thousands of one day would hold up a server; chosen."""
+"""Number of summaries renewed for their age at a time, so that a server is not blocked; chosen."""
 SummaryMaker = Callable[[Sequence[Path], datetime], Iterable[tuple[Path, tuple[int, ...], MachineSummary]]]
-"""Function that has others make summaries of machine folders: those that could be, with the marks of their files."""
+"""Function that summarizes machine folders elsewhere and yields each folder, its change mark and its summary."""
 MACHINE_FOLDER_FILES = ("machine.toml", "journal.jsonl")
-"""Files that tell a machine folder: one without machine.toml is a machine that cannot be judged."""
+"""Files that mark a machine folder. Without machine.toml the machine cannot be evaluated."""
 
 
 class FleetMachine(NamedTuple):
-    """One machine of a plant as it stands."""
+    """Machine of a fleet with its status."""
 
     key: str
-    """Name of its folder."""
+    """Name of the machine folder."""
     path: Path
-    """Path of its folder."""
+    """Path of the machine folder."""
     summary: MachineSummary
-    """Summary that follows from its files."""
+    """Summary of the files."""
     current: DatedStatus
-    """Standing at the time that was asked for."""
+    """Status at the time of the assessment."""
 
 
 class _CachedSummary(NamedTuple):
-    """The summary of a machine as it was read or made last."""
+    """Summary of a machine in memory."""
 
     mark: tuple[int, ...]
-    """Mark of the files it was made of."""
+    """Change mark of the summarized files."""
     time: datetime
     """Time of reading."""
     summary: MachineSummary
-    """Summary of these files."""
+    """Summary of the files."""
 
 
 def find_machines(path: Path) -> dict[str, Path]:
-    """The machine at this path, or all in this folder, by name of their folders; DataError where there is none."""
-    if any((path / name).exists() for name in MACHINE_FOLDER_FILES):
+    """Find the machine folder at a path, or all machine folders in it, by name. DataError if there is none."""
+    if _is_machine(path):
         return {format_path(path.resolve().name): path}
     try:
         names = sorted(name for name in os.listdir(path) if _is_machine(f"{path}/{name}"))  # noqa: PTH208
     except OSError:
         names = []
     if not names:
-        raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: lobewatch init")
+        raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: make_machine_folder")
     return {format_path(name): path / name for name in names}
 
 
-def _is_machine(folder: str) -> bool:
-    """Whether it is a machine folder; of thousands at every look of a server."""
+def _is_machine(folder: Path | str) -> bool:
+    """Return whether a folder is a machine folder. Fast, as servers ask about thousands of folders."""
     return any(os.path.exists(f"{folder}/{name}") for name in MACHINE_FOLDER_FILES)  # noqa: PTH110
 
 
 class Fleet:
-    """The standings of some machines, read again where their files have changed.
+    """Machines with their summaries, which are renewed after a change of the files or after a week."""
 
-    It holds by the key of each machine its summary, until its files change or the summary is a week old, and the damage
-    that the last look at every byte has found.
-    """
+    def __init__(self, machines: Mapping[str, Path], render_text: Callable[[str], str] = str) -> None:
+        """Read nothing yet.
 
-    def __init__(self, machines: Mapping[str, Path]) -> None:
-        """machines: by name of their folders. Nothing is read yet."""
+        Parameters
+        ----------
+        machines
+            Path of each machine folder, by name.
+        render_text
+            Function that replaces names of the library in the texts of new summaries.
+        """
         self.machines = machines
-        """Folder of each machine, by its key."""
+        """Path of each machine folder, by name."""
+        self._render_text = render_text
         self._summaries: dict[str, _CachedSummary] = {}
         self._damage: dict[str, tuple[Remark, ...]] = {}
         self._outdated: set[str] = set()
@@ -93,7 +98,13 @@ class Fleet:
         self._lock = threading.Lock()
 
     def set_machines(self, machines: Mapping[str, Path]) -> None:
-        """Take these machines for those known so far."""
+        """Replace the machines of the fleet.
+
+        Parameters
+        ----------
+        machines
+            Path of each machine folder, by name.
+        """
         if machines == self.machines:
             return
         with self._lock:
@@ -103,9 +114,14 @@ class Fleet:
             self.machines = machines
 
     def make_missing_summaries(self, make: SummaryMaker, now: datetime | None = None) -> None:
-        """Have others make the summaries that are missing; what they cannot make is made when it is asked for.
+        """Make missing summaries elsewhere. Summaries that fail there are made by the next assessment.
 
-        What `make` raises.
+        Parameters
+        ----------
+        make
+            Function that summarizes machine folders. Its errors are raised.
+        now
+            Time of the summaries. None for the present time.
         """
         now = now or datetime.now(UTC)
         with self._lock:
@@ -114,26 +130,38 @@ class Fleet:
                 self._summaries[missing[path]] = _CachedSummary(mark, now, summary)
 
     def assess_machines(self, now: datetime | None = None) -> list[FleetMachine]:
-        """One a machine, those that cannot be judged first, then worst first; who asks meanwhile waits."""
+        """Assess all machines, unreadable ones first, then the most severe first.
+
+        Parameters
+        ----------
+        now
+            Time of the assessment. None for the present time.
+        """
         now = now or datetime.now(UTC)
         with self._lock:
             self._renewals_left = MAX_RENEWALS_PER_POLL
-            standings = [self._assess_machine(key, path, now) for key, path in self.machines.items()]
-        lights = list(StatusLevel)
+            machines = [self._assess_machine(key, path, now) for key, path in self.machines.items()]
+        levels = list(StatusLevel)
         return sorted(
-            standings,
-            key=lambda m: (m.current.is_readable, lights.index(m.current.status), -_largest_drop(m.summary), m.key),
+            machines,
+            key=lambda m: (m.current.is_readable, levels.index(m.current.status), -_largest_drop(m.summary), m.key),
         )
 
     def verify_until(self, end: threading.Event) -> None:
-        """Look at every byte of all machines, now and every few hours until the end; what is damaged is said."""
+        """Verify every byte of all machines, now and every few hours. Damage becomes part of the status.
+
+        Parameters
+        ----------
+        end
+            Event that ends the verification.
+        """
         while True:
             for key, path in self.machines.items():
                 if end.is_set():
                     return
                 try:
                     damage = machine.verify(path).damage
-                except Exception:  # noqa: BLE001 - its standing says it
+                except Exception:  # noqa: BLE001 - the status of the machine shows it
                     continue
                 with self._lock:
                     if damage != self._damage.get(key, ()):
@@ -155,15 +183,16 @@ class Fleet:
             self._renewals_left -= 1
         mark = compute_change_mark(path)
         try:
-            summary = (None if key in self._outdated else read_summary(path, now)) or plant.summarize_folder(path, now)
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must not cost the others their standing
+            summary = None if key in self._outdated else read_summary(path, now)
+            summary = summary or fleet.summarize_folder(path, now, self._render_text)
+        except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
             return summarize_unreadable(last.summary.name if last else key, format_error(error))
         self._outdated.discard(key)
-        if mark == compute_change_mark(path):  # else somebody has written meanwhile
+        if mark == compute_change_mark(path):  # else another program has written meanwhile
             self._summaries[key] = _CachedSummary(compute_change_mark(path, summary.newest_file), now, summary)
         return summary
 
 
 def _largest_drop(summary: MachineSummary) -> float:
-    fall = summary.series[0].drop if summary.series else 0.0
-    return float("inf") if fall is None else fall
+    drop = summary.series[0].drop if summary.series else 0.0
+    return float("inf") if drop is None else drop

@@ -1,6 +1,6 @@
-"""Make the summary of a machine, and learn scatter from its neighbors. Needs numpy.
+"""Summarize a machine, and learn its scatter from other machines.
 
-It needs the logbook and numpy; who may do without them asks `lobewatch.fleet`, which loads it when it is needed.
+This module imports the logbook and numpy. Modules that must start fast use it through `lobewatch.fleet`.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ import contextlib
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from acquisition import CROSS_TAP
@@ -41,7 +43,6 @@ from lobewatch.monitoring.machine_status import SeriesStatus
 from lobewatch.monitoring.series_history import build_series_history
 from lobewatch.monitoring.series_points import (
     NO_SCATTER_PRIOR,
-    NO_SERIES_PRIOR,
     ScatterPrior,
     SeriesScatterPrior,
     estimate_scatter,
@@ -51,25 +52,48 @@ from lobewatch.monitoring.status_rules import next_tap_step
 from lobewatch.monitoring.trend import Trend, point_days
 
 MAX_SERIES_POINTS = 60
-"""Points kept of a series; chosen, more than its small picture can show."""
+"""Number of points of a series that a summary keeps; chosen, more than a small chart shows."""
 DATE_REMARK_CODES = ("overdue", "tap-in-future")
-"""Codes of the reasons that `MachineSummary.at` adds."""
+"""Codes of the reasons that `MachineSummary.status_at` adds."""
+MAX_MACHINES_READ = 500
+"""Number of other machines that scatter is learned from at most; chosen."""
+RenderText = Callable[[str], str]
+"""Function that replaces names of the library in a text."""
 
 
-def summarize_folder(path: Path, now: datetime) -> MachineSummary:
-    """The summary of a machine folder as `summarize_machine` makes it; DataError where it is none."""
-    return summarize_machine(Logbook.open(path), now)
+def summarize_folder(path: Path, now: datetime, render_text: RenderText = str) -> MachineSummary:
+    """Summarize a machine folder and store the summary.
+
+    Parameters
+    ----------
+    path
+        Path of the machine folder.
+    now
+        Time of the summary.
+    render_text
+        Function that replaces names of the library in the texts.
+
+    Returns
+    -------
+    MachineSummary
+        Summary of the machine.
+
+    Raises
+    ------
+    DataError
+        If the path is no machine folder.
+    """
+    return summarize_machine(Logbook.open(path), now, render_text)
 
 
 def summarize_in_parallel(
-    folders: Sequence[Path], now: datetime, workers: Workers
+    folders: Sequence[Path], now: datetime, workers: Workers, render_text: RenderText = str
 ) -> Iterator[tuple[Path, tuple[int, ...], MachineSummary]]:
-    """The summaries of machine folders that others could make, each with the mark of its files.
+    """Summarize machine folders in workers, and yield each folder with its change mark and summary.
 
-    They must see the folders under the same names; each leaves standing.json there as `summarize_machine` does. What
-    `share_work` raises.
+    Workers must see the folders under the same paths. Folders that fail are left out. Errors as `share_work`.
     """
-    tasks = [_SummaryTask(os.getcwd(), str(folder), now) for folder in folders]  # noqa: PTH109
+    tasks = [_SummaryTask(os.getcwd(), str(folder), now, render_text) for folder in folders]  # noqa: PTH109
     for folder, content in zip(folders, share_work(_make_summary_content, tasks, workers), strict=True):
         summary = decode_summary(folder, content, now)
         if summary is not None:
@@ -77,111 +101,131 @@ def summarize_in_parallel(
 
 
 class _SummaryTask(NamedTuple):
-    """A machine to be summarised."""
+    """Machine to be summarized by a worker."""
 
-    place: str
-    """Folder that its path counts from."""
+    working_directory: str
+    """Directory that the path counts from."""
     path: str
-    """Path of the machine folder as it was named."""
+    """Path of the machine folder."""
     now: datetime
     """Time of the summary."""
+    render_text: RenderText
+    """Function that replaces names of the library in the texts."""
 
 
 def _make_summary_content(task: _SummaryTask) -> bytes:
-    """Content of its standing.json; empty where it cannot be made."""
+    """Make the content of standing.json. Empty if that fails or the files change meanwhile."""
     folder = Path(task.path)
     try:
-        with contextlib.chdir(task.place):
+        with contextlib.chdir(task.working_directory):
             mark = compute_change_mark(folder)
-            summary = summarize_folder(folder, task.now)
-            is_same = mark == compute_change_mark(folder)
-            return (
-                encode_summary(summary, compute_change_mark(folder, summary.newest_file), task.now) if is_same else b""
-            )
-    except Exception:  # noqa: BLE001 - whatever is wrong with it is said by who asks for it
+            summary = summarize_folder(folder, task.now, task.render_text)
+            if mark != compute_change_mark(folder):
+                return b""
+            return encode_summary(summary, compute_change_mark(folder, summary.newest_file), task.now)
+    except Exception:  # noqa: BLE001 - the next assessment shows what is wrong
         return b""
 
 
-def summarize_with_rows(path: Path, now: datetime) -> tuple[MachineSummary, list[bytes]]:
-    """The summary of a machine folder, and each row of its history as history.rows holds it."""
+def summarize_with_rows(path: Path, now: datetime, render_text: RenderText = str) -> tuple[MachineSummary, list[bytes]]:
+    """Summarize a machine folder, and encode its history.
+
+    Parameters
+    ----------
+    path
+        Path of the machine folder.
+    now
+        Time of the summary.
+    render_text
+        Function that replaces names of the library in the texts.
+
+    Returns
+    -------
+    summary : MachineSummary
+        Summary of the machine.
+    rows : list of bytes
+        Rows of the history as in history.rows.
+    """
     logbook = Logbook.open(path)
-    summary, hashes = summarize_machine(logbook, now), hash_programs(logbook.machine)
+    summary, hashes = summarize_machine(logbook, now, render_text), hash_programs(logbook.machine)
     return summary, [encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)]
 
 
-def summarize_machine(logbook: Logbook, now: datetime | None = None) -> MachineSummary:
-    """The summary of a machine, kept beside it where its lock can be had; what `Logbook.standing` raises."""
+def summarize_machine(logbook: Logbook, now: datetime | None = None, render_text: RenderText = str) -> MachineSummary:
+    """Summarize a machine, and store the summary if the lock is free. Errors as `Logbook.status`."""
     now = now or datetime.now(UTC)
-    summary = _build_summary(logbook, logbook.query(forecast_from_analysis, now))
+    summary = _build_summary(logbook, logbook.query(forecast_from_analysis, now), render_text)
     mark = compute_change_mark(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
-        try:
-            with logbook.folder.locked(patience=0):
-                write_summary(logbook.folder.path, summary, mark, now)
-        except (BusyError, OSError):
-            pass  # it is made anew by the next who asks
+        with contextlib.suppress(BusyError, OSError), logbook.folder.locked(patience=0):
+            write_summary(logbook.folder.path, summary, mark, now)
     return summary
 
 
-def _build_summary(logbook: Logbook, outlook: MachineForecast) -> MachineSummary:
-    machine, rows, standing = logbook.machine, logbook.history.current, outlook.status
-    last = standing.last_tap
-    interval = machine.machine.tap_interval_days
+def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: RenderText) -> MachineSummary:
+    machine, rows, status = logbook.machine, logbook.history.current, forecast.status
+    last, interval = status.last_tap, machine.machine.tap_interval_days
     return MachineSummary(
         name=machine.machine.name,
-        remarks=tuple(remark for remark in standing.reasons if remark.code not in DATE_REMARK_CODES),
-        alarms=standing.alarms,
-        default_next_step=standing.next_step if last is None else next_tap_step(last, interval),
+        remarks=tuple(
+            replace(remark, text=render_text(remark.text), cure=render_text(remark.cure))
+            for remark in status.reasons
+            if remark.code not in DATE_REMARK_CODES
+        ),
+        alarms=status.alarms,
+        default_next_step=render_text(status.next_step if last is None else next_tap_step(last, interval)),
         path=str(logbook.folder.path),
         interval_days=interval,
         has_port=bool(machine.daq.port),
         newest_tap_id=rows[-1].tap_id if last is not None else "",
         last_tap="" if last is None else last.isoformat(),
         tap_tests=len(logbook.history.rows),
-        programs={name: ruling.stability.value for name, ruling in (rows[-1].verdicts or {}).items()} if rows else {},
-        fates=dict(outlook.programs),
-        limits=outlook.limits,
-        series=tuple(map(_summarize_series, standing.series)),
+        programs={name: verdict.stability.value for name, verdict in (rows[-1].verdicts or {}).items()} if rows else {},
+        forecasts=dict(forecast.programs),
+        limits=forecast.limits,
+        series=tuple(map(_summarize_series, status.series)),
     )
 
 
 def _summarize_series(series: SeriesStatus) -> SeriesSummary:
-    trend, fall = series.trend, series.drop
-    return SeriesSummary(
+    trend, drop = series.trend, series.drop
+    summary = SeriesSummary(
         name=series.name,
         tool=series.tool,
         direction=series.direction,
-        drop=fall.value if fall.is_known else None,
-        drop_std=fall.std if fall.is_known and math.isfinite(fall.std) else None,
-        frequency=None if trend is None else trend.first_value * math.exp(trend.points[-1].percent / 100),
-        alarm=trend.open_drop.change.kind if trend is not None and trend.open_drop is not None else "",
-        scatter=(0.0, 0.0) if trend is None else estimate_scatter(trend.readings.y),
-        common_scatter=(0.0, 0.0) if trend is None else estimate_scatter(trend.readings.mean_of_directions.y),
-        points=() if trend is None else tuple(_thin_out(trend)),
+        drop=drop.value if drop.is_known else None,
+        drop_std=drop.std if drop.is_known and math.isfinite(drop.std) else None,
+        frequency=None,
+    )
+    if trend is None:
+        return summary
+    return msgspec.structs.replace(
+        summary,
+        frequency=trend.first_value * math.exp(trend.points[-1].percent / 100),
+        alarm=trend.open_drop.change.kind if trend.open_drop is not None else "",
+        scatter=estimate_scatter(trend.readings.y),
+        common_scatter=estimate_scatter(trend.readings.mean_of_directions.y),
+        points=tuple(_thin_out(trend)),
     )
 
 
 def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:
-    """Day and change (%) of the points, means of neighbours where there are many; the newest as it is."""
+    """Yield day and frequency change (%) of the points. Many points are averaged, but for the newest."""
     percents = np.array([point.percent for point in trend.points])
     points = np.column_stack([point_days(trend.points), percents - trend.start])
     if len(points) > MAX_SERIES_POINTS:
-        least, more = divmod(len(points) - 1, MAX_SERIES_POINTS - 1)
-        begins = np.cumsum([0, *[least + 1] * more, *[least] * (MAX_SERIES_POINTS - 1 - more)])
+        size, larger = divmod(len(points) - 1, MAX_SERIES_POINTS - 1)
+        begins = np.cumsum([0, *[size + 1] * larger, *[size] * (MAX_SERIES_POINTS - 1 - larger)])
         points = np.add.reduceat(points, begins) / np.diff(begins, append=len(points))[:, np.newaxis]
-    for at, percent in points.tolist():
-        yield round(at, 1), round(percent, 3)
-
-
-MAX_MACHINES_READ = 500
-"""Machines that are asked at most; chosen."""
+    for day, percent in points.tolist():
+        yield round(day, 1), round(percent, 3)
 
 
 def learn_scatter(logbook: Logbook) -> None:
-    """Write down in the journal what the machines beside a young one tell of its scatter, and what it was before a
-    repair; once after each baseline, as soon as there is anything to tell.
+    """Store in the journal the scatter learned from other machines and from before a repair.
 
-    BusyError, OSError and DataError as every line of the journal.
+    Once after each baseline of a young machine, as soon as there is anything to learn from. Raises BusyError, OSError
+    and DataError, as any journal entry.
     """
     history = logbook.history
     rows = history.current
@@ -192,16 +236,18 @@ def learn_scatter(logbook: Logbook) -> None:
         or all(count >= MIN_MONITORED_POINTS for count in counts.values())
     ):
         return
-    known = [*_read_neighbor_scatters(logbook.folder.path), *_collect_earlier_scatters(history)]
-    alone, common = (pool_scatter(scatters) for scatters in zip(*known, strict=True)) if known else NO_SERIES_PRIOR
-    if alone.freedom:
-        number = sum(scatter.freedom > 0 for scatter, _ in known)
+    priors = [*_read_neighbor_scatters(logbook.folder.path), *_collect_earlier_scatters(history)]
+    if not priors:
+        return
+    scatter, common = (pool_scatter(scatters) for scatters in zip(*priors, strict=True))
+    if scatter.freedom:
+        number = sum(prior.freedom > 0 for prior, _ in priors)
         with logbook.folder.locked():
-            logbook.folder.journal.append(FleetScatter(rows[-1].time, alone, common, number).line)
+            logbook.folder.journal.append(FleetScatter(rows[-1].time, scatter, common, number).line)
 
 
 def _read_neighbor_scatters(folder: Path) -> Iterator[SeriesScatterPrior]:
-    """Those of the series of all machines in the folder that a machine stands in."""
+    """Read the scatter of all machines in the same parent folder."""
     for path in islice(sorted(folder.resolve().parent.glob(f"*/{SUMMARY_FILE_NAME}")), MAX_MACHINES_READ):
         summary = read_last_summary(path.parent)
         for series in () if summary is None else summary.series:
@@ -210,13 +256,13 @@ def _read_neighbor_scatters(folder: Path) -> Iterator[SeriesScatterPrior]:
 
 
 def _collect_earlier_scatters(history: History) -> Iterator[SeriesScatterPrior]:
-    """Those of the series that ended with a new baseline."""
+    """Estimate the scatter of the series before the present baseline."""
     before = [row for row in history.rows if row.baseline != history.baseline]
     for baseline, series in dict.fromkeys((row.baseline, row.series) for row in before):
-        alike = [row for row in before if (row.baseline, row.series) == (baseline, series)]
-        x, y = ([row for row in alike if row.direction == direction] for direction in ("x", "y"))
-        for rows, beside in ((x, y), (y, ())):
-            trend = build_series_history(rows, beside).frequency.trend if rows else None
+        same = [row for row in before if (row.baseline, row.series) == (baseline, series)]
+        x, y = ([row for row in same if row.direction == direction] for direction in ("x", "y"))
+        for rows, other_direction in ((x, y), (y, ())):
+            trend = build_series_history(rows, other_direction).frequency.trend if rows else None
             if trend is not None:
                 yield SeriesScatterPrior(
                     estimate_scatter(trend.readings.y), estimate_scatter(trend.readings.mean_of_directions.y)

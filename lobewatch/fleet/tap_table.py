@@ -1,10 +1,10 @@
-"""The tap tests of machines as columns, straight from the bytes of their histories."""
+"""Read the tap tests of machines as columns, straight from the bytes of their histories."""
 
 from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import chain
 from operator import attrgetter
@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-import lobewatch.fleet as plant
+import lobewatch.fleet as fleet
 from acquisition.errors import format_error
 from lobewatch.fleet.machine_summary import MachineSummary, read_summary, software_version
 from lobewatch.machine.row_file import read_rows
@@ -34,20 +34,18 @@ TAP_NUMBER_COLUMNS = (
     "temperature_c",
     "hours",
 )
-"""Columns of numbers: of the mode followed where it was tapped, each with its standard error; mean of the recalibrated
-bearings, likewise; of the recalibrated model; of the spindle."""
+"""Columns of numbers: followed mode at the tapped point and mean calibrated bearing stiffness, each with its standard
+error; tip stiffness of the calibrated model; conditions of the tap test."""
 TAP_CONDITION_COLUMNS = TAP_NUMBER_COLUMNS[-2:]
-"""Those of them that are conditions of the tap test."""
+"""Columns of conditions of the tap test."""
 
 
 class _RemarkCode(msgspec.Struct, gc=False):
-    """The code of a remark."""
-
     code: str
 
 
 class _TableRow(msgspec.Struct, array_like=True, gc=False):
-    """The beginning of a `RowRecord` of the history, in its order; what is not needed is not looked into."""
+    """First fields of a `RowRecord`, in its order. Raw fields are not decoded."""
 
     number: int
     tap_id: str
@@ -71,24 +69,24 @@ class _TableRow(msgspec.Struct, array_like=True, gc=False):
 
 
 class TapTable(NamedTuple):
-    """The tap tests of one machine that count, oldest first."""
+    """Tap tests of one machine as columns, oldest first."""
 
     folder: str
-    """Name of the folder of the machine."""
+    """Name of the machine folder."""
     machine: str
     """Name of the machine."""
     series: Sequence[tuple[str, str]]
-    """Series of tap tests that are compared with one another: tool, and direction at its tip, "x" or "y"."""
+    """Tool and direction ("x" or "y") of each series of comparable tap tests."""
     series_numbers: Sequence[int]
-    """Number of the series of each tap test, from 1 on."""
+    """Number of the series of each tap test, from 1."""
     tap_id: Sequence[str]
     """Identity of each tap test."""
     time: Sequence[float]
     """Time of each tap test (s since 1970)."""
     remarks: Sequence[str]
-    """Codes of what is in doubt of each tap test, with blanks between."""
+    """Codes of the remarks on each tap test, separated by blanks."""
     numbers: NDArray[np.float64]
-    """Numbers of each tap test as in `NUMBERS`, NaN where not known, shape (n, 12)."""
+    """Values of `TAP_NUMBER_COLUMNS`, NaN if unknown, shape (n, 12)."""
 
 
 _decode_table_rows = msgspec.msgpack.Decoder(list[_TableRow]).decode
@@ -97,21 +95,26 @@ _get_estimates = attrgetter("frequency", "damping_ratio", "stiffness", "bearing_
 _get_modelled = attrgetter("static_tip_stiffness", "modal_tip_stiffness")
 
 
-def read_tap_table(key: str, path: Path, now: datetime | None = None) -> TapTable:
-    """The table of one machine; ValueError or OSError where it cannot be read. key: name of its folder."""
+def read_tap_table(
+    key: str, path: Path, now: datetime | None = None, render_text: Callable[[str], str] = str
+) -> TapTable:
+    """Read the tap tests of one machine folder named `key`. ValueError or OSError if it cannot be read.
+
+    `render_text` replaces names of the library in the texts of a new summary.
+    """
     now = now or datetime.now(UTC)
     summary = read_summary(path, now)
     rows = None if summary is None else _read_table_rows(path, summary)
     if summary is None or rows is None:
-        summary, contents = plant.summarize_with_rows(path, now)
+        summary, contents = fleet.summarize_with_rows(path, now, render_text)
         rows = _decode_rows(contents)
     numbers: dict[tuple[str, str, str], int] = {}
-    of_series = [numbers.setdefault(series, len(numbers) + 1) for series in map(_get_series, rows)]
+    series_numbers = [numbers.setdefault(series, len(numbers) + 1) for series in map(_get_series, rows)]
     return TapTable(
         key,
         summary.name,
         [(tool, direction) for tool, direction, _ in numbers],
-        of_series,
+        series_numbers,
         [row.tap_id for row in rows],
         [row.time.timestamp() for row in rows],
         [_join_codes(row.remarks) for row in rows],
@@ -128,15 +131,15 @@ def _join_codes(remarks: Sequence[_RemarkCode]) -> str:
 def _make_number_array(rows: Sequence[_TableRow]) -> NDArray[np.float64]:
     estimates = np.fromiter(chain.from_iterable(chain.from_iterable(map(_get_estimates, rows))), np.float64)
     modelled = np.fromiter(chain.from_iterable(map(_get_modelled, rows)), np.float64)
-    said = [
+    conditions = [
         [row.conditions.get(name, math.nan) if row.conditions else math.nan for row in rows]
         for name in TAP_CONDITION_COLUMNS
     ]
-    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(said).T])
+    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(conditions).T])
 
 
 def _read_table_rows(path: Path, summary: MachineSummary) -> list[_TableRow] | None:
-    """The rows of history.rows; None where it is not that of the standing."""
+    """Read history.rows. None if it does not belong to the summary."""
     if not summary.tap_tests:
         return []
     try:
@@ -149,15 +152,17 @@ def _read_table_rows(path: Path, summary: MachineSummary) -> list[_TableRow] | N
 
 
 def _decode_rows(contents: Sequence[bytes]) -> list[_TableRow]:
-    """The rows in a place, each as it was written last; all at once, an array of msgpack."""
+    """Decode rows at once, as an array of msgpack. The last one counts for each place."""
     rows = _decode_table_rows(struct.pack(">BI", 0xDD, len(contents)) + b"".join(contents))
     return list({row.number: row for row in rows if row.number >= 0}.values())
 
 
-def read_all_tables(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterator[TapTable]:
-    """The tables of all machines in order of their names; `damaged` gets those that cannot be read, with the reason."""
+def read_all_tables(
+    machines: Mapping[str, Path], damaged: dict[str, str], render_text: Callable[[str], str] = str
+) -> Iterator[TapTable]:
+    """Read the tables of all machines by name. `damaged` gets the reason for each unreadable machine."""
     for key in sorted(machines):
         try:
-            yield read_tap_table(key, machines[key])
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must not cost the others their lines
+            yield read_tap_table(key, machines[key], render_text=render_text)
+        except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
             damaged[key] = format_error(error)

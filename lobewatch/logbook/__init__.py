@@ -1,4 +1,4 @@
-"""One machine: the logbook and the questions that are answered from it."""
+"""Logbook of one machine, its analysis and the data of its charts."""
 
 import lazy_loader
 

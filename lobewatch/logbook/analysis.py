@@ -1,4 +1,4 @@
-"""What follows from the tap tests of one machine, each answer worked out once."""
+"""Analyze the usable tap tests of one machine, and cache each result."""
 
 from __future__ import annotations
 
@@ -21,19 +21,32 @@ from lobewatch.verdicts.recommendation import Advice, advise
 from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 
 MAX_CACHED_VERDICT_SETS = 8
-"""Tap tests whose verdicts are kept in memory, those asked for last."""
+"""Number of tap tests whose verdicts stay in memory, most recently used last."""
 
 
 class Analysis:
-    """Answers from the files of a machine as they were when it was made, with those tap tests that can be used.
+    """Results from the files of a machine as they were when the analysis was made.
 
-    DamagedTapError ends a question that meets a damaged file: `Logbook.ask` asks it again of an analysis without that.
+    A method that meets a damaged tap file raises DamagedTapError. `Logbook.query` then repeats the query on a new
+    analysis without that file, so ask the logbook rather than its analysis.
     """
 
     def __init__(
         self, folder: MachineFolder, files: UsableTaps, cache: HistoryCache, measurements: TapMeasurements
     ) -> None:
-        """Nothing is worked out yet."""
+        """Start without any result.
+
+        Parameters
+        ----------
+        folder
+            Folder of the machine.
+        files
+            Usable tap tests and journal entries.
+        cache
+            history.rows.
+        measurements
+            Measured tap tests.
+        """
         self.folder, self.files, self.measurements = folder, files, measurements
         self._cache = cache
         self._history: History | None = None
@@ -41,22 +54,22 @@ class Analysis:
 
     @property
     def machine(self) -> Machine:
-        """machine.toml."""
+        """Settings in machine.toml."""
         return self.folder.machine
 
     @property
     def taps(self) -> Sequence[TapEntry]:
-        """The committed tap tests whose files can be used, oldest first by their time."""
+        """Usable tap tests, oldest first."""
         return [place.entry for place in self.files.places]
 
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
-        """The test cuts that something can be learnt from, oldest first."""
+        """Usable test cuts, oldest first."""
         return tuple(cut for cut in self.files.cuts if cut.is_usable)
 
     @property
     def history(self) -> History:
-        """All measurements in order of time, up to date; on the disk too where that could be written."""
+        """Up-to-date history, oldest tap test first; history.rows is updated where the lock is free."""
         if self._history is None:
             self._history = self._update_history()
             if self._history.rows:
@@ -65,31 +78,51 @@ class Analysis:
 
     @property
     def cached_history(self) -> History | None:
-        """The history; None where nobody has asked for it."""
+        """Cached history, or None."""
         return self._history
 
     def _update_history(self) -> History:
-        """The stored rows as far as they still hold, and those that are missing."""
+        """Read the rows that are still valid and add the missing ones."""
         history = self._cache.read(self.files)
         rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
         history = replace(history, rows=rows)
         return clear_newest_verdicts(history) if history.rows and self.files.newest_damaged_remarks() else history
 
     def measurement(self, tap_id: str) -> Measurement:
-        """What a tap test says; KeyError for one that is not in the journal or is left out."""
-        rows = self.history.rows
-        return self.measurements.measurement(self.files.place(tap_id), rows)
+        """Measure one tap test.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+
+        Raises
+        ------
+        KeyError
+            If the tap test is not in the journal or cannot be used.
+        """
+        return self.measurements.measurement(self.files.place(tap_id), self.history.rows)
 
     @property
     def calibrated_measurement(self) -> Measurement | None:
-        """The newest measurement that the bearings of the model could be found from; None where there is none."""
+        """Newest measurement with calibrated bearings, or None."""
         newest = self.history.newest_calibrated
         return None if newest is None else self.measurement(newest.tap_id)
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
-        """The newest x and y of a tool (None: of the newest tap test), as they were after the tap test `until`.
+        """Combine the newest x and y of a tool, or predict the tool by the model if it was never tapped.
 
-        Predicted by the model where the tool was not tapped by then; DataError where there is no model of it.
+        Parameters
+        ----------
+        tool
+            Name of the tool. None for the tool of the newest tap test.
+        until
+            Identity of the last tap test to use. None for all tap tests.
+
+        Raises
+        ------
+        NotTappedError
+            If the tool was not tapped by then and the model cannot predict it.
         """
         places = self.files.list_until(until)
         if not places:
@@ -97,18 +130,30 @@ class Analysis:
         tool, rows = places[-1].entry.tool if tool is None else tool, self.history.rows
         assembly = self.measurements.assembly_of(tool, places, rows)
         is_now = places[-1] is self.files.places[-1]
-        doubts = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
-        return replace(assembly, questions=(*assembly.questions, *doubts))
+        damage = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
+        return replace(assembly, questions=(*assembly.questions, *damage))
 
     def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
-        """A tool as `assembly` has it, or why it is not known."""
+        """Return the assembly of a tool, or the reason why there is none.
+
+        Parameters
+        ----------
+        tool, until
+            As in `assembly`.
+        """
         try:
             return self.assembly(tool, until)
         except NotTappedError as error:
             return error
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
-        """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
+        """Return the earliest assembly of the same tool and directions, or None if there is no earlier one.
+
+        Parameters
+        ----------
+        now
+            Assembly to compare with.
+        """
         for tap in self._earlier_taps(now):
             then = self.assembly(tap.tool, tap.id)
             if then.directions == now.directions:
@@ -116,7 +161,7 @@ class Analysis:
         return None
 
     def _earlier_taps(self, now: Assembly) -> Iterator[TapEntry]:
-        """Tap tests of the same tool, without questions, from which on all its directions may have been known."""
+        """Yield earlier tap tests of the tool, without open questions, once all its directions are covered."""
         directions, questions = set[str](), self.history.questions
         for tap in self.files.list_series(now.tap_id):
             if tap.id == now.tap_id:
@@ -127,7 +172,20 @@ class Analysis:
                     yield tap
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
-        """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
+        """Evaluate programs on the newest tap tests of their tools.
+
+        Parameters
+        ----------
+        until
+            Identity of the last tap test to use. None for all tap tests.
+        names
+            Names of the programs. None for all programs.
+
+        Returns
+        -------
+        list of Verdict
+            One verdict for each program, in the order of machine.toml.
+        """
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows = self.history.rows
         until = rows[-1].tap_id if until is None and self.history.current else until
@@ -139,11 +197,17 @@ class Analysis:
         return [verdicts[table.name] for table in tables]
 
     def verdict_for(self, table: ProgramTable) -> Verdict:
-        """The verdict on a program that machine.toml does not hold, from the newest tap tests of its tool."""
+        """Evaluate a program that is not in machine.toml.
+
+        Parameters
+        ----------
+        table
+            Program to evaluate.
+        """
         return evaluate_at_speed(table, self.assembly_or_reason(table.tool), self.machine, self.cuts)
 
     def _cached_verdicts(self, tap_id: str | None) -> dict[str, Verdict]:
-        """Verdicts that are kept, by program."""
+        """Return the cached verdicts after a tap test, by program."""
         verdicts = self._verdicts[tap_id] = self._verdicts.pop(tap_id, {})
         if len(self._verdicts) > MAX_CACHED_VERDICT_SETS:
             del self._verdicts[next(iter(self._verdicts))]
@@ -152,27 +216,37 @@ class Analysis:
     def stored_verdicts(
         self, tap_id: str, drops: bool = False, verdicts: Mapping[str, Verdict] | None = None
     ) -> Mapping[str, StoredVerdict]:
-        """Word, limit and critical `drops` of every program after a tap test; the history keeps what was asked for.
+        """Return the verdict on every program after a tap test, and store the new ones in the history.
 
-        verdicts: by program, where others have worked them out.
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+        drops
+            Whether critical frequency drops are needed too.
+        verdicts
+            Verdicts evaluated elsewhere, by program.
         """
-        stored = self.history.rows[number := self.files.place(tap_id).number].verdicts
-        rulings = dict(stored or {})
-        names = [table.name for table in self.machine.program if is_verdict_missing(rulings.get(table.name), drops)]
-        if names or stored is None:
-            judged = [verdicts[name] for name in names] if verdicts else self.verdicts(tap_id, names)
-            rulings |= {verdict.program.name: build_stored_verdict(verdict, drops) for verdict in judged}
-            rulings = {table.name: rulings[table.name] for table in self.machine.program}
-            self._history = self.history.with_verdicts(number, rulings)
-            self._cache.store(
-                clear_newest_verdicts(self._history) if self.files.newest_damaged_remarks() else self._history
-            )
-        return rulings
+        row_verdicts = self.history.rows[number := self.files.place(tap_id).number].verdicts
+        stored = dict(row_verdicts or {})
+        names = [table.name for table in self.machine.program if is_verdict_missing(stored.get(table.name), drops)]
+        if names or row_verdicts is None:
+            new = [verdicts[name] for name in names] if verdicts else self.verdicts(tap_id, names)
+            stored |= {verdict.program.name: build_stored_verdict(verdict, drops) for verdict in new}
+            stored = {table.name: stored[table.name] for table in self.machine.program}
+            history = self._history = self.history.with_verdicts(number, stored)
+            self._cache.store(clear_newest_verdicts(history) if self.files.newest_damaged_remarks() else history)
+        return stored
 
     def initial_verdict(self, now: Verdict) -> StoredVerdict | None:
-        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them.
+        """Return the verdict on a program at the first tap tests of its tool in the same directions.
 
-        None for a program that machine.toml does not hold.
+        None if there are no such tap tests or the program is not in machine.toml.
+
+        Parameters
+        ----------
+        now
+            Present verdict on the program.
         """
         if now.program.name not in self.machine.cut_names:
             return None
@@ -180,7 +254,7 @@ class Analysis:
         return None if tap_id is None else self.stored_verdicts(tap_id)[now.program.name]
 
     def _first_tap_id(self, now: Assembly) -> str | None:
-        """The tap test of `first_assembly`: without reading a file where its row holds both directions."""
+        """Find the tap test of `first_assembly`, from the history alone where a row holds both directions."""
         if len(now.directions) < 2:
             then = self.first_assembly(now)
             return None if then is None else then.tap_id
@@ -188,11 +262,30 @@ class Analysis:
         return next((tap_id for tap_id, row in rows if row.x and row.y and row.x != row.y), None)
 
     def advice(self, verdict: Verdict) -> Advice:
-        """What goes beyond a verdict; it takes longer than the verdict itself."""
+        """Search for better settings of a program. Slower than the verdict itself.
+
+        Parameters
+        ----------
+        verdict
+            Verdict on the program.
+        """
         return advise(verdict, self.machine)
 
     def status(self, now: datetime | None = None) -> MachineStatus:
-        """The light of the machine, the reasons, and one next step."""
-        now, files = now or datetime.now(UTC), self.files
-        words = files.acknowledgements, files.fleet_scatter
-        return assess_status(self.machine, self.history, now, self.folder.path, files.remarks, *words)
+        """Assess the machine: status, reasons and one next step.
+
+        Parameters
+        ----------
+        now
+            Time of the assessment. None for the present time.
+        """
+        files = self.files
+        return assess_status(
+            self.machine,
+            self.history,
+            now or datetime.now(UTC),
+            self.folder.path,
+            files.remarks,
+            files.acknowledgements,
+            files.fleet_scatter,
+        )

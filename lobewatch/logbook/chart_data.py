@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from acquisition import DataError, Frf, Remark
 from dsm import Modes, Spindle, WhirlMap, mode_shapes, natural_frequencies, stiffness_curve, whirl_map
 from lobes import PocketShift, match_pockets
-from lobes.tip_response import TipData
 from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
 from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.logbook.logbook import Logbook
@@ -40,33 +39,54 @@ from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
 from lobewatch.verdicts.verdict import Verdict
 
 NO_POCKET_CODE = "no-safe-pocket"
-"""Code of the remark that says why there are no pockets."""
+"""Code of the remark on missing pockets."""
 
 
 @dataclass(frozen=True, eq=False)
 class LobeComparison:
-    """One cut, then and now."""
+    """Stability lobes of one cut, then and now."""
 
     now: LobeChart
     """Chart from the newest tap tests, or predicted."""
     then: LobeChart | None
-    """Chart from the first tap tests of the same tool and directions; None where there are no earlier ones."""
+    """Chart from the first tap tests of the same tool and directions. None if there are no earlier tap tests."""
     pockets: Sequence[Setting]
-    """Safe settings of now, whatever the method of the chart, the largest removal rate first."""
+    """Stable pockets from the newest tap tests by semi-discretization, largest removal rate first."""
     shifts: Sequence[PocketShift]
-    """Shifts of the pockets of the diagram; nothing of them is recommended."""
+    """Shifts of the pockets in the chart. Not a recommendation."""
     verdicts: Sequence[Verdict]
-    """Verdicts on the programs with this same cut: not by the method of the chart, but those of `Logbook.verdicts`."""
+    """Verdicts of `Logbook.verdicts` on the programs with the same cut, whatever the method of the chart."""
     remarks: Sequence[Remark]
-    """Remarks on what the chart rests on, and why there are no pockets."""
+    """Remarks on the tap tests and the chart, and the reason for missing pockets."""
 
 
 def compare_lobes(
     logbook: Logbook, tool: str | None, cut: str, source: DynamicsSource, method: LobeMethod
 ) -> LobeComparison:
-    """tool None: that of the program, of the newest tap test for the reference cut.
+    """Compare the stability lobes of a cut now with those from the first tap tests.
 
-    DataError with the reason where there are no lobes.
+    Parameters
+    ----------
+    logbook
+        Logbook of the machine.
+    tool
+        Name of the tool. None for the tool of the program, or of the newest tap test for the reference cut.
+    cut
+        Name of a program, or the reference cut.
+    source
+        Dynamics at the tool tip: fitted modes or the measured FRF.
+    method
+        Method of the chart. Pockets and verdicts use semi-discretization in any case.
+
+    Returns
+    -------
+    LobeComparison
+        Charts, pockets, verdicts and remarks.
+
+    Raises
+    ------
+    DataError
+        If there are no lobes, with the reason.
     """
     assembly = _find_assembly(logbook, tool, cut)
     now = _make_chart(logbook, assembly, cut, source, method)
@@ -74,15 +94,15 @@ def compare_lobes(
     then = None if first is None else _make_chart(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
     same = logbook.verdicts(names=[name for name, program_cuts in cuts.items() if program_cuts == now.cuts])
-    learnt = learn_spindle(now.table, assembly, logbook.machine, logbook.cuts)
-    pockets = find_stable_pockets(now.table, assembly, logbook.machine, learnt)
+    at_speed = learn_spindle(now.table, assembly, logbook.machine, logbook.cuts)
+    pockets = find_stable_pockets(now.table, assembly, logbook.machine, at_speed)
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
     remarks += [] if pockets else [_no_pocket_remark(now, logbook.machine)]
     return LobeComparison(now, then, pockets, _find_pocket_shifts(then, now), same, remarks)
 
 
 def chart_speed_pockets(logbook: Logbook, tool: str | None, cut: str) -> tuple[Assembly, list[SpeedPocket]] | None:
-    """Pockets of a cut with a tool that was tapped without force; None where lobes can be drawn, or not even that."""
+    """Find the pocket speeds of a cut with a tool tapped without force. None if lobes can be drawn, or neither."""
     assembly = _find_assembly(logbook, tool, cut)
     if assembly.directions or not assembly.without_stiffness or cut not in logbook.machine.cuts(assembly.tool):
         return None
@@ -100,23 +120,23 @@ def _make_chart(
     machine = logbook.machine
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
-        raise DataError(f"--cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {', '.join(cuts) or 'none'}")
+        raise DataError(
+            f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {', '.join(cuts) or 'none'}"
+        )
     assembly = assembly.check()
-    x: TipData | None = assembly.x
-    y: TipData | None = assembly.y
-    if source is DynamicsSource.FRF:
-        x, y = _read_frfs(logbook, assembly)
+    frfs = _read_frfs(logbook, assembly) if source is DynamicsSource.FRF else None
+    x, y = frfs or (assembly.x, assembly.y)
     lobes = compute_lobe_chart(method, x, y, cuts[cut], speed_grid(machine))
     return LobeChart(cut, find_cut_table(machine, cut), assembly, source, x, y, cuts[cut], lobes)
 
 
 def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
-    """In x and y, measured or predicted by receptance coupling; a direction that is not known is like the other."""
+    """Read or predict the FRFs in x and y. A missing direction gets the FRF of the other."""
     place = logbook.machine.tap.position_mm
     if place > 0 and (not assembly.predicted or assembly.tool == logbook.machine.tap.tool):
         raise DataError(
-            f"--source frf needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the tip; "
-            "use --source modes, which the model carries to the tip"
+            f"DynamicsSource.FRF needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the "
+            "tip; use DynamicsSource.MODES, which the model carries to the tip"
         )
     read = _predict_frf if assembly.predicted else _read_assembly_frf
     frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
@@ -125,25 +145,24 @@ def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
 
 
 def _predict_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
-    """With the newest bearings that were found in this direction."""
+    """Predict the FRF by receptance coupling, with the newest bearings calibrated in this direction."""
     rows = logbook.history.current
     newest = [row for row in rows if row.direction == direction and row.bearing_stiffness.is_known][-1]
     return compute_model_frf(build_model_state(logbook.machine, logbook.measurement(newest.tap_id), assembly.tool))
 
 
 def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
-    """Moved as the assembly has moved the modes of an older tap test."""
+    """Read the FRF and shift it in frequency as the assembly has shifted the modes of an older tap test."""
     tap_id = assembly.taps[direction]
     entry = next(tap for tap in logbook.taps if tap.id == tap_id)
     frf = logbook.folder.read(entry).required_frf.in_band(logbook.machine.mode.band_hz)
     now, then = (assembly.x, assembly.y)["xy".index(direction)], logbook.measurement(tap_id).at_tip
-    moved = now[0].frequency / then[0].frequency if now else 1.0
-    band = None if frf.usable_band is None else (moved * frf.usable_band[0], moved * frf.usable_band[1])
-    return replace(frf, frequency=moved * frf.frequency, usable_band=band)
+    ratio = now[0].frequency / then[0].frequency if now else 1.0
+    band = None if frf.usable_band is None else (ratio * frf.usable_band[0], ratio * frf.usable_band[1])
+    return replace(frf, frequency=ratio * frf.frequency, usable_band=band)
 
 
 def _no_pocket_remark(now: LobeChart, machine: Machine) -> Remark:
-    """Why nothing is recommended."""
     if len(now.assembly.directions) == 1:
         gap, cure = now.assembly.missing_direction
         return Remark(NO_POCKET_CODE, now.name, f"no speed and depth can be called safe: {gap}", cure)
@@ -152,7 +171,7 @@ def _no_pocket_remark(now: LobeChart, machine: Machine) -> Remark:
 
 
 def _find_pocket_shifts(then: LobeChart | None, now: LobeChart) -> list[PocketShift]:
-    """How pockets moved, but for those that are cut off: the tops of both must be known."""
+    """Match the pockets of both charts. Pockets cut off at the top of a chart are left out."""
     if then is None:
         return []
     deepest = MAX_CHART_DEPTH_RATIO * max(then.lobes.minimum.depth, now.lobes.minimum.depth)
@@ -162,37 +181,49 @@ def _find_pocket_shifts(then: LobeChart | None, now: LobeChart) -> list[PocketSh
     return [shift for shift in shifts if max(shift.before.depth, shift.after.depth) < deepest]
 
 
-_Float = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class ModelFigureData:
-    """What is drawn of a model."""
+    """Data of the figure of a spindle model."""
 
     title: str
-    """Headline."""
+    """Title of the figure."""
     spindle: Spindle
-    """The shaft."""
+    """Shaft with bearings and joints."""
     modes: Modes
-    """Modes along the shaft."""
-    curve: tuple[_Float, _Float]
+    """Mode shapes along the shaft."""
+    curve: tuple[NDArray[np.float64], NDArray[np.float64]]
     """Bearing stiffness (N/m) and frequency (Hz) of the followed mode, shape (n,) each."""
-    points: tuple[_Float, _Float]
-    """The same of the tap tests."""
+    points: tuple[NDArray[np.float64], NDArray[np.float64]]
+    """Bearing stiffness (N/m) and frequency (Hz) of the tap tests, shape (n,) each."""
     whirl: WhirlMap
     """Whirl frequencies over speed."""
     highest_speed: float
     """End of the speed range of the machine (rpm)."""
     frf_place: str
-    """Place of force and motion of the frequency responses, in words."""
+    """Point of excitation and response of the FRFs, as text."""
     model_frf: Frf
-    """Frequency response of the model."""
+    """FRF of the model."""
     measured_frf: Frf | None
-    """Newest measured one of the same tool."""
+    """Newest measured FRF of the same tool, or None."""
 
 
 def collect_model_figure(logbook: Logbook, state: ModelState, modes: int) -> ModelFigureData:
-    """What `lobewatch model --figure` draws."""
+    """Collect the data of the figure of a spindle model.
+
+    Parameters
+    ----------
+    logbook
+        Logbook of the machine.
+    state
+        Model with a tool.
+    modes
+        Number of modes to draw.
+
+    Returns
+    -------
+    ModelFigureData
+        Mode shapes, stiffness curve, whirl map and FRFs.
+    """
     spindle, machine = state.spindle, state.machine
     speeds = np.linspace(0.0, 1.15 * (first_critical_speed(spindle) or machine.speed.high_rpm), 24)
     return ModelFigureData(
@@ -209,8 +240,8 @@ def collect_model_figure(logbook: Logbook, state: ModelState, modes: int) -> Mod
     )
 
 
-def _compute_stiffness_curve(spindle: Spindle, mode: int) -> tuple[_Float, _Float]:
-    """Bearing stiffness over the followed frequency, from a thirtieth to thirty times the present one."""
+def _compute_stiffness_curve(spindle: Spindle, mode: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute frequency over bearing stiffness, from a thirtieth to thirty times the present stiffness."""
     if not any(bearing.group and np.isfinite(bearing.stiffness) for bearing in spindle.bearings):
         return np.empty(0), np.empty(0)
     ends = []
@@ -221,9 +252,9 @@ def _compute_stiffness_curve(spindle: Spindle, mode: int) -> tuple[_Float, _Floa
     return stiffness_curve(spindle, frequency, mode), frequency
 
 
-def _calibrated_points(logbook: Logbook, tool: str) -> tuple[_Float, _Float]:
-    calibrated_rows = [row for row in logbook.history.current if row.tool == tool and row.bearing_stiffness.is_known]
-    points = np.array([(row.bearing_stiffness.value, row.frequency.value) for row in calibrated_rows]).reshape(-1, 2)
+def _calibrated_points(logbook: Logbook, tool: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rows = [row for row in logbook.history.current if row.tool == tool and row.bearing_stiffness.is_known]
+    points = np.array([(row.bearing_stiffness.value, row.frequency.value) for row in rows]).reshape(-1, 2)
     return points[:, 0], points[:, 1]
 
 

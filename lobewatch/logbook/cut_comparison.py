@@ -1,9 +1,9 @@
-"""A recording of a cut of a machine, listened to: what is written down of it, and what was to be expected."""
+"""Compare recorded cuts with the prediction of the tap tests, and store them in the journal."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Literal
 
@@ -24,48 +24,48 @@ from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tool.assembly import Assembly
 
 CutSensor = Literal["accelerometer", "microphone"]
-"""What hears cuts."""
+"""Sensor that records cuts."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutComparison:
-    """What was heard beside what the tap tests predict."""
+    """Detected chatter of a recorded cut, compared with the prediction of the tap tests."""
 
     setting: CutSetting
-    """Setting that was cut with."""
+    """Speed, depth and tool of the cut."""
     detected: CutEvaluation
-    """Sound of the cut."""
+    """Evaluation of the recording."""
     assembly: Assembly | None
-    """The tool as it was tapped; None where it was not and cannot be predicted."""
+    """Assembly of the tool. None if it was not tapped and cannot be predicted."""
     sensor: CutSensor
-    """What heard it."""
+    """Sensor that recorded the cut."""
     predicted: ExpectedChatter | None
-    """Sound by its modes, at the speed that was heard (that was set where none was); None without them."""
+    """Chatter predicted from the modes at the detected speed, else at the set speed. None without modes."""
 
     @property
     def tooth_passing_frequency(self) -> float:
-        """Times a second that the cut repeats, at the speed that was heard, else as it was set (Hz)."""
+        """Tooth passing frequency (Hz)."""
         return self.setting.cut.repeats_per_turn * self.speed_rpm / 60
 
     @property
     def speed_rpm(self) -> float:
-        """As it was heard; as it was set where it was not."""
+        """Detected spindle speed, else the set speed (rpm)."""
         return self.detected.speed_rpm if np.isfinite(self.detected.speed_rpm) else self.setting.speed_rpm
 
     @property
     def power(self) -> CutPower | None:
-        """Power of the cut at that speed; None where nobody has read it."""
+        """Drive power of the cut at this speed, or None."""
         return None if self.setting.power is None else self.setting.power.at(self.speed_rpm)
 
     @property
     def lobe_number(self) -> int | None:
-        """Whole waves of chatter between two teeth; None without chatter."""
+        """Number of whole chatter waves between two teeth. None without chatter."""
         chatter = self.detected.chatter
         return None if chatter is None else int(chatter.frequency * 60 / (self.setting.cut.teeth * self.speed_rpm))
 
     @property
     def frequency_difference(self) -> float | None:
-        """Chatter heard from chatter predicted, modulo tooth passing (Hz); None where one of them is not known."""
+        """Detected less predicted chatter frequency, modulo tooth passing (Hz). None without both."""
         if self.detected.chatter is None or self.predicted is None:
             return None
         return float(
@@ -73,12 +73,12 @@ class CutComparison:
         )
 
     def nearest_mode_frequency(self, frequency: float) -> float | None:
-        """Frequency of the mode as tapped that is nearest to one (Hz); None where none was tapped."""
+        """Return the frequency (Hz) of the tapped mode nearest to a frequency, or None without modes."""
         tapped = () if self.assembly is None else (*(self.assembly.x or ()), *(self.assembly.y or ()))
         return min((mode.frequency for mode in tapped), key=lambda mode: abs(mode - frequency), default=None)
 
     def to_recorded_cut(self, at: datetime) -> CutEntry:
-        """To be written down; at: when it was cut (UTC)."""
+        """Make the journal entry of a cut made at a time (UTC)."""
         chatter = self.detected.chatter
         return CutEntry(
             "",
@@ -94,7 +94,7 @@ class CutComparison:
 
 
 def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> list[CutComparison]:
-    """Listen to a recording; each cut in it by itself, one at least."""
+    """Evaluate each cut in a recording and predict its chatter."""
     cut = setting.cut
     recording = CutRecording(
         signal.acceleration,
@@ -109,28 +109,22 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     tool = logbook.query(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
-    return [_compare_cut(setting, heard, assembly, sensor) for heard in evaluate_recording(recording)]
-
-
-def _compare_cut(
-    setting: CutSetting, heard: CutEvaluation, assembly: Assembly | None, sensor: CutSensor
-) -> CutComparison:
-    speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
-    expected = None if assembly is None else predict_chatter(setting, assembly, speed)
-    return CutComparison(setting, heard, assembly, sensor, expected)
+    comparisons = [
+        CutComparison(setting, detected, assembly, sensor, None) for detected in evaluate_recording(recording)
+    ]
+    if assembly is None:
+        return comparisons
+    return [replace(cut, predicted=predict_chatter(setting, assembly, cut.speed_rpm)) for cut in comparisons]
 
 
 def store_recorded_cuts(
     folder: MachineFolder, comparisons: Sequence[CutComparison], signal: CutSignal, at: datetime | None
 ) -> list[CutEntry]:
-    """Write down what was heard, each cut with what was recorded between those beside it. Saved when this returns.
-
-    at: when it was cut, None for now.
-    """
+    """Store each cut with its part of the recording. `at` is the time of the cut, None for now."""
     time = resolve_cutting_time(at, datetime.now(UTC))
-    begins, ends = [[getattr(one.detected.parts, name) for one in comparisons] for name in ("begin", "end")]
-    sounds = zip([0.0, *ends[:-1]], [*begins[1:], signal.duration], strict=True)
+    parts = [comparison.detected.parts for comparison in comparisons]
+    begins, ends = [0.0, *(part.end for part in parts[:-1])], [*(part.begin for part in parts[1:]), signal.duration]
     return [
-        store_cut(folder, comparison.to_recorded_cut(time), signal.slice_time(*sound))
-        for comparison, sound in zip(comparisons, sounds, strict=True)
+        store_cut(folder, comparison.to_recorded_cut(time), signal.slice_time(begin, end))
+        for comparison, begin, end in zip(comparisons, begins, ends, strict=True)
     ]

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,47 +35,47 @@ from lobewatch.logbook.tool_modes import (
 )
 from lobewatch.machine import Machine
 
+NUM_COMPARED_MODEL_MODES = 8
+"""Number of model modes that measured modes are compared with."""
+JOINT_STIFFNESS_FACTORS = np.geomspace(0.1, 10.0, 9).tolist()
+"""Initial factors on radial and tilting stiffness of the joints."""
+MAX_FITTED_NUMBERINGS = 2
+"""Number of mode numberings that are fitted at most."""
+MAX_REMATCH_ROUNDS = 2
+"""Number of times that modes are matched again to the fitted model at most."""
 Grouping = Callable[[Spindle], Spindle]
-"""The same spindle with other groups."""
+"""Function that assigns the springs of a spindle to groups with a common factor."""
 
 
 def choose_grouping(spindle: Spindle, modes: int) -> Grouping:
-    """The finest one that needs no more factors than there are modes; two at least are needed."""
-    return next(
-        (grouping for grouping in (split_tilting_groups, keep_groups) if len(_group_names(grouping(spindle))) <= modes),
-        merge_groups,
-    )
+    """Choose the finest grouping that needs no more factors than there are modes."""
+    finer = (split_tilting_groups, keep_groups)
+    return next((grouping for grouping in finer if len(_group_names(grouping(spindle))) <= modes), merge_groups)
 
 
 def compute_start_factors(spindle: Spindle, bearings: float, radial: float, tilting: float) -> list[float]:
-    """A factor for each group, bearings first, in order of appearance; both of a joint that has one: the middle."""
+    """List one factor for each group, bearings first. A common group of a joint gets the geometric mean."""
     springs = [(bearing.group, bearings) for bearing in spindle.bearings]
     for joint in spindle.joints:
-        alone = [(joint.group, radial), (joint.rotational_group, tilting)]
-        springs += alone if joint.rotational_group else [(joint.group, math.sqrt(radial * tilting))]
+        separate = [(joint.group, radial), (joint.rotational_group, tilting)]
+        springs += separate if joint.rotational_group else [(joint.group, math.sqrt(radial * tilting))]
     return list({name: factor for name, factor in springs if name}.values())
 
 
 def split_tilting_groups(spindle: Spindle) -> Spindle:
-    """The same with a group of its own for the stiffness of each joint against tilting."""
-    return replace(
-        spindle,
-        joints=[
-            replace(joint, rotational_group=joint.rotational_group or f"{joint.group} tilting")
-            if joint.group
-            else joint
-            for joint in spindle.joints
-        ],
+    """Give the tilting stiffness of each joint a group of its own."""
+    return _replace_grouped_joints(
+        spindle, lambda joint: {"rotational_group": joint.rotational_group or f"{joint.group} tilting"}
     )
 
 
 def keep_groups(spindle: Spindle) -> Spindle:
-    """The same: groups as machine.toml has them."""
+    """Keep the groups of machine.toml."""
     return spindle
 
 
 def merge_groups(spindle: Spindle) -> Spindle:
-    """The same with one group for all bearings that are calibrated and one for all joints."""
+    """Put all calibrated bearings into one group and all joints into another."""
     return replace(
         spindle,
         bearings=[replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings],
@@ -88,62 +88,51 @@ def _group_names(spindle: Spindle) -> set[str]:
     return ({bearing.group for bearing in spindle.bearings} | joints) - {""}
 
 
-NUM_COMPARED_MODEL_MODES = 8
-"""Modes of the model that are compared."""
-JOINT_STIFFNESS_FACTORS = np.geomspace(0.1, 10.0, 9)
-"""Factors on either stiffness of the joints that are tried."""
-MAX_FITTED_NUMBERINGS = 2
-"""Most numberings of the modes that are fitted to."""
-MAX_REMATCH_ROUNDS = 2
-"""Most times that modes are looked for anew in the model that was fitted to them."""
-
-
 class InitialGuess(NamedTuple):
-    """Factors to begin with, and the modes that are found with them."""
+    """Initial factors of a fit, with the modes matched to the scaled model."""
 
     cost: float
-    """Distance of all modes from the model."""
+    """Distance of all modes from the model (-)."""
     bearings: float
-    """Factor on the bearings."""
+    """Factor on the bearing stiffness (-)."""
     radial: float
-    """Factor on the radial stiffness of joints."""
+    """Factor on the radial stiffness of the joints (-)."""
     tilting: float
-    """Factor on their stiffness against tilting."""
+    """Factor on the tilting stiffness of the joints (-)."""
     matches: tuple[ModeMatch, ...]
-    """One a tap test."""
+    """Matched modes of each tap test."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Modes of tap tests by their number in the model, and the model fitted to them."""
+    """Spindle model fitted to the matched modes of several tap tests."""
 
     taps: Sequence[TappedTool]
-    """The tap tests."""
+    """Tools with their tap tests."""
     matches: tuple[ModeMatch, ...]
-    """One a tap test."""
+    """Matched modes of each tap test."""
     grouping: Grouping
-    """Grouping of the parts that share a factor."""
+    """Grouping of the springs that share a factor."""
     fit: StiffnessFit
-    """The model."""
+    """Fitted stiffness."""
 
 
 def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
-    """The modes followed, and of those around them what the model has nearby, in its order and about as stiff.
+    """Fit bearings and joints to the matched modes of several tap tests.
 
-    position: where all were tapped, from the tool tip (m). For joints from a tenth to ten times as stiff as given, the
-    mode followed of the first tool sets the bearings, and the other modes are numbered where they fit best. Then the
-    model is fitted to all of them, and they are looked for in it anew. Raises what dsm.fit_stiffness raises.
+    For joints from a tenth to ten times as stiff as given, the followed mode of the first tool sets the bearings, and
+    the other modes get the numbers that fit best. Then the model is fitted to all modes, and the modes are matched
+    again. `position` is the tapped point, from the tool tip (m). Raises the errors of `dsm.fit_stiffness`.
     """
     starts = _select_distinct(sorted(_generate_guesses(taps, position), key=lambda start: start.cost))
     if not starts:
-        return _fit_model(
-            taps, InitialGuess(0.0, 1.0, 1.0, 1.0, tuple(ModeMatch(0.0, ((t.mode_number, t.followed),)) for t in taps))
-        )
+        followed = tuple(ModeMatch(0.0, ((tap.mode_number, tap.followed),)) for tap in taps)
+        return _fit_model(taps, InitialGuess(0.0, 1.0, 1.0, 1.0, followed))
     best = None
     for start in starts[:MAX_FITTED_NUMBERINGS]:
         with suppress(StiffnessFitError, UnreachableFrequencyError):
-            settled = _iterate_fit(taps, start, position)
-            best = settled if best is None or (best.fit.has_misfit and not settled.fit.has_misfit) else best
+            fitted = _iterate_fit(taps, start, position)
+            best = fitted if best is None or (best.fit.has_misfit and not fitted.fit.has_misfit) else best
         if best is not None and not best.fit.has_misfit:
             break
     return best or _fit_model(taps, starts[0])
@@ -151,26 +140,31 @@ def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
 
 def _generate_guesses(taps: Sequence[TappedTool], position: float) -> Iterator[InitialGuess]:
     first = taps[0]
-    for radial, tilting in product(JOINT_STIFFNESS_FACTORS.tolist(), JOINT_STIFFNESS_FACTORS.tolist()):
+    for radial, tilting in product(JOINT_STIFFNESS_FACTORS, repeat=2):
         with suppress(ValueError, ArithmeticError):
-            stiffer = [_scale_joints(tap.spindle, radial, tilting) for tap in taps]
-            factor = calibrate(stiffer[0], first.followed.frequency, mode=first.mode_number).factor
-            matches = _match_all(taps, [_scale_bearings(spindle, factor) for spindle in stiffer], position)
+            scaled = [_scale_joints(tap.spindle, radial, tilting) for tap in taps]
+            factor = calibrate(scaled[0], first.followed.frequency, mode=first.mode_number).factor
+            matches = _match_all(taps, [_scale_bearings(spindle, factor) for spindle in scaled], position)
             yield InitialGuess(sum(match.cost for match in matches), factor, radial, tilting, matches)
 
 
 def _select_distinct(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """The best of each numbering."""
+    """Keep the best guess of each numbering."""
     return list({str(_mode_numbers(start.matches)): start for start in reversed(starts)}.values())[::-1]
 
 
 def _scale_joints(spindle: Spindle, radial: float, tilting: float) -> Spindle:
-    joints = [
-        replace(joint, stiffness=radial * joint.stiffness, rotational_stiffness=tilting * joint.rotational_stiffness)
-        if joint.group
-        else joint
-        for joint in spindle.joints
-    ]
+    return _replace_grouped_joints(
+        spindle,
+        lambda joint: {
+            "stiffness": radial * joint.stiffness,
+            "rotational_stiffness": tilting * joint.rotational_stiffness,
+        },
+    )
+
+
+def _replace_grouped_joints(spindle: Spindle, changes: Callable[[Joint], dict[str, Any]]) -> Spindle:
+    joints = [replace(joint, **changes(joint)) if joint.group else joint for joint in spindle.joints]
     return replace(spindle, joints=joints)
 
 
@@ -183,7 +177,7 @@ def _scale_bearings(spindle: Spindle, factor: float) -> Spindle:
 
 
 def _iterate_fit(taps: Sequence[TappedTool], start: InitialGuess, position: float) -> JointFit:
-    """Fitted and looked for anew, until the same modes are found."""
+    """Fit and match again until the matched modes stay the same."""
     fitted = _fit_model(taps, start)
     for _ in range(MAX_REMATCH_ROUNDS):
         matches = _match_all(taps, fitted.fit.spindles, position)
@@ -223,33 +217,32 @@ def _fit_model(taps: Sequence[TappedTool], start: InitialGuess) -> JointFit:
 
 @dataclass(frozen=True)
 class JointCalibration:
-    """One model for several tools."""
+    """Joint and bearing stiffness fitted to several tools."""
 
     label: str
     """Label of the model in machine.toml."""
     taps: tuple[TappedTool, ...]
-    """Tools that it was fitted to, one a spindle of the fit."""
+    """Fitted tools, one for each spindle of the fit."""
     fit: StiffnessFit
-    """The stiffness of bearings and joints."""
+    """Fitted stiffness of bearings and joints."""
     predicted: dict[str, PredictedMode]
-    """The softest mode at the tip of each tool that was not fitted to, by its name; empty where factors are shared."""
+    """Softest tip mode of each tool that was not fitted, by name. Empty if stiffnesses share a factor."""
     joints: tuple[Joint, ...]
-    """Joints to write into machine.toml; empty where that would be no improvement."""
+    """Joints to write into machine.toml. Empty if that is no improvement."""
     unmatched: dict[str, tuple[float, ...]]
-    """Frequencies (Hz) of other modes of the tap tests that the model has nowhere near, by tool."""
+    """Frequencies (Hz) of measured modes without a model mode nearby, by tool."""
     remarks: tuple[Remark, ...]
-    """Remarks on what makes the fit doubtful, beside its own."""
+    """Remarks on shared factors and on the time between the tap tests."""
 
 
 def calibrate_joints(
     logbook: Logbook, tools: Sequence[str], direction: str | None = None, mode: Sequence[int] = ()
 ) -> JointCalibration:
-    """Fit bearings and joints to the newest tap tests of several tools, in one direction; see tapped_tools.
+    """Fit bearings and joints to the newest tap tests of several tools in one direction.
 
-    The modes followed, whose number in the model is known, give one factor for all bearings and one for all joints.
-    Further modes of the same tests count too (known_modes), and each group gets a factor of its own, joints one for
-    either stiffness, as far as there are modes for that. DataError for a model without a joint to find, and for tools
-    that nothing fits.
+    The followed modes give one factor for all bearings and one for all joints. Further modes of the same tests refine
+    this: each group gets its own factor, and joints one for each stiffness, as far as there are modes. `direction` and
+    `mode` are those of `find_tapped_tools`. DataError for a model without a group of joints, and if nothing fits.
     """
     machine = logbook.machine
     if not any(joint.group for joint in machine.model(tools[0]).joints):
@@ -259,18 +252,18 @@ def calibrate_joints(
         )
     taps = find_tapped_tools(logbook, tools, direction, mode)
     try:
-        fitted_modes = fit_joints(taps, machine.tap.position_mm / 1e3)
+        joint_fit = fit_joints(taps, machine.tap.position_mm / 1e3)
     except (StiffnessFitError, UnreachableFrequencyError) as error:
         raise DataError(f"tools {' and '.join(map(repr, tools))} do not fit one spindle: {error}") from error
-    fit, grouping = fitted_modes.fit, fitted_modes.grouping
+    fit, grouping = joint_fit.fit, joint_fit.grouping
     return JointCalibration(
         machine.spindle.label if machine.spindle else "",
         tuple(taps),
         fit,
         dict(_predict_other_tools(machine, fit, grouping, tools)) if grouping is split_tilting_groups else {},
         _joints_for_toml(fit, grouping, machine.model(machine.tap.tool)),
-        dict(_find_unmatched(fitted_modes)),
-        (*_shared_factor_remarks(fitted_modes), *_time_gap_remarks(taps, machine)),
+        dict(_find_unmatched(joint_fit)),
+        (*_shared_factor_remarks(joint_fit), *_time_gap_remarks(taps, machine)),
     )
 
 
@@ -287,7 +280,7 @@ def _predict_other_tools(
 
 
 def _joints_for_toml(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> tuple[Joint, ...]:
-    """All joints of machine.toml as found; none where the tools do not fit one spindle, or no joint is felt."""
+    """Return all joints as fitted. Empty if the tools do not fit one spindle or no joint has an effect."""
     joints = fit.apply_to(grouping(drawn)).joints
     names = {name for joint in joints for name in (joint.group, joint.rotational_group) if name}
     if fit.has_misfit or names & {*fit.groups} <= fit.open_groups:
@@ -295,30 +288,26 @@ def _joints_for_toml(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> t
     return tuple(replace(joint, group=old.group) for joint, old in zip(joints, drawn.joints, strict=True))
 
 
-def _find_unmatched(fitted_modes: JointFit) -> Iterator[tuple[str, tuple[float, ...]]]:
-    for tap, match in zip(fitted_modes.taps, fitted_modes.matches, strict=True):
-        counted = [mode for _, mode in match.modes]
-        left = [
-            mode.frequency
-            for mode in select_neighbor_modes(tap)
-            if not any(mode is counted_mode for counted_mode in counted)
-        ]
-        if left:
-            yield tap.tool, tuple(left)
+def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...]]]:
+    for tap, match in zip(joint_fit.taps, joint_fit.matches, strict=True):
+        matched = {id(mode) for _, mode in match.modes}
+        unmatched = tuple(mode.frequency for mode in select_neighbor_modes(tap) if id(mode) not in matched)
+        if unmatched:
+            yield tap.tool, unmatched
 
 
-def _shared_factor_remarks(fitted_modes: JointFit) -> Iterator[Remark]:
-    """Fewer factors than stiffnesses."""
-    if fitted_modes.grouping is not split_tilting_groups:
-        shared = "all bearings share a factor, and " if fitted_modes.grouping is merge_groups else ""
-        count = fitted_modes.fit.mode.size
-        text = f"{count} modes are too few: {shared}all stiffnesses of the joint keep their given ratio; "
+def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
+    if joint_fit.grouping is not split_tilting_groups:
+        shared = "all bearings share a factor, and " if joint_fit.grouping is merge_groups else ""
+        text = (
+            f"{joint_fit.fit.mode.size} modes are too few: {shared}all stiffnesses of the joint keep their given "
+            "ratio; other tools are not predicted"
+        )
         cure = "measure more modes: a wider [mode] band_hz, a harder hammer tip"
-        yield Remark("factors-shared", "", f"{text}other tools are not predicted", cure)
+        yield Remark("factors-shared", "", text, cure)
 
 
 def _time_gap_remarks(taps: Sequence[TappedTool], machine: Machine) -> Iterator[Remark]:
-    """Bearings may have changed from one test to the other."""
     times = [tap.time for tap in taps]
     days = (max(times) - min(times)) / timedelta(days=1)
     if days > machine.machine.tap_interval_days:

@@ -1,9 +1,11 @@
-"""The logbook of one machine: its tap tests and all that follows from them, each worked out once."""
+"""Open the logbook of one machine, query its analysis and add tap tests."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
+from functools import wraps
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
@@ -12,164 +14,221 @@ from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import UsableTaps
-from lobewatch.logbook import recordings as replaying
+from lobewatch.logbook import recordings
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.machine import DamagedTapError, Machine, MachineFolder, ProgramTable, TapEntry
+from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
 from lobewatch.machine.folder_updates import store_mode_edits
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.verify_files import enter_orphaned_taps
 from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap
-from lobewatch.monitoring.machine_status import MachineStatus
-from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.recommendation import Advice
-from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 from modal import ModeEdits
 
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
 
 
+def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate[Logbook, P], Answer]:
+    """Make a method of the logbook that queries its analysis."""
+
+    @wraps(question)
+    def answer(logbook: Logbook, /, *arguments: P.args, **options: P.kwargs) -> Answer:
+        return logbook.query(question, *arguments, **options)
+
+    return answer
+
+
 class Logbook:
-    """One machine. Reading brings history.rows up to date where its lock can be had, else works in memory and says so.
+    """Tap tests, test cuts and results of one machine.
 
-    It holds what the disk said when it was first asked; `commit` and `replay` add to it, `is_current` tells whether
-    somebody else has. Questions are answered by `Analysis`, all through `ask`.
+    A logbook shows the machine folder as it was at the first access. `commit` and `replay` add to it, and `is_current`
+    tells whether another program has changed the folder. Reading updates history.rows if the lock of the folder is
+    free. Otherwise the logbook works in memory, and a remark says so. All results come from `Analysis`.
 
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from lobewatch.machine import make_machine_folder
     >>> with TemporaryDirectory() as parent:
     ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
     ...     logbook = Logbook.open(toml.parent)
-    ...     standing = logbook.standing()
-    >>> standing.light.value, [reason.code for reason in standing.reasons]
+    ...     status = logbook.status()
+    >>> status.status.value, [reason.code for reason in status.reasons]
     ('unknown', ['never-tapped'])
     """
 
     def __init__(self, folder: MachineFolder) -> None:
-        """Nothing is read yet."""
+        """Read nothing yet.
+
+        Parameters
+        ----------
+        folder
+            Folder of the machine.
+        """
         self.folder = folder
         """Folder of the machine."""
         self.files = UsableTaps(folder)
-        """What the folder holds, and what was done to the machine."""
+        """Usable tap tests and all other entries of the journal."""
         self.fits: dict[str, TapFit] = {}
-        """Modes of tap tests that others have fitted, by tap test."""
+        """Modes fitted elsewhere, by tap test."""
         self._mark, self._cache = folder.change_mark, HistoryCache(folder)
         self._current_analysis: Analysis | None = None
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
-        """The logbook of a machine folder; DataError where it is none."""
+        """Open the logbook of a machine folder.
+
+        Parameters
+        ----------
+        path
+            Path of the machine folder.
+
+        Raises
+        ------
+        DataError
+            If there is no machine folder at this path.
+        """
         return cls(MachineFolder(path))
 
     @property
     def machine(self) -> Machine:
-        """machine.toml."""
+        """Settings in machine.toml."""
         return self.folder.machine
 
     @property
+    def analysis(self) -> Analysis:
+        """Analysis of the usable tap tests."""
+        if self._current_analysis is None:
+            self._current_analysis = self._make_analysis(TapMeasurements(self.folder, self.files.places, self.fits))
+        return self._current_analysis
+
+    @property
     def remarks(self) -> list[Remark]:
-        """What is to be said of the files themselves."""
+        """Remarks on the files of the machine."""
         history = None if self._current_analysis is None else self._current_analysis.cached_history
         return [*self.files.remarks, *self._cache.remarks, *find_older_version_remarks(history)]
 
     @property
     def is_current(self) -> bool:
-        """Whether journal and machine.toml are as they were then."""
+        """Whether journal and machine.toml are unchanged since they were read."""
         return self.folder.change_mark == self._mark
 
     def query(
-        self, question: Callable[Concatenate[Analysis, P], Answer], *arguments: P.args, **named: P.kwargs
+        self, question: Callable[Concatenate[Analysis, P], Answer], *arguments: P.args, **options: P.kwargs
     ) -> Answer:
-        """The answer to a question; asked again where it meets a damaged tap file, of an analysis without that."""
+        """Query the analysis, again without each tap file that proves to be damaged.
+
+        Parameters
+        ----------
+        question
+            Function of an analysis, such as `Analysis.verdicts`.
+        arguments, options
+            Further arguments of the function.
+        """
         while True:
             try:
-                return question(self._analysis, *arguments, **named)
+                return question(self.analysis, *arguments, **options)
             except DamagedTapError as error:
                 self.files.leave_out(error)
                 self._current_analysis = None
 
     @property
     def taps(self) -> Sequence[TapEntry]:
-        """The committed tap tests whose files can be used, oldest first by their time."""
-        return self._analysis.taps
+        """Usable tap tests, oldest first."""
+        return self.analysis.taps
 
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
-        """The test cuts that something can be learnt from, oldest first."""
-        return self._analysis.cuts
+        """Usable test cuts, oldest first."""
+        return self.analysis.cuts
 
     def series(self, tool: str, direction: str) -> list[TapEntry]:
-        """Tap tests of one tool and direction, oldest first."""
+        """Return the tap tests of one tool and direction, oldest first.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        direction
+            Direction at the tool tip, "x" or "y".
+        """
         return [tap for tap in self.taps if (tap.tool, tap.direction) == (tool, direction)]
 
     def newest_tap(self, tool: str | None = None) -> TapEntry:
-        """The newest tap test, of a tool where one is named; DataError where there is none."""
+        """Return the newest tap test.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool. None for any tool.
+
+        Raises
+        ------
+        NotTappedError
+            If there is no such tap test.
+        """
         return self.files.newest(tool)
 
     @property
     def history(self) -> History:
-        """All measurements in order of time, up to date; on the disk too where that could be written."""
-        return self.query(_get_history)
+        """Up-to-date history, oldest tap test first; history.rows is updated where the lock is free."""
+        history: History = self.query(attrgetter("history"))
+        return history
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
-        """Codes of what is asked and not answered, by tap test; what --accept takes."""
+        """Codes of the open questions, by tap test; `accept` answers them."""
         return self.history.questions
 
     def measurement(self, tap_id: str) -> Measurement:
-        """What a tap test says; KeyError for one that is not in the journal or is left out, DataError where its file is
-        damaged."""
-        self.query(_get_history)  # what is damaged before it is found now
-        return self._analysis.measurement(tap_id)
+        """Measure one tap test.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+
+        Raises
+        ------
+        KeyError
+            If the tap test is not in the journal or cannot be used.
+        DataError
+            If its file is damaged.
+        """
+        _ = self.history  # finds damaged files first
+        return self.analysis.measurement(tap_id)
 
     @property
     def calibrated_measurement(self) -> Measurement | None:
-        """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        return self.query(_get_calibrated)
+        """Newest measurement with calibrated bearings, or None."""
+        measurement: Measurement | None = self.query(attrgetter("calibrated_measurement"))
+        return measurement
 
-    def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
-        """See `Analysis.assembly`."""
-        return self.query(Analysis.assembly, tool, until)
-
-    def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
-        """See `Analysis.verdicts`."""
-        return self.query(Analysis.verdicts, until, names)
-
-    def verdict_for(self, table: ProgramTable) -> Verdict:
-        """See `Analysis.verdict_on`."""
-        return self.query(Analysis.verdict_for, table)
-
-    def stored_verdicts(self, tap_id: str, drops: bool = False) -> Mapping[str, StoredVerdict]:
-        """See `Analysis.rulings`."""
-        return self.query(Analysis.stored_verdicts, tap_id, drops)
-
-    def first_assembly(self, now: Assembly) -> Assembly | None:
-        """See `Analysis.first_assembly`."""
-        return self.query(Analysis.first_assembly, now)
-
-    def initial_verdict(self, now: Verdict) -> StoredVerdict | None:
-        """See `Analysis.ruling_then`."""
-        return self.query(Analysis.initial_verdict, now)
-
-    def advice(self, verdict: Verdict) -> Advice:
-        """What goes beyond a verdict; it takes longer than the verdict itself."""
-        return self.query(Analysis.advice, verdict)
-
-    def status(self, now: datetime | None = None) -> MachineStatus:
-        """The light of the machine, the reasons, and one next step."""
-        return self.query(Analysis.status, now)
+    assembly = _answered_by(Analysis.assembly)
+    first_assembly = _answered_by(Analysis.first_assembly)
+    verdicts = _answered_by(Analysis.verdicts)
+    verdict_for = _answered_by(Analysis.verdict_for)
+    stored_verdicts = _answered_by(Analysis.stored_verdicts)
+    initial_verdict = _answered_by(Analysis.initial_verdict)
+    advice = _answered_by(Analysis.advice)
+    status = _answered_by(Analysis.status)
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
-        """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
+        """Store a tap test permanently.
+
+        Parameters
+        ----------
+        tap
+            Tap test to store.
+        now
+            Time of a live test, which is checked against the clock. None for a recorded test.
+        """
         if not self.is_current:
             self._invalidate()
         codes = find_clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
-        goes_on = self.files.add(self.folder.commit(tap, codes))
-        self._current_analysis = (
-            self._make_analysis(self._current_analysis.measurements) if goes_on and self._current_analysis else None
-        )
+        is_newest, analysis = self.files.add(self.folder.commit(tap, codes)), self._current_analysis
+        self._current_analysis = self._make_analysis(analysis.measurements) if is_newest and analysis else None
         self._mark = self.folder.change_mark
 
     def replay(
@@ -179,67 +238,112 @@ class Logbook:
         tool: str = "",
         direction: str = "",
         conditions: Conditions = UNKNOWN_CONDITIONS,
-        **said: Any,
+        **description: Any,
     ) -> Measurement:
-        """Store a recorded file as a tap test, unless it is stored already, and say what it means.
+        """Store a recorded file as a tap test, unless it is stored already, and measure it.
 
-        date, tool, direction, conditions and the other fields of `acquisition.Description` (unit="g/N") say what the
-        file does not. DataError for a file that cannot be trusted, or does not say enough, with the reason.
+        Parameters
+        ----------
+        file
+            Path of the recorded file.
+        date
+            Time of recording. None if the file names it.
+        tool
+            Name of the tool. Default: from the file, else [tap] tool of machine.toml.
+        direction
+            Direction at the tool tip. Default: from the file, else "x".
+        conditions
+            Conditions of the tap test.
+        description
+            Other fields of `acquisition.Description`, such as ``unit="g/N"``.
+
+        Returns
+        -------
+        Measurement
+            Measurement of the stored tap test.
+
+        Raises
+        ------
+        DataError
+            If the file cannot be trusted or lacks information.
         """
-        description = Description(date=date, tool=tool, direction=direction, conditions=conditions, **said)
-        (tap_id,) = self.replay_all([Path(file)], description).tap_ids
+        known = Description(date=date, tool=tool, direction=direction, conditions=conditions, **description)
+        (tap_id,) = self.replay_all([Path(file)], known).tap_ids
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> replaying.ReplayOutcome:
-        """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
+    def replay_all(self, files: Sequence[Path], description: Description, **options: Any) -> recordings.ReplayOutcome:
+        """Store recorded files as tap tests, each once.
+
+        Parameters
+        ----------
+        files
+            Paths of the recorded files.
+        description
+            Facts that the files do not state.
+        options
+            `workers`, `keep_going` and `progress` of `store_recordings`.
+        """
         with self.folder.locked():
-            enter_orphaned_taps(self.folder)  # else what an interrupted replay has stored would be stored twice
-            outcome = replaying.store_recordings(self.folder, files, said, **how)
+            enter_orphaned_taps(self.folder)  # else an interrupted replay would be stored twice
+            outcome = recordings.store_recordings(self.folder, files, description, **options)
             self.fits |= outcome.fits
             self._invalidate()
         return outcome
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
-        """Accept what is asked of these tap tests, for good; the codes that none of them asks."""
+        """Accept questions on tap tests permanently.
+
+        Parameters
+        ----------
+        tap_ids
+            Identities of the tap tests.
+        codes
+            Codes of the questions.
+
+        Returns
+        -------
+        list of str
+            Codes that none of these tap tests raises.
+        """
         unasked = accept_questions(self.folder, self.questions, tap_ids, codes) if codes else []
         if len(unasked) < len(codes):
             self._invalidate()
         return unasked
 
     def edit_modes(self, tap_ids: Sequence[str], edits: ModeEdits) -> dict[str, str]:
-        """Keep what a person says of the modes of these tap tests, for good; the reasons why it cannot be of some.
+        """Store edits of the modes of tap tests permanently. Empty edits withdraw earlier ones.
 
-        Edits that say nothing take back what was said before.
+        Parameters
+        ----------
+        tap_ids
+            Identities of the tap tests.
+        edits
+            Modes to add, drop and hold.
+
+        Returns
+        -------
+        dict
+            Reason for each tap test that the edits do not fit; nothing is stored for it.
         """
         entries = {tap_id: self.files.by_id[tap_id] for tap_id in tap_ids}
         fits = {tap_id: fit_tap(self.folder.read(entry), self.machine, edits) for tap_id, entry in entries.items()}
         reasons = {
-            name: said.text for name, fit in fits.items() for said in fit.remarks if said.code == EDITS_NOT_APPLIED_CODE
+            tap_id: remark.text
+            for tap_id, fit in fits.items()
+            for remark in fit.remarks
+            if remark.code == EDITS_NOT_APPLIED_CODE
         }
-        store_mode_edits(self.folder, [tap_id for tap_id in fits if tap_id not in reasons], edits)
-        self.fits |= {tap_id: fit for tap_id, fit in fits.items() if tap_id not in reasons}
+        fits = {tap_id: fit for tap_id, fit in fits.items() if tap_id not in reasons}
+        store_mode_edits(self.folder, [*fits], edits)
+        self.fits |= fits
         self._invalidate()
         return reasons
 
     def _invalidate(self) -> None:
-        """What is on the disk has changed."""
+        """Forget everything after a change on the disk."""
         self.files.forget()
         self._current_analysis, self._mark = None, self.folder.change_mark
 
-    @property
-    def _analysis(self) -> Analysis:
-        if self._current_analysis is None:
-            self._current_analysis = self._make_analysis(TapMeasurements(self.folder, self.files.places, self.fits))
-        return self._current_analysis
-
     def _make_analysis(self, measurements: TapMeasurements) -> Analysis:
         return Analysis(self.folder, self.files, self._cache, measurements)
-
-
-def _get_history(analysis: Analysis) -> History:
-    return analysis.history
-
-
-def _get_calibrated(analysis: Analysis) -> Measurement | None:
-    return analysis.calibrated_measurement

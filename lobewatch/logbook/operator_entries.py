@@ -20,19 +20,19 @@ from modal import ModeEdits
 def acknowledge_alarms(
     logbook: Logbook, name: str = "", until: datetime | None = None, note: str = "", operator: str = ""
 ) -> list[Alarm]:
-    """The alarm of this name, or all that ring, with the word that is now in the journal, for good.
+    """Acknowledge one alarm by name, or all active alarms, permanently.
 
-    until: without a zone local time; operator: the name of the login where empty. ValueError where nothing rings or the
-    name is of none, for an end that is past, and for a note that cannot be told again.
+    `until` ends the acknowledgement (local time without a zone). `operator` defaults to the login name. ValueError if
+    no alarm matches, if the end is past, and for a note that cannot be stored.
     """
     now = datetime.now(UTC)
     end = None if until is None else until.astimezone(UTC)
     if end is not None and end <= now:
-        raise ValueError(f"--until {until}: is past; give the day on which it is to ring again")
+        raise ValueError(f"acknowledge_alarms.until {until}: is past; give the day on which it is to ring again")
     check_name(note, "note")
     check_name(operator, "operator")
-    standing, baseline = logbook.status(now), logbook.history.baseline
-    newest, by = standing.last_tap or now, operator or _get_login_name()
+    status, baseline = logbook.status(now), logbook.history.baseline
+    newest, by = status.last_tap or now, operator or _get_login_name()
     alarms = [
         msgspec.structs.replace(
             alarm,
@@ -40,7 +40,7 @@ def acknowledge_alarms(
                 alarm.code, alarm.about, alarm.triggered_by, newest, baseline, now, by, end, note
             ),
         )
-        for alarm in select_alarms(standing.alarms, name, now)
+        for alarm in select_alarms(status.alarms, name, now)
     ]
     with logbook.folder.locked():
         logbook.folder.journal.append(*(alarm.acknowledgement.line for alarm in alarms if alarm.acknowledgement))
@@ -48,7 +48,7 @@ def acknowledge_alarms(
 
 
 def _get_login_name() -> str:
-    """Name of whoever is logged in; empty where the system does not say."""
+    """Return the login name, or an empty text if the system has none."""
     try:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):
@@ -56,10 +56,10 @@ def _get_login_name() -> str:
 
 
 def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) -> FileModes:
-    """Modes of a tap test; name: its identity, file, or a part that no other has.
+    """Fit the modes of a tap test, after storing edits of them if there are any.
 
-    edits: kept for it from now on in place of what was said before; None: nothing changes. ValueError, and nothing is
-    kept, where they cannot be done; DataError where its file is damaged.
+    `name` is the identity of the tap test, its file, or a unique part of either. ValueError, and nothing is stored, if
+    the edits do not fit. DataError if the file is damaged.
     """
     entries = [*logbook.files.by_id.values()]
     tap = find_excludable_entry(name, entries, (), str(logbook.folder.path))
@@ -67,25 +67,12 @@ def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) 
         reasons = logbook.edit_modes([tap.id], edits)
         if reasons:
             raise ValueError(f"{reasons[tap.id]}; nothing is kept")
-    now = logbook.files.by_id[tap.id]
-    logbook.folder.read(now)
-    return fit_file_modes(logbook.folder.path / now.file, by_hand=now.by_hand, sensor=logbook.machine.tap.sensor)
-
-
-def resolve_edits(edits: ModeEdits, by_fit: bool) -> ModeEdits | None:
-    """Edits to be kept, empty ones where all is taken back; None where nothing changes. ValueError for both."""
-    if edits and by_fit:
-        raise ValueError("--by-fit takes back all that is said by hand; leave --add, --drop and --fix out")
-    return edits if edits or by_fit else None
+    tap = logbook.files.by_id[tap.id]
+    logbook.folder.read(tap)
+    return fit_file_modes(logbook.folder.path / tap.file, by_hand=tap.by_hand, sensor=logbook.machine.tap.sensor)
 
 
 def store_edits(logbook: Logbook, tap_ids: Sequence[str], edits: ModeEdits) -> str:
-    """Keep what is said of the modes of these tap tests, if anything; a text on those that it cannot be done of."""
+    """Store edits of the modes of tap tests. Return a text on the tap tests that the edits do not fit."""
     reasons = logbook.edit_modes(tap_ids, edits) if edits else {}
     return "\n".join(["stored without:", *group_by_message(reasons.items())]) if reasons else ""
-
-
-def reject_edits(edits: ModeEdits) -> None:
-    """ValueError where something is said of modes though nothing is stored."""
-    if edits:
-        raise ValueError(f"{edits}: with --dry-run nothing is kept; lobewatch modes FILE shows what becomes of it")

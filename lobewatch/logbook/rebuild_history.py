@@ -1,4 +1,4 @@
-"""history.rows anew from the tap tests, with the word on every program after each of them."""
+"""Rebuild history.rows from the tap tests, with the verdict on every program after each test."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
 
 RebuildProgress = Callable[[int, int], None]
-"""Told how many tap tests are done, and of how many."""
+"""Callback for progress: number of finished tap tests, and of all."""
 
 
 @dataclass(frozen=True)
 class TapFileBytes:
-    """One tap file; empty where it is damaged."""
+    """Content of one tap file, for a worker."""
 
     entry: TapEntry
-    """Its line of the journal."""
+    """Journal entry."""
     content: bytes
-    """All of it."""
+    """Content. Empty if the file is damaged."""
     machine_toml: str
-    """The machine as it is now."""
+    """Content of machine.toml."""
 
 
 @dataclass(frozen=True, eq=False)
 class VerdictRequest:
-    """What the word on each program was after a tap test."""
+    """Request for the verdicts on all programs after one tap test, for a worker."""
 
     tools: Mapping[str, Assembly | DataError]
-    """Tools as they were known then, or why one was not, by name."""
+    """Assembly of each tool at that time, or the reason why there is none, by name."""
     machine_toml: str
-    """The machine as it is now."""
+    """Content of machine.toml."""
 
 
 def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgress = lambda _done, _of: None) -> int:
-    """Write it anew and say how many rows it has; equal bit by bit whoever works."""
+    """Rebuild history.rows and return its number of rows. The result does not depend on the workers."""
     logbook.folder.history_path.unlink(missing_ok=True)
     toml = logbook.folder.toml_text
     if workers.use_other_processes:
@@ -65,12 +65,12 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgres
 def _evaluate_all(
     logbook: Logbook, tap_ids: list[str], toml: str, workers: Workers
 ) -> Iterator[tuple[str, dict[str, Verdict]]]:
-    """The verdicts after each tap test, as far as others work them out."""
+    """Yield the verdicts of workers after each tap test; none without workers."""
     if not workers.use_other_processes:
         yield from ((tap_id, {}) for tap_id in tap_ids)
         return
-    questions = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, share_work(evaluate_programs, questions, workers, _are_verdicts), strict=True)
+    requests = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
+    yield from zip(tap_ids, share_work(evaluate_programs, requests, workers, _are_verdicts), strict=True)
 
 
 def _read_tap_bytes(logbook: Logbook, entry: TapEntry, toml: str) -> TapFileBytes:
@@ -84,7 +84,7 @@ def _make_verdict_request(logbook: Logbook, tap_id: str, toml: str) -> VerdictRe
 
 
 def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
-    """The modes in a tap file; None where it cannot be read."""
+    """Fit the modes of a tap file. None if it cannot be read."""
     with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
         path = Path(work) / "tap.h5"
         path.write_bytes(tap.content)
@@ -94,27 +94,26 @@ def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
             return None
 
 
-def evaluate_programs(question: VerdictRequest) -> dict[str, Verdict]:
-    """On all programs, by their names."""
-    machine = _parse_cached(question.machine_toml)
-    return {table.name: evaluate_program(table, question.tools[table.tool], machine) for table in machine.program}
+def evaluate_programs(request: VerdictRequest) -> dict[str, Verdict]:
+    """Evaluate all programs, by name."""
+    machine = _parse_cached(request.machine_toml)
+    return {table.name: evaluate_program(table, request.tools[table.tool], machine) for table in machine.program}
 
 
 def _is_tap_fit(tap: TapFileBytes, answer: Any) -> bool:
     return answer is None or is_fit_of(answer, tap.entry)
 
 
-def _are_verdicts(question: VerdictRequest, answer: Any) -> bool:
-    programs = {table.name: table for table in _parse_cached(question.machine_toml).program}
+def _are_verdicts(request: VerdictRequest, answer: Any) -> bool:
+    programs = {table.name: table for table in _parse_cached(request.machine_toml).program}
     return answer.keys() == programs.keys() and all(_is_verdict(programs[name], answer[name]) for name in programs)
 
 
 def _is_verdict(program: ProgramTable, answer: Any) -> bool:
-    """An unknown limit is NaN, a known one is not."""
-    known = answer.word is not Stability.UNKNOWN
-    return (
-        isinstance(answer, Verdict) and isinstance(answer.stability, Stability) and answer.program == program
-    ) and known == (answer.limit > 0)
+    """Check a verdict from a worker. Its limit is NaN if, and only if, the verdict is unknown."""
+    is_known = answer.stability is not Stability.UNKNOWN
+    is_typed = isinstance(answer, Verdict) and isinstance(answer.stability, Stability)
+    return is_typed and answer.program == program and is_known == (answer.limit > 0)
 
 
 @lru_cache(maxsize=4)

@@ -30,20 +30,20 @@ from modal import Mode
 
 @dataclass(frozen=True, eq=False)
 class ReplayPreview:
-    """What would become of one file."""
+    """Preview of the replay of one file."""
 
     file: Path
     """Path of the file."""
     stored_tap_id: str = ""
-    """The tap test that it is stored as already."""
+    """Identity of the tap test, if the file is stored already."""
     rejection: str = ""
-    """Reason why it cannot be used, and what to say of it."""
+    """Reason why the file cannot be used."""
     recording: Recording | None = None
-    """Recording as it is understood."""
+    """Recording with its facts."""
     tap: TapTest | None = None
-    """The tap test that it would be."""
+    """Tap test that a replay would store."""
     measurement: Measurement | None = None
-    """Measurement of that; its remarks hold the questions that would be asked."""
+    """Measurement of this tap test. Its remarks include the questions that it raises."""
 
 
 def preview_replay(
@@ -53,26 +53,22 @@ def preview_replay(
     progress: ReplayProgressCallback = lambda _what, _done, _of: None,
     workers: Workers = LOCAL_WORKERS,
 ) -> list[ReplayPreview]:
-    """One a file, in order of date; those that cannot be used or are stored already first.
+    """Preview the replay of recorded files, in order of date; rejected and stored files come first.
 
-    workers: who reads and fits; what they find is the same.
+    The result does not depend on the workers.
     """
-    read_files, fits = list[ReplayPreview](), dict[Path, TapFit]()
-    for preview, fit in _read_recordings(logbook, files, description, progress, workers):
-        read_files.append(preview)
-        fits |= {preview.file: fit} if fit is not None else {}
-    read_files.sort(key=_recorded_time)
-    last: dict[tuple[str, str], Mode] = {}
+    read_files = sorted(_read_recordings(logbook, files, description, progress, workers), key=_recorded_time)
+    newest_modes: dict[tuple[str, str], Mode] = {}
     previews = list[ReplayPreview]()
-    for number, preview in enumerate(read_files, 1):
-        tap = preview.tap
-        previews.append(preview if tap is None else _measure_preview(logbook, preview, tap, fits[preview.file], last))
+    for number, (preview, fit) in enumerate(read_files, 1):
+        previews.append(_measure_preview(logbook, preview, fit, newest_modes))
         progress("measure", number, len(files))
     return previews
 
 
-def _recorded_time(preview: ReplayPreview) -> float:
-    return preview.tap.circumstances.created.timestamp() if preview.tap else -math.inf
+def _recorded_time(read_file: tuple[ReplayPreview, TapFit | None]) -> float:
+    tap = read_file[0].tap
+    return tap.circumstances.created.timestamp() if tap else -math.inf
 
 
 def _read_recordings(
@@ -82,37 +78,37 @@ def _read_recordings(
     progress: ReplayProgressCallback,
     workers: Workers,
 ) -> Iterator[tuple[ReplayPreview, TapFit | None]]:
-    """Each content once; in the order of the files."""
+    """Read each content once and yield a preview of each file, in the order of the files."""
     contents, todo = StoredContents.of(logbook.folder.taps()), dict[str, Path]()
     digests, unread = compute_digests(files)
     for file, digest in digests.items():
         if contents.find_tap(digest, description) is None:
             todo.setdefault(digest, file)
     results = dict[str, InterpretedFile | str]()
-    for digest, understood in zip(todo, _interpret_all(logbook, [*todo.values()], description, workers), strict=True):
-        results[digest] = understood
+    for digest, result in zip(todo, _interpret_all(logbook, [*todo.values()], description, workers), strict=True):
+        results[digest] = result
         progress("read", len(results), len(todo))
     for file in files:
         digest = digests.get(file, "")
-        result = explain_file_error(file, unread[file]) if file in unread else results.get(digest)
-        if result is None:
+        answer = explain_file_error(file, unread[file]) if file in unread else results.get(digest)
+        if answer is None:
             yield ReplayPreview(file, stored_tap_id=contents.find_tap(digest, description) or ""), None
-        elif isinstance(result, str):
-            yield ReplayPreview(file, rejection=result), None
+        elif isinstance(answer, str):
+            yield ReplayPreview(file, rejection=answer), None
         elif todo[digest] != file:
-            yield ReplayPreview(file, stored_tap_id=result.tap.id), None
+            yield ReplayPreview(file, stored_tap_id=answer.tap.id), None
         else:
-            yield ReplayPreview(file, recording=result.recording, tap=result.tap), result.fit
+            yield ReplayPreview(file, recording=answer.recording, tap=answer.tap), answer.fit
 
 
 def _interpret_all(
     logbook: Logbook, files: Sequence[Path], description: Description, workers: Workers
 ) -> Iterator[InterpretedFile | str]:
-    """Each file in turn, or why it cannot be used; DataError as `share_work`."""
+    """Yield the interpretation of each file, or the reason why it cannot be used. Errors as `share_work`."""
     if workers.use_other_processes:
         toml = logbook.folder.toml_text
-        asked = (FileRequest.of(file, description, toml) for file in files)
-        yield from share_work(interpret_request, asked, workers, is_valid_interpretation)
+        requests = (FileRequest.of(file, description, toml) for file in files)
+        yield from share_work(interpret_request, requests, workers, is_valid_interpretation)
         return
     for file in files:
         try:
@@ -122,19 +118,21 @@ def _interpret_all(
 
 
 def _measure_preview(
-    logbook: Logbook, preview: ReplayPreview, tap: TapTest, fit: TapFit, last: dict[tuple[str, str], Mode]
+    logbook: Logbook, preview: ReplayPreview, fit: TapFit | None, newest_modes: dict[tuple[str, str], Mode]
 ) -> ReplayPreview:
-    """last: the mode followed in the newest file before it of each tool and direction."""
-    series = (tap.circumstances.tool, tap.circumstances.direction)
-    before = last.get(series) or _find_earlier_mode(logbook, tap)
+    """Measure a tap test to preview. `newest_modes` holds the newest followed mode of each tool and direction."""
+    if preview.tap is None or fit is None:
+        return preview
+    series = (preview.tap.circumstances.tool, preview.tap.circumstances.direction)
+    before = newest_modes.get(series) or _find_earlier_mode(logbook, preview.tap)
     measurement = interpret_fit(fit, logbook.machine, before)
     if measurement.followed is not None:
-        last[series] = measurement.followed
+        newest_modes[series] = measurement.followed
     return replace(preview, measurement=measurement)
 
 
 def _find_earlier_mode(logbook: Logbook, tap: TapTest) -> Mode | None:
-    """The mode that the newest stored tap test before it of the same series follows."""
+    """Find the followed mode of the newest earlier tap test of the same series."""
     about = tap.circumstances
     rows = [row for row in logbook.history.rows if (row.tool, row.direction) == (about.tool, about.direction)]
     modes = [row.mode for row in rows if row.time < about.created and row.mode is not None and not row.questions]

@@ -27,26 +27,26 @@ from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict
 
 
-def recommend_requested(logbook: Logbook, said: Mapping[str, Any], name: str | None = None) -> Recommendation:
-    """Of the cut that is said (see `build_cut_without_setting`), on all that tap tests and test cuts say of its tool.
+def recommend_requested(logbook: Logbook, cut: Mapping[str, Any], name: str | None = None) -> Recommendation:
+    """Recommend a setting for a cut, from all tap tests and test cuts of its tool.
 
-    said: its depth_mm is asked for, its speed_rpm is that of now; name: that of its program. ValueError for a cut that
-    is none, DataError where there is no tap test.
+    The cut is that of `build_cut_without_setting`: its depth_mm is kept, and its speed_rpm is the present speed. The
+    recommended program gets the name. ValueError for an invalid cut, DataError without a tap test.
     """
     machine = logbook.machine
-    table, either = build_cut_without_setting(machine, said)
+    table, either = build_cut_without_setting(machine, cut)
     table = msgspec.structs.replace(table, name=name or table.name)
     logbook.newest_tap()
-    now = said.get("speed_rpm") or find_common_speed(machine, table.tool)
-    return _recommend_cut(logbook, table, either, said.get("depth_mm"), now)
+    speed = cut.get("speed_rpm") or find_common_speed(machine, table.tool)
+    return _recommend_cut(logbook, table, either, cut.get("depth_mm"), speed)
 
 
-def recommend_for_program(logbook: Logbook, program: ProgramTable) -> Recommendation:
-    """Of a program of machine.toml whose speed or depth is asked for; what it has of both stays."""
+def _recommend_for_program(logbook: Logbook, program: ProgramTable) -> Recommendation:
+    """Recommend the missing speed or depth of a program."""
     speed, depth = (None if math.isnan(value) else value for value in (program.speed_rpm, program.depth_mm))
-    place = {"speed_rpm": speed or logbook.machine.speed.high_rpm, "depth_mm": depth or DEPTH_STEP_MM}
-    table = msgspec.structs.replace(program, **place)
-    return _recommend_cut(logbook, table, False, depth, speed, is_set=speed is not None)
+    setting = {"speed_rpm": speed or logbook.machine.speed.high_rpm, "depth_mm": depth or DEPTH_STEP_MM}
+    table = msgspec.structs.replace(program, **setting)
+    return _recommend_cut(logbook, table, False, depth, speed, is_speed_fixed=speed is not None)
 
 
 def _recommend_cut(
@@ -54,54 +54,56 @@ def _recommend_cut(
     table: ProgramTable,
     either: bool,
     depth_mm: float | None,
-    now_rpm: float | None,
-    is_set: bool = False,
+    speed_rpm: float | None,
+    is_speed_fixed: bool = False,
 ) -> Recommendation:
     machine, tool = logbook.machine, logbook.query(Analysis.assembly_or_reason, table.tool)
     at_speed = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, logbook.cuts)
-    return recommend(table, tool, machine, at_speed, either, depth_mm, now_rpm, is_set)
+    return recommend(table, tool, machine, at_speed, either, depth_mm, speed_rpm, is_speed_fixed)
 
 
 class RequestedVerdicts(NamedTuple):
-    """Answers to what was asked about."""
+    """Verdicts on requested programs, and recommendations for those that are incomplete."""
 
     verdicts: list[Verdict]
-    """Verdicts on the programs that have a speed and a depth."""
+    """Verdicts on programs with a speed and a depth."""
     recommendations: list[Recommendation]
-    """Settings of those that have not."""
+    """Recommended settings of the other programs."""
 
 
-def evaluate_requested(logbook: Logbook, names: Sequence[str], said: Mapping[str, Any]) -> RequestedVerdicts:
-    """Of the cut that is said (see `build_requested_program`), else of the programs of these names, else of all.
+def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str, Any]) -> RequestedVerdicts:
+    """Evaluate a requested cut (see `build_requested_program`), else the named programs, else all programs.
 
-    ValueError for a name or a cut that is none, DataError where there is no program or no tap test.
+    ValueError for an unknown name or an invalid cut, DataError without a program or a tap test.
     """
     machine = logbook.machine
-    if any(value is not None for value in said.values()):
+    if any(value is not None for value in cut.values()):
         if names:
-            raise ValueError("--program has its own speed, depth and tool; give either it or the options of a cut")
-        asked = build_requested_program(machine, said)
+            text = "evaluate_requested.names has its own speed, depth and tool; give either it or the options of a cut"
+            raise ValueError(text)
+        requested = build_requested_program(machine, cut)
         logbook.newest_tap()
-        return RequestedVerdicts([logbook.verdict_for(asked)], [])
+        return RequestedVerdicts([logbook.verdict_for(requested)], [])
     if not machine.all_programs:
-        add = "add one for each cut that the shop runs, or give --speed, --depth, --tool and --material"
-        raise DataError(f"{logbook.folder.toml}: no [[program]] to check; {add}")
+        fields = "ProgramTable.speed_rpm, ProgramTable.depth_mm, ProgramTable.tool and ProgramTable.material"
+        text = f"no [[program]] to check; add one for each cut that the shop runs, or give {fields}"
+        raise DataError(f"{logbook.folder.toml}: {text}")
     by_name = {table.name: table for table in machine.all_programs}
     chosen = [find_by_name(by_name, name).name for name in names] or list(by_name)
     logbook.newest_tap()
-    wanted = [table for table in machine.incomplete_programs if table.name in chosen]
-    is_judged = any(table.name in chosen for table in machine.program)
-    verdicts = logbook.verdicts(names=chosen if names else None) if is_judged else []
-    return RequestedVerdicts(verdicts, [recommend_for_program(logbook, table) for table in wanted])
+    incomplete = [table for table in machine.incomplete_programs if table.name in chosen]
+    has_complete = any(table.name in chosen for table in machine.program)
+    verdicts = logbook.verdicts(names=chosen if names else None) if has_complete else []
+    return RequestedVerdicts(verdicts, [_recommend_for_program(logbook, table) for table in incomplete])
 
 
-def propose_requested_pitch(logbook: Logbook, said: Mapping[str, Any]) -> PitchProposal:
-    """Pitches for the cut that is said (see `build_requested_program`), as deep as the tool cuts where no depth is.
+def propose_requested_pitch(logbook: Logbook, cut: Mapping[str, Any]) -> PitchProposal:
+    """Propose unequal pitches for a cut (see `build_requested_program`), at the largest depth if it has none.
 
-    ValueError for what is no cut, DataError where its tool is not known.
+    ValueError for an invalid cut, DataError if its tool was not tapped.
     """
-    machine, is_deep = logbook.machine, said.get("depth_mm") is None
-    table = build_requested_program(machine, {**said, "depth_mm": DEPTH_STEP_MM} if is_deep else said)
+    machine, is_deep = logbook.machine, cut.get("depth_mm") is None
+    table = build_requested_program(machine, {**cut, "depth_mm": DEPTH_STEP_MM} if is_deep else cut)
     if is_deep:
         name = f"{table.speed_rpm:g} rpm"
         table = msgspec.structs.replace(table, name=name, depth_mm=table.deepest_mm / MAX_PROGRAM_DEPTH_RATIO)

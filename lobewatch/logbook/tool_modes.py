@@ -17,12 +17,20 @@ from lobewatch.verdicts.uncertainty import tap_scatter_of
 from modal import Mode, select_credible_modes
 
 HALF_WIDTH_95_PER_STD = 1.96
-"""Half-width that 95 % stay within, over the standard deviation."""
+"""Half-width of a 95 % interval over the standard deviation (-)."""
+LOG_FREQUENCY_ERROR = 0.03
+"""Standard error of the logarithm of a model frequency before the fit (-)."""
+LOG_STIFFNESS_ERROR = 0.7
+"""Standard error of the logarithm of a model stiffness (-). Close modes exchange their shapes."""
+UNMATCHED_MODE_COST = 9.0
+"""Sum of squares above which a mode is not in the model (-): 9 % of frequency, or a factor of 8 of stiffness."""
+MAX_NEIGHBOR_MODES = 4
+"""Number of modes next to the followed mode that are matched at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class TappedTool:
-    """One tool with its newest tap test."""
+    """Tool with its newest tap test."""
 
     tool: str
     """Tool in the spindle."""
@@ -31,20 +39,20 @@ class TappedTool:
     time: datetime
     """Time of the tap test."""
     spindle: Spindle
-    """The model with this tool, as machine.toml has it."""
+    """Model of machine.toml with this tool."""
     mode_number: int
-    """Number of the mode followed in the model; 1 is the lowest."""
+    """Number of the followed mode in the model, from 1."""
     followed: Mode
-    """The mode followed."""
+    """Followed mode."""
     others: tuple[Mode, ...]
-    """All other modes that are believed."""
+    """All other credible modes."""
     scatter: float
-    """Standard deviation of a frequency from one mounting of the tool to the next, relative (-)."""
+    """Reclamping repeatability of a frequency: relative standard deviation (-)."""
     tolerance: float
-    """Standard error of each diameter of the drawing, relative (-)."""
+    """Relative standard error of each diameter on the drawing (-)."""
 
     def frequency_std(self, mode: Mode) -> float:
-        """Standard error of a frequency of this tap test (Hz), that of mounting the tool included."""
+        """Return the standard error of a frequency of this tap test, reclamping included (Hz)."""
         own_error = float(mode.standard_error[0])
         return math.hypot(own_error if math.isfinite(own_error) else 0.0, self.scatter * mode.frequency)
 
@@ -52,10 +60,15 @@ class TappedTool:
 def find_tapped_tools(
     logbook: Logbook, tools: Sequence[str], direction: str | None = None, mode: Sequence[int] = ()
 ) -> list[TappedTool]:
-    """The newest test of each tool in one direction (None: that of the newest test of the first tool).
+    """Find the newest tap test of each tool in one direction.
 
-    mode: number of the mode followed of each in the model; empty: [mode] model_mode of all. ValueError for one tool
-    alone or twice; DataError for one that was not tapped or has no model, and for a test in question.
+    direction
+        None for the direction of the newest tap test of the first tool.
+    mode
+        Number of the followed mode of each tool in the model. Empty for [mode] model_mode.
+
+    Raises ValueError for fewer than two tools or a tool named twice. Raises DataError for a tool without a usable tap
+    test or without a model.
     """
     _check_tools(tools, mode)
     for tool in tools:
@@ -69,21 +82,23 @@ def find_tapped_tools(
 
 def _check_tools(tools: Sequence[str], mode: Sequence[int]) -> None:
     if len(tools) < 2:
-        raise ValueError(f"--tool {tools[0]}: joint and bearings need the taps of two tools at least; name another one")
+        text = "joint and bearings need the taps of two tools at least; name another one"
+        raise ValueError(f"calibrate_joints.tools {tools[0]}: {text}")
     for tool in tools:
         if tools.count(tool) > 1:
             raise ValueError(
-                f"--tool {tool}: named {tools.count(tool)} times; name another tool, or give the same one at another "
-                "stick-out a [[tool]] and a name of its own"
+                f"calibrate_joints.tools {tool}: named {tools.count(tool)} times; name another tool, or give the same "
+                "one at another stick-out a [[tool]] and a name of its own"
             )
     if mode and len(mode) != len(tools):
-        raise ValueError(f"{len(mode)} --mode for {len(tools)} --tool; give one for each, or none")
+        numbers = f"{len(mode)} calibrate_joints.mode for {len(tools)} calibrate_joints.tools"
+        raise ValueError(f"{numbers}; give one for each, or none")
 
 
 def _find_newest_row(rows: Sequence[HistoryRow], tool: str, direction: str | None) -> HistoryRow:
-    fits = [row for row in rows if row.tool == tool and direction in (None, row.direction)]
-    if fits:
-        return fits[-1]
+    matching = [row for row in rows if row.tool == tool and direction in (None, row.direction)]
+    if matching:
+        return matching[-1]
     tapped = sorted({f"{row.tool}, {row.direction}" for row in rows})
     where = "" if direction is None else f" in direction {direction}"
     raise DataError(f"tool {tool!r} was never tapped{where}; tapped are: {'; '.join(tapped) or 'none'}; tap it first")
@@ -96,8 +111,8 @@ def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> Tapped
     if not measurement.followed.has_stiffness:
         text = "no force was measured: K, by which modes are told apart, is not known"
         raise DataError(f"{row.tap_id}: {text}; tap tool {row.tool!r} with a hammer that measures its force")
-    if asked := find_open_questions(measurement.remarks):
-        codes = ", ".join(remark.code for remark in asked)
+    if questions := find_open_questions(measurement.remarks):
+        codes = ", ".join(remark.code for remark in questions)
         raise DataError(f"{row.tap_id}: the newest test of tool {row.tool!r} is in question ({codes}); answer first")
     low, high = machine.mode.band_hz or (0.0, math.inf)
     in_band = [mode for mode in measurement.modes if low <= mode.frequency <= high]
@@ -115,32 +130,21 @@ def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> Tapped
     )
 
 
-LOG_FREQUENCY_ERROR = 0.03
-"""Of the logarithm of a frequency of a model that is not fitted to it yet."""
-LOG_STIFFNESS_ERROR = 0.7
-"""The same of a stiffness: modes that are close exchange their shapes."""
-UNMATCHED_MODE_COST = 9.0
-"""Sum of squares of these above which a mode is none of the model: 9 % of frequency, or a factor of 8 of stiffness."""
-MAX_NEIGHBOR_MODES = 4
-"""Modes of a tap test that are looked at beside the one followed, those nearest to it."""
-
-
 class ModeMatch(NamedTuple):
-    """The modes of a tap test in a model."""
+    """Modes of a tap test with their numbers in the model."""
 
     cost: float
-    """Distance from those of the model, a sum of squares."""
+    """Distance from the modes of the model, a sum of squares (-)."""
     modes: tuple[tuple[int, Mode], ...]
-    """Modes with their numbers in the model, in order."""
+    """Numbers in the model and modes, in order."""
 
 
 def assign_mode_numbers(tap: TappedTool, frequency: Sequence[float], stiffness: Sequence[float]) -> ModeMatch:
-    """The cheapest way to number the modes of a tap test, in the order of the model, the one followed as it is known.
+    """Assign model numbers to the modes of a tap test at the least cost, in the order of the model.
 
-    frequency (Hz), stiffness (N/m): of the modes of the model where it was tapped. What fits none is left out, at a
-    cost.
+    The followed mode keeps its number. Another mode may stay without a number, at a cost. `frequency` (Hz) and
+    `stiffness` (N/m) are those of the model at the tapped point.
     """
-
     measured = sorted([tap.followed, *select_neighbor_modes(tap)], key=lambda mode: mode.frequency)
     best = [ModeMatch(0.0, ())] * (len(frequency) + 1)
     for mode in measured:
@@ -148,15 +152,15 @@ def assign_mode_numbers(tap: TappedTool, frequency: Sequence[float], stiffness: 
         row = [ModeMatch(best[0].cost + skipped, best[0].modes)]
         for number, model in enumerate(zip(frequency, stiffness, strict=True), 1):
             pair = _match_cost(mode, *model) if (mode is tap.followed) == (number == tap.mode_number) else math.inf
-            taken = ModeMatch(best[number - 1].cost + pair, (*best[number - 1].modes, (number, mode)))
-            left = ModeMatch(best[number].cost + skipped, best[number].modes)
-            row.append(min(taken, left, row[-1], key=lambda candidate: candidate.cost))
+            matched = ModeMatch(best[number - 1].cost + pair, (*best[number - 1].modes, (number, mode)))
+            unmatched = ModeMatch(best[number].cost + skipped, best[number].modes)
+            row.append(min(matched, unmatched, row[-1], key=lambda candidate: candidate.cost))
         best = row
     return best[-1]
 
 
 def select_neighbor_modes(tap: TappedTool) -> list[Mode]:
-    """Those other modes of a tap test that are looked at."""
+    """Select the modes nearest to the followed mode."""
 
     def distance(mode: Mode) -> float:
         return abs(math.log(mode.frequency / tap.followed.frequency))
@@ -165,9 +169,6 @@ def select_neighbor_modes(tap: TappedTool) -> list[Mode]:
 
 
 def _match_cost(mode: Mode, frequency: float, stiffness: float) -> float:
-    """Of taking it for this one of the model."""
-    apart = (
-        math.log(mode.frequency / frequency) / LOG_FREQUENCY_ERROR,
-        math.log(mode.stiffness / stiffness) / LOG_STIFFNESS_ERROR,
-    )
-    return apart[0] ** 2 + apart[1] ** 2
+    frequency_distance = math.log(mode.frequency / frequency) / LOG_FREQUENCY_ERROR
+    stiffness_distance = math.log(mode.stiffness / stiffness) / LOG_STIFFNESS_ERROR
+    return frequency_distance**2 + stiffness_distance**2

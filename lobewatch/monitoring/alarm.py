@@ -16,7 +16,7 @@ from acquisition import Remark
 from lobewatch.machine.journal.entries import Acknowledgement, format_alarm_id
 
 
-class Alarm(msgspec.Struct, frozen=True):
+class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "triggered_at": "raised"}):
     """A reason with an active alarm. Its identity is the alarm, of what, and the tap test that first triggered it."""
 
     code: str

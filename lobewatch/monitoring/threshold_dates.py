@@ -15,7 +15,7 @@ UNIX_EPOCH = date(1970, 1, 1)
 INF = math.inf
 
 
-class ThresholdDates(msgspec.Struct, frozen=True):
+class ThresholdDates(msgspec.Struct, frozen=True, rename={"forecast_end": "foretold_to"}):
     """When a level is reached, in days since 1970; it may be past where nobody has tapped since."""
 
     is_measured: bool = False

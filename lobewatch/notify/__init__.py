@@ -1,1 +1,1 @@
-"""How a machine stands, told to those who are not looking: other programs, and the next who asks."""
+"""Publish the status of machines to MQTT brokers and Prometheus."""

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -17,32 +17,36 @@ from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
 
 MQTT_TIMEOUT = 4.0
-"""Time for all brokers together, from the lookup of their names to the last acknowledgement (s); chosen."""
+"""Time for all brokers together, from the name lookup to the last acknowledgement (s); chosen."""
 MQTT_KEEP_ALIVE = 10
-"""Time between signs of life (s); after half as long again without one the broker takes the sender for lost."""
+"""Keep-alive interval (s). The broker drops the sender after 1.5 intervals."""
 SENDER_LOST_MESSAGE, SENDER_DONE_MESSAGE = (msgspec.json.encode({"sender": word}) for word in ("lost", "done"))
-"""Messages at PREFIX/sender: the last will of a sender that broke off, and the word of one that has told all."""
+"""Messages at PREFIX/sender: last will of a lost sender, and end of a complete transmission."""
+
+OUTBOX_FILE = "unsent.json"
+"""File of an undelivered message in the folder of its machine."""
+Content = TypeVar("Content")
 
 
 def send_messages(batches: Mapping[Broker, Mapping[str, bytes]]) -> dict[Broker, str]:
-    """Put messages, by broker and topic, where they stay: to all brokers at once, for PATIENCE at most.
+    """Publish retained messages, by broker and topic, to all brokers at once within MQTT_TIMEOUT.
 
-    Returns why not, for each broker that has not acknowledged all.
+    Returns the reason for each broker that has not acknowledged all messages.
     """
     end = time.monotonic() + MQTT_TIMEOUT
-    sendings = {broker: BrokerThread(broker, messages, end) for broker, messages in batches.items()}
-    for sending in sendings.values():
-        sending.start()
-    for sending in sendings.values():
-        sending.join(max(end - time.monotonic(), 0.0))
-    return {broker: why for broker, sending in sendings.items() if (why := sending.failure)}
+    threads = {broker: _BrokerThread(broker, messages, end) for broker, messages in batches.items()}
+    for thread in threads.values():
+        thread.start()
+    for thread in threads.values():
+        thread.join(max(end - time.monotonic(), 0.0))
+    return {broker: failure for broker, thread in threads.items() if (failure := thread.failure)}
 
 
-class BrokerThread(threading.Thread):
-    """One attempt to send to one broker; left behind where it does not end, for nothing ends a lookup that hangs."""
+class _BrokerThread(threading.Thread):
+    """Attempt to send to one broker. A thread that hangs in a name lookup is left behind."""
 
     def __init__(self, broker: Broker, messages: Mapping[str, bytes], end: float) -> None:
-        """end: when nobody waits for it any more (monotonic clock, s)."""
+        """Prepare the attempt. `end` is its deadline (monotonic clock, s)."""
         super().__init__(name=f"to {broker.address}", daemon=True)
         self._broker, self._end = broker, end
         self._messages = {**messages, f"{broker.prefix}/sender": SENDER_DONE_MESSAGE}
@@ -50,7 +54,7 @@ class BrokerThread(threading.Thread):
         self._set_stage("cannot be reached")
 
     def run(self) -> None:
-        """Send all, or set down why not; without its last word the broker publishes the last will."""
+        """Send all messages or set `failure`. Without a disconnect the broker publishes the last will."""
         client = None
         try:
             client = self._make_client()
@@ -58,19 +62,19 @@ class BrokerThread(threading.Thread):
             self._exchange(client)
         except DataError as error:
             self.failure = f"{self._broker.address}: {error}"
-        except Exception as error:  # noqa: BLE001  (what paho does with the bytes of a stranger is not for us to say)
+        except Exception as error:  # noqa: BLE001 - paho may raise anything for foreign bytes
             self.failure = f"{self._broker.address}: {self._stage} ({error})"
         finally:
             if client is not None and (connection := client.socket()) is not None:
                 connection.close()
 
     def _set_stage(self, stage: str) -> None:
-        """Set down what is to be said where it goes no further than this."""
+        """Set the failure that holds unless a later stage is reached."""
         self._stage = stage
         self.failure = f"{self._broker.address}: {stage} within {MQTT_TIMEOUT:g} s"
 
     def _make_client(self) -> Any:
-        """Client of paho, not connected yet; DataError without paho."""
+        """Make an unconnected paho client. DataError without paho."""
         try:
             from paho.mqtt import client as paho
             from paho.mqtt.enums import CallbackAPIVersion
@@ -90,7 +94,7 @@ class BrokerThread(threading.Thread):
         return client
 
     def _exchange(self, client: Any) -> None:
-        """Read and write until all is acknowledged, or nobody waits any more; DataError where a message is refused."""
+        """Read and write until all is acknowledged or the deadline is over. DataError for a rejected message."""
         from paho.mqtt.client import error_string
 
         while self._n_left:
@@ -104,7 +108,7 @@ class BrokerThread(threading.Thread):
         self.failure = ""
 
     def _on_socket_open(self, *_: Any) -> None:
-        """Refuse to begin when another attempt may be under way already."""
+        """Give up after the deadline, when another attempt may have begun."""
         if time.monotonic() > self._end:
             raise TimeoutError
         self._set_stage("does not answer")
@@ -122,15 +126,11 @@ class BrokerThread(threading.Thread):
         self._n_left -= 1
 
 
-OUTBOX_FILE = "unsent.json"
-"""Name of the file of such a message, in the folder of its machine."""
-
-
 class OutboxMessage(msgspec.Struct, frozen=True):
-    """The newest message of a machine; it stands for all before it."""
+    """Newest undelivered message of a machine. It replaces all earlier ones."""
 
     topic: str
-    """Topic that it is to stand at."""
+    """Topic of the message."""
     message: msgspec.Raw
     """Message as JSON."""
     broker: tuple[str, str, int]
@@ -138,9 +138,9 @@ class OutboxMessage(msgspec.Struct, frozen=True):
 
 
 def deliver_messages(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]]) -> dict[Broker, str]:
-    """Send messages (topic and content, by broker and machine folder) with those left over beside.
+    """Send messages (topic and content, by broker and machine folder) and those in the outboxes of other machines.
 
-    Returns why not, for each broker that did not take all. What does not go is kept beside its machine.
+    Returns the reason for each broker that did not take all. Undelivered messages go to the outbox of their machine.
     """
     fresh = {folder.resolve() for messages in batches.values() for folder in messages}
     pending = {broker: _read_outboxes(broker, messages, fresh) | dict(messages) for broker, messages in batches.items()}
@@ -155,19 +155,24 @@ def deliver_messages(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]])
 
 
 def _read_outboxes(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) -> dict[Path, tuple[str, bytes]]:
-    """Messages to the same broker, of machines beside these but for those with a fresh one."""
+    """Read the outboxes for a broker in the parent folders, except of machines with a fresh message."""
     messages = {}
-    places = {folder.resolve().parent for folder in folders}
-    for path in sorted(path for place in places for path in place.glob(f"*/{OUTBOX_FILE}") if path.parent not in fresh):
-        try:
-            unsent = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=OutboxMessage)
-        except (OSError, ValueError, RecursionError):
-            continue
-        if tuple(unsent.broker) == tuple(broker[:3]):
-            messages[path.parent] = unsent.topic, bytes(unsent.message)
+    parents = {folder.resolve().parent for folder in folders}
+    for path in sorted(path for parent in parents for path in parent.glob(f"*/{OUTBOX_FILE}")):
+        outbox = None if path.parent in fresh else read_json(path, OutboxMessage)
+        if outbox is not None and tuple(outbox.broker) == tuple(broker[:3]):
+            messages[path.parent] = outbox.topic, bytes(outbox.message)
     return messages
 
 
-def _write_outbox(folder: Path, unsent: OutboxMessage) -> None:
+def _write_outbox(folder: Path, outbox: OutboxMessage) -> None:
     with contextlib.suppress(DataError, OSError), MachineFolder(folder).locked(patience=0):
-        atomic_write(folder / OUTBOX_FILE, msgspec.json.encode(unsent))
+        atomic_write(folder / OUTBOX_FILE, msgspec.json.encode(outbox))
+
+
+def read_json(path: Path, kind: type[Content]) -> Content | None:
+    """Read a small JSON file of a type. None if it cannot be read."""
+    try:
+        return msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=kind)
+    except (OSError, ValueError, RecursionError):
+        return None

@@ -1,4 +1,4 @@
-"""The operator's screen in a browser: pages that follow a tap test and a cut, and a dashboard of machines."""
+"""Operator's screen in a browser: pages of live tap tests and cut recordings, and a dashboard of machines."""
 
 import lazy_loader
 

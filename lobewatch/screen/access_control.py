@@ -1,7 +1,7 @@
 """Limit connections and check host, origin and token of every request.
 
-Whoever can reach the port could otherwise open connections until the process has no descriptors left, and the tap test
-that runs in it could neither write a hit nor open the device again.
+Without a limit, anyone who reaches the port could use up the descriptors of the process. Then a running tap test could
+neither store a hit nor reopen the device.
 """
 
 from __future__ import annotations
@@ -19,170 +19,34 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
 from aiohttp import web
-from aiohttp.typedefs import Handler, Middleware
+from aiohttp.typedefs import Handler
 from yarl import URL
 
 from acquisition.errors import format_error
+from lobewatch.show.terminal.option_names import with_option_names
 
 MAX_CONNECTIONS = 64
-"""Number of connections at a time."""
+"""Number of open connections at most."""
 MAX_ANONYMOUS_PER_NETWORK = 8
-"""Number of them from one address that have not shown a token; a browser opens six, and one for the feed."""
+"""Number of connections without a token from one network at most. A browser opens six and one for the feed."""
 REQUEST_HEAD_TIMEOUT = 10.0
-"""Time that a stranger may take for the head of a request, and to take the answer (s)."""
+"""Time for a request head or a response without a token (s)."""
 IDLE_TIMEOUT = 75.0
-"""Time that whoever has shown a token may be silent between two requests (s)."""
+"""Time between two requests of a connection with a token (s)."""
 RESERVED_DESCRIPTORS = 64
-"""Number of descriptors that stay free for the disk and the device, whatever knocks."""
+"""Number of descriptors reserved for the disk and the device."""
 UNLIMITED_DESCRIPTORS = 1 << 20
-"""Number of descriptors where the system names no limit."""
+"""Number of descriptors if the system has no limit."""
 ACCEPT_INTERVAL = 0.002
-"""Time between two connections that are let in, and between two answers to strangers (s): a flood of them costs
-little, and a page needs seven."""
+"""Time between two accepted connections, and between two responses without a token (s). It slows a flood down."""
 LISTEN_BACKLOG = 128
-"""Number of connections that wait in the system to be let in."""
-
-
-@dataclass(eq=False)
-class ClientConnection:
-    """One connection."""
-
-    socket: socket.socket
-    """Socket of the connection, closed by its transport; its number is negative then."""
-    network: str
-    """Address or network that it comes from; connections are counted by this."""
-    transport: asyncio.Transport
-    """Transport of the connection."""
-    has_token: bool = False
-    """Whether it has shown a token."""
-    timer: asyncio.TimerHandle | None = None
-    """Timer that hangs up; None while a request is answered."""
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it still holds a descriptor."""
-        return self.socket.fileno() >= 0
-
-    def start_timer(self) -> None:
-        """Hang up where it is not heard, or has not taken its answer, in time."""
-        self.stop_timer()
-        patience = IDLE_TIMEOUT if self.has_token else REQUEST_HEAD_TIMEOUT
-        self.timer = asyncio.get_running_loop().call_later(patience, self.transport.abort)
-
-    def stop_timer(self) -> None:
-        """Stop the timer: it is being answered, which may take as long as it takes."""
-        if self.timer is not None:
-            self.timer.cancel()
-        self.timer = None
-
-
-class ConnectionLimiter:
-    """Lets connections in to a web application; to be used in one event loop."""
-
-    def __init__(self) -> None:
-        """Nobody is in."""
-        self._connections: list[ClientConnection] = []
-        self._anonymous_lock = asyncio.Lock()
-
-    @property
-    def connection_count(self) -> int:
-        """Number of connections."""
-        return sum(guest.is_open for guest in self._connections)
-
-    async def serve(self, listener: socket.socket, server: web.Server) -> None:
-        """Let in whoever comes, until cancelled."""
-        loop = asyncio.get_running_loop()
-        while True:
-            try:
-                connection, address = await loop.sock_accept(listener)
-            except OSError:  # it has gone already, or there is no descriptor for it
-                await asyncio.sleep(10 * ACCEPT_INTERVAL)
-                continue
-            place = get_client_network(address[0])
-            if self._can_accept(connection, place):
-                transport, _ = await loop.connect_accepted_socket(server, connection)
-                guest = ClientConnection(connection, place, transport)
-                guest.start_timer()
-                self._connections.append(guest)
-            else:
-                connection.close()
-            await asyncio.sleep(ACCEPT_INTERVAL)
-
-    @contextlib.asynccontextmanager
-    async def hold_connection(self, request: web.Request) -> AsyncIterator[None]:
-        """Keep the connection of a request while that is answered; strangers are answered one after the other."""
-        guest = self._find_connection(request)
-        if guest is None:
-            yield
-            return
-        guest.stop_timer()
-        try:
-            if not guest.has_token:
-                async with self._anonymous_lock:
-                    await asyncio.sleep(ACCEPT_INTERVAL)
-            yield
-        finally:
-            guest.start_timer()
-
-    def trust(self, request: web.Request) -> None:
-        """Note that whoever sent this has shown a token."""
-        guest = self._find_connection(request)
-        if guest is not None:
-            guest.has_token = True
-
-    def _find_connection(self, request: web.Request) -> ClientConnection | None:
-        return next((guest for guest in self._connections if guest.transport is request.transport), None)
-
-    def _can_accept(self, connection: socket.socket, place: str) -> bool:
-        """Whether one more may come in; for it, the one that has been silent longest without a token may have to go."""
-        self._connections = [guest for guest in self._connections if guest.is_open]
-        if connection.fileno() >= _max_descriptors() - RESERVED_DESCRIPTORS:  # numbers are given lowest first
-            return False
-        strangers = [guest for guest in self._connections if not guest.has_token]
-        strangers.sort(key=lambda guest: guest.timer is None)
-        near = [guest for guest in strangers if guest.network == place]
-        if len(near) >= MAX_ANONYMOUS_PER_NETWORK:
-            self._drop_connection(near[0])
-        elif len(self._connections) >= MAX_CONNECTIONS and strangers:
-            self._drop_connection(strangers[0])
-        return len(self._connections) < MAX_CONNECTIONS
-
-    def _drop_connection(self, guest: ClientConnection) -> None:
-        guest.stop_timer()
-        guest.transport.abort()
-        self._connections.remove(guest)
-
-
-def get_client_network(host: str) -> str:
-    """IPv4 address, or the network of 64 bits of an IPv6 address: one computer may have all of its addresses."""
-    address = ipaddress.ip_address(host.partition("%")[0])
-    return str(address) if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
-
-
-def open_listener(host: str, port: int) -> socket.socket:
-    """A socket that listens at an address of this computer; OSError or ValueError where it cannot be had."""
-    family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
-    listener = socket.create_server((str(address[0]), int(address[1])), family=family, backlog=LISTEN_BACKLOG)
-    listener.setblocking(False)
-    return listener
-
-
-def _max_descriptors() -> int:
-    """Number of descriptors that this process may have."""
-    if sys.platform == "win32":
-        return UNLIMITED_DESCRIPTORS
-    import resource
-
-    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    return limit if limit != resource.RLIM_INFINITY else UNLIMITED_DESCRIPTORS
-
-
+"""Number of connections that wait in the system."""
 PUBLIC_ROUTE_PREFIX = "open-"
-"""Beginning of the name of a route that answers without a token; it must neither tell nor alter anything."""
+"""Prefix of the names of routes without a token. They must not reveal or change anything."""
 WATCH_ROUTE_PREFIX = "watch-"
-"""Beginning of the name of a route that alters nothing although it is not asked by GET."""
+"""Prefix of the names of routes that change nothing, although their method is not GET."""
 HAS_FULL_ACCESS = web.RequestKey("HAS_FULL_ACCESS", bool)
-"""Whether the token of a request is the full one."""
+"""Whether a request has the full token."""
 RESPONSE_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -195,8 +59,142 @@ RESPONSE_HEADERS = {
 _log = logging.getLogger(__name__)
 
 
+@dataclass(eq=False)
+class ClientConnection:
+    """Connection of a client."""
+
+    socket: socket.socket
+    """Socket of the connection. Its number is negative after the transport has closed it."""
+    network: str
+    """Address or network of the client; connections are counted by it."""
+    transport: asyncio.Transport
+    """Transport of the connection."""
+    has_token: bool = False
+    """Whether the client has shown a valid token."""
+    timer: asyncio.TimerHandle | None = None
+    """Timer that closes the connection. None while a request is answered."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the connection still has a descriptor."""
+        return self.socket.fileno() >= 0
+
+    def start_timer(self) -> None:
+        """Close the connection unless the next request or the end of the response comes in time."""
+        self.stop_timer()
+        patience = IDLE_TIMEOUT if self.has_token else REQUEST_HEAD_TIMEOUT
+        self.timer = asyncio.get_running_loop().call_later(patience, self.transport.abort)
+
+    def stop_timer(self) -> None:
+        """Stop the timer while a request is answered."""
+        if self.timer is not None:
+            self.timer.cancel()
+        self.timer = None
+
+
+class ConnectionLimiter:
+    """Accepts a limited number of connections for a web application, in one event loop."""
+
+    def __init__(self) -> None:
+        """Start without connections."""
+        self._connections: list[ClientConnection] = []
+        self._anonymous_lock = asyncio.Lock()
+
+    @property
+    def connection_count(self) -> int:
+        """Number of open connections."""
+        return sum(client.is_open for client in self._connections)
+
+    async def serve(self, listener: socket.socket, server: web.Server) -> None:
+        """Accept connections until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                connection, address = await loop.sock_accept(listener)
+            except OSError:  # the client is gone, or no descriptor is left
+                await asyncio.sleep(10 * ACCEPT_INTERVAL)
+                continue
+            network = get_client_network(address[0])
+            if self._can_accept(connection, network):
+                transport, _ = await loop.connect_accepted_socket(server, connection)
+                client = ClientConnection(connection, network, transport)
+                client.start_timer()
+                self._connections.append(client)
+            else:
+                connection.close()
+            await asyncio.sleep(ACCEPT_INTERVAL)
+
+    @contextlib.asynccontextmanager
+    async def hold_connection(self, request: web.Request) -> AsyncIterator[None]:
+        """Keep a connection open while its request is answered. Requests without a token wait in turn."""
+        client = self._find_connection(request)
+        if client is None:
+            yield
+            return
+        client.stop_timer()
+        try:
+            if not client.has_token:
+                async with self._anonymous_lock:
+                    await asyncio.sleep(ACCEPT_INTERVAL)
+            yield
+        finally:
+            client.start_timer()
+
+    def trust(self, request: web.Request) -> None:
+        """Mark the connection of a request as one with a valid token."""
+        client = self._find_connection(request)
+        if client is not None:
+            client.has_token = True
+
+    def _find_connection(self, request: web.Request) -> ClientConnection | None:
+        return next((client for client in self._connections if client.transport is request.transport), None)
+
+    def _can_accept(self, connection: socket.socket, network: str) -> bool:
+        """Return whether to accept a connection. The oldest idle connection without a token may be dropped for it."""
+        self._connections = [client for client in self._connections if client.is_open]
+        if connection.fileno() >= _max_descriptors() - RESERVED_DESCRIPTORS:  # the system gives the lowest number
+            return False
+        anonymous = [client for client in self._connections if not client.has_token]
+        anonymous.sort(key=lambda client: client.timer is None)
+        same_network = [client for client in anonymous if client.network == network]
+        if len(same_network) >= MAX_ANONYMOUS_PER_NETWORK:
+            self._drop_connection(same_network[0])
+        elif len(self._connections) >= MAX_CONNECTIONS and anonymous:
+            self._drop_connection(anonymous[0])
+        return len(self._connections) < MAX_CONNECTIONS
+
+    def _drop_connection(self, client: ClientConnection) -> None:
+        client.stop_timer()
+        client.transport.abort()
+        self._connections.remove(client)
+
+
+def get_client_network(host: str) -> str:
+    """Return an IPv4 address, or the 64-bit network of an IPv6 address, which one computer may own."""
+    address = ipaddress.ip_address(host.partition("%")[0])
+    return str(address) if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
+
+
+def open_listener(host: str, port: int) -> socket.socket:
+    """Open a socket that listens at an address of this computer. OSError or ValueError if that fails."""
+    family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+    listener = socket.create_server((str(address[0]), int(address[1])), family=family, backlog=LISTEN_BACKLOG)
+    listener.setblocking(False)
+    return listener
+
+
+def _max_descriptors() -> int:
+    """Return the number of descriptors that this process may open."""
+    if sys.platform == "win32":
+        return UNLIMITED_DESCRIPTORS
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return limit if limit != resource.RLIM_INFINITY else UNLIMITED_DESCRIPTORS
+
+
 def check_token(token: str | None) -> str:
-    """Token that fits into an address and a header; a new one for None. ValueError for one that does not fit."""
+    """Check a token, or make one for None. ValueError for a token that does not fit into an address."""
     if token is None:
         return secrets.token_urlsafe(24)
     if not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
@@ -206,30 +204,52 @@ def check_token(token: str | None) -> str:
 
 @dataclass(frozen=True)
 class AccessTokens:
-    """Tokens, one of which a browser must know."""
+    """Tokens of a server; a browser must send one of them."""
 
     full: str
-    """Token to see and alter."""
+    """Token for full access."""
     watch: str
-    """Token only to see."""
+    """Token for read-only access."""
 
 
 def check_tokens(full: str | None, watch: str | None) -> AccessTokens:
-    """Both tokens, each a new one for None. ValueError for one that does not fit into an address, and for one twice."""
+    """Check both tokens, or make them for None. ValueError for an invalid token and for equal tokens."""
     tokens = AccessTokens(check_token(full), check_token(watch))
     if tokens.full == tokens.watch:
         raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
     return tokens
 
 
-def make_guarded_application(tokens: AccessTokens, listen: str, door: ConnectionLimiter) -> web.Application:
-    """Application that answers only to its own page, tells nothing without a token, alters nothing without the
-    full one."""
-    application = web.Application(
-        middlewares=[_make_timer_middleware(door), _make_access_middleware(tokens, listen, door)], client_max_size=4096
-    )
+def make_guarded_application(tokens: AccessTokens, listen: str, limiter: ConnectionLimiter) -> web.Application:
+    """Make an application that serves only its own pages, needs a token, and needs the full token for changes."""
+
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        async with limiter.hold_connection(request):
+            try:
+                _check_host(request, listen)
+                _check_origin(request)
+                name = request.match_info.route.name or ""
+                if not name.startswith(PUBLIC_ROUTE_PREFIX):
+                    changes = request.method != "GET" and not name.startswith(WATCH_ROUTE_PREFIX)
+                    _check_request_token(request, tokens, changes)
+                    limiter.trust(request)
+                return await handler(request)
+            except web.HTTPException as error:
+                return _respond_with_error(error.text or error.reason, error.status)
+            except (ValueError, OSError) as error:
+                return _respond_with_error(format_error(error), 409)
+            except Exception:  # noqa: BLE001 - the traceback goes to the log, not to the page
+                _log.exception("%s %s failed", request.method, request.path)
+                return _respond_with_error("lobewatch failed here; see its terminal", 500)
+
+    application = web.Application(middlewares=[guard], client_max_size=4096)
     application.on_response_prepare.append(_add_headers)
     return application
+
+
+def _respond_with_error(text: str, status: int) -> web.Response:
+    return web.json_response({"error": with_option_names(text)}, status=status)
 
 
 async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
@@ -237,42 +257,8 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
         response.headers.setdefault(name, value)
 
 
-def _make_timer_middleware(door: ConnectionLimiter) -> Middleware:
-    @web.middleware
-    async def attend(request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Answer a request whose head has come; its connection is not hung up before."""
-        async with door.hold_connection(request):
-            return await handler(request)
-
-    return attend
-
-
-def _make_access_middleware(tokens: AccessTokens, listen: str, door: ConnectionLimiter) -> Middleware:
-    @web.middleware
-    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-        try:
-            _check_host(request, listen)
-            _check_origin(request)
-            name = request.match_info.route.name or ""
-            if not name.startswith(PUBLIC_ROUTE_PREFIX):
-                _check_request_token(
-                    request, tokens, alters=request.method != "GET" and not name.startswith(WATCH_ROUTE_PREFIX)
-                )
-                door.trust(request)
-            return await handler(request)
-        except web.HTTPException as refusal:
-            return web.json_response({"error": refusal.text or refusal.reason}, status=refusal.status)
-        except (ValueError, OSError) as error:
-            return web.json_response({"error": format_error(error)}, status=409)
-        except Exception:  # noqa: BLE001 - the page must not see a traceback, the log must
-            _log.exception("%s %s failed", request.method, request.path)
-            return web.json_response({"error": "lobewatch failed here; see its terminal"}, status=500)
-
-    return guard
-
-
 def _check_host(request: web.Request, listen: str) -> None:
-    """Refuse a host that is no address in figures and not our own name: it may be another page's trick."""
+    """Reject a host name that is neither numeric nor our own, against DNS rebinding."""
     try:
         host = URL(f"http://{request.host}").host or ""
     except ValueError:
@@ -285,22 +271,22 @@ def _check_host(request: web.Request, listen: str) -> None:
 
 
 def _check_origin(request: web.Request) -> None:
-    """Refuse what comes from another page; what alters something or opens a feed must come from our own."""
+    """Reject requests of other pages. Changes and feeds must come from our own page."""
     origin = request.headers.get("Origin")
-    must = request.method != "GET" or "Upgrade" in request.headers
-    if origin != f"http://{request.host}" and (must or origin is not None):
+    needs_origin = request.method != "GET" or "Upgrade" in request.headers
+    if origin != f"http://{request.host}" and (needs_origin or origin is not None):
         raise web.HTTPForbidden(text="this request does not come from lobewatch's own page")
 
 
-def _check_request_token(request: web.Request, tokens: AccessTokens, alters: bool) -> None:
-    """Refuse without a token in the header Authorization, or for a WebSocket, which has none, among its protocols."""
+def _check_request_token(request: web.Request, tokens: AccessTokens, changes: bool) -> None:
+    """Reject a request without a token in its Authorization header or, for a WebSocket, in its protocols."""
     given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
     protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
     given += [name.strip().removeprefix("token.") for name in protocols]
     request[HAS_FULL_ACCESS] = _matches_any(given, tokens.full)
     if not request[HAS_FULL_ACCESS] and not _matches_any(given, tokens.watch):
         raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")
-    if alters and not request[HAS_FULL_ACCESS]:
+    if changes and not request[HAS_FULL_ACCESS]:
         raise web.HTTPForbidden(text="this address is only to watch; open the other one that lobewatch printed")
 
 

@@ -9,7 +9,6 @@ import gzip
 import secrets
 import sys
 import threading
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -25,8 +24,8 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.prometheus import PROMETHEUS_CONTENT_TYPE, format_prometheus
 from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.access_control import HAS_FULL_ACCESS, PUBLIC_ROUTE_PREFIX, WATCH_ROUTE_PREFIX
-from lobewatch.screen.machine_table import MachineTable
-from lobewatch.screen.web_server import WebServerThread, add_pages, add_session
+from lobewatch.screen.dashboard_table import DashboardTable
+from lobewatch.screen.web_server import WebServerThread, add_pages, add_session, read_body
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.hit_loop import TapStopped
@@ -34,91 +33,73 @@ from lobewatch.tap.session import TapSession, plan_session
 from lobewatch.tap.state import TapState, TapStep
 from lobewatch.tap.visit import TapVisit
 
+REPORT_POLICY = (
+    f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
+    "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
+)
+"""Content security policy of reports: inline styles, and no scripts but those of reports."""
+MIN_GZIP_BYTES = 1_000_000
+"""Smallest size of a response that is compressed (bytes); chosen."""
 
-def release_memory() -> None:
-    """Give back what nobody refers to any more, and what lies free between what is in use.
 
-    Pictures are circles of objects, which Python keeps until it has made as many others; the C library of Linux keeps
-    what is free for each thread that has once needed it. Together that is 50 MB and more after a few dozen reports.
+def _release_memory() -> None:
+    """Return unused memory to the system.
+
+    Figures are reference cycles, which Python collects late, and the C library of Linux keeps free memory for each
+    thread. Together that exceeds 50 MB after a few dozen reports.
     """
     gc.collect()
     if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc alone
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc only
         if trim is not None:
             trim(0)
 
 
-class LiveTest:
-    """A tap test, and those chosen after it, in a thread of its own from the beginning on."""
+class LiveTest(TapVisit):
+    """Tap test started from the dashboard, and the tests chosen after it, in a thread of their own."""
 
     def __init__(self, folder: MachineFolder, direction: TapDirection, *, resume: bool = True) -> None:
-        """Begin, or go on with an interrupted test; DataError where machine.toml names no port."""
+        """Start a test, or resume an interrupted one. DataError if machine.toml names no port."""
         if not folder.machine.daq.port:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
-        self._folder = folder
-        self._resume = resume
-        self._visit = TapVisit(self._plan, folder.machine.tap.tool, direction, after=self._publish)
-        self._end: TapState | None = None
+
+        def plan(tool: str, direction: TapDirection) -> TapSession:
+            return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume)
+
+        def publish(_: TapSession) -> None:
+            publish_status(Logbook.open(folder.path))
+
+        super().__init__(plan, folder.machine.tap.tool, direction, after=publish)
+        self._final_state: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()
 
     @property
     def state(self) -> TapState:
-        """Newest state of the test, also after its end."""
-        return self._end or self._visit.state
+        """Newest state, also after the end."""
+        return self._final_state or super().state
 
     @property
-    def wakes(self) -> set[Callable[[], None]]:
-        """Functions that are called after every change but that of the end by `stop`."""
-        return self._visit.wakes
+    def is_running(self) -> bool:
+        """Whether the test uses the device. A failed test does not."""
+        return self._thread.is_alive() and not self.is_waiting and self.state.word is not TapStep.FAILED
 
-    @property
-    def running(self) -> bool:
-        """Whether it holds the device; where it has failed it gives it back."""
-        return self._thread.is_alive() and not self._visit.is_waiting and self.state.word is not TapStep.FAILED
-
-    def undo(self) -> None:
-        """Take the last good hit back."""
-        self._visit.undo()
-
-    def stop(self) -> None:
-        """End it; the hits so far stay in the spool."""
-        self._visit.stop()
-
-    def choose(self, key: str, tool: str = "") -> None:
-        """Say what comes after a test."""
-        self._visit.choose(key, tool)
-
-    def join(self) -> None:
-        """Wait until it has given the device back."""
+    def end(self) -> None:
+        """Stop the test and wait until the device is free. Its hits stay in the spool."""
+        self.stop()
         self._thread.join()
-
-    def _plan(self, tool: str, direction: TapDirection) -> TapSession:
-        return plan_session(MachineFolder(self._folder.path), tool=tool, direction=direction, resume=self._resume)
-
-    def _publish(self, *_: object) -> None:
-        publish_status(Logbook.open(self._folder.path))
 
     def _run(self) -> None:
         try:
-            self._visit.run()
+            self.run()
         except TapStopped:
-            state = self._visit.state
+            state = self.state
             reason = f"Stopped with {state.good} good hits: START goes on with them."
-            self._end = replace(state, word=TapStep.FAILED, reason=reason)
+            self._final_state = replace(state, word=TapStep.FAILED, reason=reason)
         except (OSError, RuntimeError, ValueError):
-            pass  # the session shows its failure itself
+            pass  # the state shows the failure
         finally:
-            release_memory()
-
-
-REPORT_POLICY = (
-    f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
-    "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
-)
-"""A report has its style in it, and runs the scripts of reports alone."""
-MIN_GZIP_BYTES = 1_000_000
-"""Bytes from which on a list of machines is sent packed, which is worth its time; chosen."""
+            _release_memory()
 
 
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -126,11 +107,11 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     direction: TapDirection
     resume: bool = True
-    """Whether an interrupted test of the same tool and direction is gone on with."""
+    """Whether to resume an interrupted test of the same tool and direction."""
 
 
 class DashboardServer(WebServerThread):
-    """Serves a machine or a folder of machines from __enter__ to __exit__, in a thread of its own."""
+    """Server of the dashboard of a machine or a folder of machines, in a thread while its context lasts."""
 
     def __init__(
         self,
@@ -141,12 +122,30 @@ class DashboardServer(WebServerThread):
         token: str | None = None,
         watch_token: str | None = None,
     ) -> None:
-        """Brings the histories up to date. Port 0: any free one; token None: a new one.
+        """Prepare the server, and assess the machines.
 
-        DataError where there is no machine, ValueError for a token that does not fit into an address.
+        Parameters
+        ----------
+        path
+            Machine folder, or a folder of machine folders.
+        listen
+            Address of this computer to listen at.
+        port
+            Port of the pages. 0 for any free one.
+        token
+            Token for full access. None for a random one.
+        watch_token
+            Token for read-only access. None for a random one.
+
+        Raises
+        ------
+        ValueError
+            If a token does not fit into an address.
+        DataError
+            If there is no machine.
         """
         super().__init__(listen, port, token, watch_token)
-        self._table = MachineTable(Path(path))
+        self._table = DashboardTable(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
         self._end = threading.Event()
@@ -161,21 +160,21 @@ class DashboardServer(WebServerThread):
         router.add_get("/report/{machine}/{key}", self._report, name=f"{PUBLIC_ROUTE_PREFIX}report")
 
     def __enter__(self) -> Self:
-        """Serve, and look at every byte of the machines meanwhile."""
+        """Start to serve, and verify every byte of the machines meanwhile."""
         self._verifier.start()
         return super().__enter__()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop the tap tests that run, then close; their hits stay in the spool."""
+        """Stop running tap tests, then close. Their hits stay in the spool."""
         self._end.set()
         if self._verifier.is_alive():
             self._verifier.join(10)
         for test in self._tests.values():
             test.stop()
         for test in self._tests.values():
-            test.join()
+            test.end()
         super().__exit__(kind, error, trace)
 
     def _find_machine(self, request: web.Request) -> tuple[str, MachineFolder]:
@@ -186,20 +185,20 @@ class DashboardServer(WebServerThread):
         return key, MachineFolder(path)
 
     def _find_test(self, request: web.Request) -> LiveTest:
-        """Newest test of a machine: a page that has watched one to its end sees the next."""
+        """Find the newest test of a machine."""
         test = self._tests.get(request.match_info["machine"])
         if test is None:
             raise web.HTTPNotFound(text="no tap test runs on this machine; go to All machines and press START")
         return test
 
     async def _list(self, request: web.Request) -> web.Response:
-        running = {key for key, test in self._tests.items() if test.running}
+        running = {key for key, test in self._tests.items() if test.is_running}
         answer = await asyncio.to_thread(self._table.updates_since, request.query.get("known", ""), running)
         body = msgspec.json.encode(answer | {"may_alter": request[HAS_FULL_ACCESS]})
         if len(body) < MIN_GZIP_BYTES or "gzip" not in request.headers.get("Accept-Encoding", ""):
             return web.Response(body=body, content_type="application/json")
-        zipped = await asyncio.to_thread(gzip.compress, body, 1)
-        return web.Response(body=zipped, content_type="application/json", headers={"Content-Encoding": "gzip"})
+        compressed = await asyncio.to_thread(gzip.compress, body, 1)
+        return web.Response(body=compressed, content_type="application/json", headers={"Content-Encoding": "gzip"})
 
     async def _metrics(self, _: web.Request) -> web.Response:
         text = format_prometheus(await asyncio.to_thread(self._table.assess_machines))
@@ -207,37 +206,29 @@ class DashboardServer(WebServerThread):
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
-        try:
-            wish = msgspec.json.decode(await request.read(), type=StartRequest)
-        except (msgspec.DecodeError, UnicodeDecodeError):
-            raise web.HTTPBadRequest(text='the body must be {"direction": "x"}, "y" or "xy"') from None
+        start = await read_body(request, StartRequest, 'the body must be {"direction": "x"}, "y" or "xy"')
         test = self._tests.get(key)
-        begins = test is None or not test.running
-        if test is not None and begins:  # it may wait for a choice that is made by this
-            await asyncio.to_thread(_stop_test, test)
-        if begins and self._tests.get(key) is test:  # else another START was as fast
-            self._tests[key] = LiveTest(folder, wish.direction, resume=wish.resume)
+        is_free = test is None or not test.is_running
+        if test is not None and is_free:  # it may wait for the choice of the next step
+            await asyncio.to_thread(test.end)
+        if is_free and self._tests.get(key) is test:  # else another START was faster
+            self._tests[key] = LiveTest(folder, start.direction, resume=start.resume)
         return web.json_response({"url": f"/tap/{quote(key)}/"})
 
     async def _write_report(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
         html = await asyncio.to_thread(_render_report, folder)
-        await asyncio.to_thread(release_memory)
+        await asyncio.to_thread(_release_memory)
         self._reports[key] = (secrets.token_urlsafe(24), html)
         return web.json_response({"url": f"/report/{quote(key)}/{self._reports[key][0]}"})
 
     async def _report(self, request: web.Request) -> web.Response:
-        """Answer at a name that cannot be guessed, so that the browser can open it as a page."""
+        """Serve a report at a secret address, so that the browser can open it as a page."""
         key, html = self._reports.get(request.match_info["machine"], ("", ""))
         if not key or not secrets.compare_digest(key.encode(), request.match_info["key"].encode()):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
         self.limiter.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
-
-
-def _stop_test(test: LiveTest) -> None:
-    test.stop()
-    test.join()
 
 
 def _render_report(folder: MachineFolder) -> str:

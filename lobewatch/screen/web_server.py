@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from importlib import resources
 from types import TracebackType
-from typing import Protocol, Self, cast
+from typing import Protocol, Self, TypeVar, cast
 
 import msgspec
 from aiohttp import web
@@ -39,27 +39,34 @@ from lobewatch.tap.cut_recording import CutState
 from lobewatch.tap.state import StatePublisher, TapState
 
 STATIC_CONTENT_TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
-"""Content types of the files of pages, by the ending of their names."""
+"""Content types of static files, by extension."""
+HTTP_LOG = logging.getLogger("lobewatch.screen.http")
+"""Log of requests that are not HTTP. It goes nowhere, so that nobody can fill the terminal."""
+HTTP_LOG.addHandler(logging.NullHandler())
+HTTP_LOG.propagate = False
+WILDCARD_ADDRESSES = {
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
+    "::": (socket.AF_INET6, "2001:db8::1", "::1"),
+}
+"""Wildcard addresses: family, an address elsewhere, and the own address without a network."""
+Body = TypeVar("Body")
 
 
 class WatchedTest(RunningTest, StateSource[TapState], Protocol):
-    """A live tap test that pages follow."""
+    """Live tap test that pages follow."""
 
 
 class ChoiceRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Body of the request that says what comes after a test."""
+    """Body of the request that chooses the next step after a test."""
 
     key: str
     """Key of the choice."""
     tool: str = ""
-    """Name of the next tool, where that is chosen."""
+    """Name of the next tool, if that is chosen."""
 
 
 def add_pages(application: web.Application, pages: dict[str, str]) -> None:
-    """Serve pages (path: file in static/) and, at /static/, all that they load.
-
-    The files are held in memory: nothing of the disk can be asked for by name.
-    """
+    """Serve pages (path: file in static/) and all static files at /static/, from memory."""
     folder = resources.files("lobewatch.screen").joinpath("static")
     files = {
         file.name: file.read_bytes()
@@ -67,17 +74,21 @@ def add_pages(application: web.Application, pages: dict[str, str]) -> None:
         if file.name.rpartition(".")[2] in STATIC_CONTENT_TYPES
     }
 
+    def respond(name: str) -> web.Response:
+        content_type = STATIC_CONTENT_TYPES[name.rpartition(".")[2]]
+        return web.Response(body=files[name], content_type=content_type, charset="utf-8")
+
     async def static(request: web.Request) -> web.Response:
         name = request.match_info["name"]
         if name not in files:
             raise web.HTTPNotFound(text="there is no such file")
-        return _respond_with_file(files, name)
+        return respond(name)
 
     application.router.add_get("/static/{name}", static, name=f"{PUBLIC_ROUTE_PREFIX}static")
     for i, (path, name) in enumerate(pages.items()):
 
         async def page(_: web.Request, name: str = name) -> web.Response:
-            return _respond_with_file(files, name)
+            return respond(name)
 
         application.router.add_get(path, page, name=f"{PUBLIC_ROUTE_PREFIX}page{i}")
 
@@ -86,13 +97,13 @@ def add_feed(
     application: web.Application,
     prefix: str,
     find: Callable[[web.Request], StateSource[State]],
-    messages: StateEncoder[State],
+    encoder: StateEncoder[State],
 ) -> None:
-    """Serve what is only watched. `find` raises HTTPNotFound where there is nothing."""
+    """Serve the feed of a source. `find` raises HTTPNotFound if there is none."""
 
     async def follow(request: web.Request) -> web.StreamResponse:
         find(request)
-        return await stream_states(request, lambda: find(request), messages)
+        return await stream_states(request, lambda: find(request), encoder)
 
     async def access(request: web.Request) -> web.Response:
         find(request)
@@ -103,10 +114,7 @@ def add_feed(
 
 
 def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], WatchedTest]) -> None:
-    """Serve the screen of a session: its feed, undo, stop and what comes next.
-
-    `find` raises HTTPNotFound where there is none.
-    """
+    """Serve the screen of a tap test: feed, undo, stop and next step. `find` raises HTTPNotFound if there is none."""
 
     async def undo(request: web.Request) -> web.Response:
         await asyncio.to_thread(find(request).undo)
@@ -117,47 +125,36 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         return web.json_response({})
 
     async def choose(request: web.Request) -> web.Response:
-        try:
-            choice = msgspec.json.decode(await request.read(), type=ChoiceRequest)
-        except (msgspec.DecodeError, UnicodeDecodeError):
-            raise web.HTTPBadRequest(text='the body must be like {"key": "y"}') from None
+        choice = await read_body(request, ChoiceRequest, 'the body must be like {"key": "y"}')
         check_name(choice.tool, "tool")
         find(request).choose(choice.key, choice.tool)
         return web.json_response({})
 
     add_feed(application, prefix, find, StateEncoder(encode_tap_state, encode_plots))
-    application.router.add_post(f"{prefix}undo", undo)
-    application.router.add_post(f"{prefix}stop", stop)
-    application.router.add_post(f"{prefix}choose", choose)
+    for action in (undo, stop, choose):
+        application.router.add_post(f"{prefix}{action.__name__}", action)
 
 
-def _respond_with_file(files: dict[str, bytes], name: str) -> web.Response:
-    return web.Response(body=files[name], content_type=STATIC_CONTENT_TYPES[name.rpartition(".")[2]], charset="utf-8")
-
-
-HTTP_LOG = logging.getLogger("lobewatch.screen.http")
-"""Log of requests that are no HTTP, which goes nowhere: anybody could fill the operator's terminal."""
-HTTP_LOG.addHandler(logging.NullHandler())
-HTTP_LOG.propagate = False
-WILDCARD_ADDRESSES = {
-    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
-    "::": (socket.AF_INET6, "2001:db8::1", "::1"),
-}
-"""Names of all addresses of this computer: family, an address elsewhere, and its own where it has no network."""
+async def read_body(request: web.Request, kind: type[Body], hint: str) -> Body:
+    """Decode the JSON body of a request. HTTPBadRequest with a hint if it is of another type."""
+    try:
+        return msgspec.json.decode(await request.read(), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        raise web.HTTPBadRequest(text=hint) from None
 
 
 class WebServerThread:
-    """Base of the servers: `application` is served from __enter__ to __exit__; add its routes before."""
+    """Thread that serves `application` while its context lasts. Add the routes before."""
 
     def __init__(self, listen: str, port: int, token: str | None, watch_token: str | None = None) -> None:
-        """ValueError for a token that does not fit into an address, and for no address to listen at."""
+        """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
         tokens = check_tokens(token, watch_token)
         self.token, self.watch_token = tokens.full, tokens.watch
         self._listen = listen.lower()
         self.limiter = ConnectionLimiter()
-        """Door that lets connections in, and counts them."""
+        """Limiter that accepts and counts connections."""
         self.application = make_guarded_application(tokens, self._listen, self.limiter)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
@@ -167,7 +164,7 @@ class WebServerThread:
         self._stop = asyncio.Event()
 
     def __enter__(self) -> Self:
-        """Listen; DeviceError where the address cannot be had."""
+        """Start to serve. DeviceError if the address is not available."""
         self._thread.start()
         self._ready.wait()
         if self._error is not None:
@@ -180,30 +177,34 @@ class WebServerThread:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Send the last state to every page that still listens, then close."""
+        """Send the last state to every page, then close."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join()
 
     @property
     def origin(self) -> str:
-        """Address without the token, e.g. http://127.0.0.1:40123."""
+        """Address without the token, such as http://127.0.0.1:40123."""
         host = _find_own_address(self._listen) if self._listen in WILDCARD_ADDRESSES else self._listen
         return f"http://{f'[{host}]' if ':' in host else host}:{self._port}"
 
     @property
     def url(self) -> str:
-        """Address with the token behind #, which browsers keep to themselves."""
+        """Address with the full token after #, which browsers do not send."""
         return f"{self.origin}/#token={self.token}"
 
     @property
     def watch_url(self) -> str:
-        """Address for who may only watch."""
+        """Address with the read-only token."""
         return f"{self.origin}/#token={self.watch_token}"
 
     async def _serve(self) -> None:
         self.application[SHUTDOWN_EVENT] = asyncio.Event()
-        self.application.on_shutdown.append(_signal_shutdown)
+
+        async def signal_shutdown(application: web.Application) -> None:
+            application[SHUTDOWN_EVENT].set()
+
+        self.application.on_shutdown.append(signal_shutdown)
         runner = web.AppRunner(self.application, access_log=None, logger=HTTP_LOG, shutdown_timeout=2.0)
         try:
             await runner.setup()
@@ -226,26 +227,22 @@ class WebServerThread:
         await asyncio.wait([serving])
 
 
-async def _signal_shutdown(application: web.Application) -> None:
-    application[SHUTDOWN_EVENT].set()
-
-
 def _find_own_address(listen: str) -> str:
-    """Address of this computer in its network; nothing is sent for it."""
-    family, far_away, alone = WILDCARD_ADDRESSES[listen]
+    """Find the address of this computer in its network, without sending anything."""
+    family, remote, fallback = WILDCARD_ADDRESSES[listen]
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
-            probe.connect((far_away, 9))
+            probe.connect((remote, 9))
             return str(probe.getsockname()[0])
     except OSError:
-        return alone
+        return fallback
 
 
 class ScreenServer(WebServerThread):
-    """Serves the screen of a tap test from __enter__ to __exit__, in a thread of its own.
+    """Server of the screen of a tap test, in a thread of its own while its context lasts.
 
-    The session is only asked for its newest state, at most 20 times a second and page: it never waits for a screen.
-    Whoever has `url` may watch, undo and stop, whoever has `watch_url` only watch; without a token nothing can be seen.
+    The server reads the newest state at most 20 times a second for each page, so the test never waits for a screen.
+    `url` gives full access: watch, undo and stop. `watch_url` is read-only. Without a token nothing is visible.
     """
 
     def __init__(
@@ -257,14 +254,33 @@ class ScreenServer(WebServerThread):
         token: str | None = None,
         watch_token: str | None = None,
     ) -> None:
-        """Port 0: any free one. Token None: a new one. ValueError for a token that does not fit into an address."""
+        """Prepare the server.
+
+        Parameters
+        ----------
+        session
+            Live tap test.
+        listen
+            Address of this computer to listen at.
+        port
+            Port of the pages. 0 for any free one.
+        token
+            Token for full access. None for a random one.
+        watch_token
+            Token for read-only access. None for a random one.
+
+        Raises
+        ------
+        ValueError
+            If a token does not fit into an address.
+        """
         super().__init__(listen, port, token, watch_token)
         add_pages(self.application, {"/": "screen.html"})
         add_session(self.application, "/", lambda _: session)
 
 
 class CutScreenServer(WebServerThread):
-    """Serves the screen of a cut that is listened to, likewise: nothing of it can be altered from a page."""
+    """Read-only server of the screen of a cut recording, in a thread of its own while its context lasts."""
 
     def __init__(
         self,
@@ -274,7 +290,24 @@ class CutScreenServer(WebServerThread):
         token: str | None = None,
         watch_token: str | None = None,
     ) -> None:
-        """At any free port. Token None: a new one. ValueError for a token that does not fit into an address."""
+        """Prepare the server at any free port.
+
+        Parameters
+        ----------
+        pictures
+            Publisher of the states of the recording.
+        listen
+            Address of this computer to listen at.
+        token
+            Token for full access. None for a random one.
+        watch_token
+            Token for read-only access. None for a random one.
+
+        Raises
+        ------
+        ValueError
+            If a token does not fit into an address.
+        """
         super().__init__(listen, 0, token, watch_token)
         add_pages(self.application, {"/": "listen.html"})
         add_feed(self.application, "/", lambda _: pictures, StateEncoder(encode_cut_state, encode_curves))

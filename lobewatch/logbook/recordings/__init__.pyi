@@ -1,4 +1,4 @@
-"""Recorded files as tap tests of a machine: found in folders, dated, understood, shown or stored."""
+"""Recorded files as tap tests of a machine: find, read, prepare and store them."""
 
 from .store_recordings import ReplayOutcome, store_recordings
 

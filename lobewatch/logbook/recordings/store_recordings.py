@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from acquisition import DataError, Description, TapTest
+from acquisition import DataError, Description
 from lobewatch.logbook.recordings.prepare_taps import (
-    PreparedTap,
+    TapDraft,
     explain_file_error,
     prepare_all_taps,
     prepare_tap,
+    prepared_path,
     remove_prepared_files,
 )
 from lobewatch.machine import MachineFolder, TapEntry
@@ -20,15 +21,15 @@ from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
 
 MAX_NAMED_FILES = 3
-"""Files that are named of those of which the same is said; the others are counted."""
+"""Number of files that a message names; it counts the others."""
 
 
-def group_by_message(said: Iterable[tuple[str, str]]) -> list[str]:
-    """A line for each sentence, in the order of the first file of each; said: names of files, each with a sentence."""
+def group_by_message(messages: Iterable[tuple[str, str]]) -> list[str]:
+    """Group files by message. Return one line for each message, in the order of its first file."""
     files: dict[str, list[str]] = {}
-    for file, sentence in said:
-        files.setdefault(sentence, []).append(file)
-    return [f"{_join_file_names(names)}: {sentence}" for sentence, names in files.items()]
+    for file, message in messages:
+        files.setdefault(message, []).append(file)
+    return [f"{_join_file_names(names)}: {message}" for message, names in files.items()]
 
 
 def _join_file_names(files: list[str]) -> str:
@@ -37,39 +38,40 @@ def _join_file_names(files: list[str]) -> str:
 
 
 ReplayProgressCallback = Callable[[str, int, int], None]
-"""Told what is done ("read", "store"), how many of it are, and of how many."""
+"""Callback for progress: step ("read", "store", "measure"), number of finished files, and of all."""
 
 LOCAL_WORKERS = Workers()
+"""Workers of a replay without other processes."""
 
 
 @dataclass(frozen=True)
 class ReplayOutcome:
-    """What came of some recorded files."""
+    """Result of a replay."""
 
     tap_ids: Sequence[str]
-    """The tap test of each file that was not refused, in the order of the files."""
+    """Tap test of each usable file, in the order of the files."""
     already_stored: Mapping[Path, str]
-    """Files that were stored already, or stand twice among those given, and their tap test."""
+    """Tap test of each file that was stored already or is given twice."""
     new_tap_ids: Sequence[str]
-    """The tap tests that are new, oldest first."""
+    """New tap tests, oldest first."""
     rejected: Mapping[Path, str] = field(default_factory=dict)
-    """Files that cannot be used, and why."""
+    """Reason for each file that cannot be used."""
     assumed_facts: Sequence[str] = ()
-    """Facts that were taken for granted where files do not say them, each once."""
+    """Defaults assumed for facts that files do not state, each once."""
     fits: Mapping[str, TapFit] = field(default_factory=dict)
-    """The modes of the new tap tests, by identity."""
+    """Fitted modes of the new tap tests, by identity."""
 
 
 @dataclass
 class StoredContents:
-    """Which contents are stored already, and as which tap test."""
+    """Contents that are stored already, with their tap tests."""
 
     by_digest: dict[str, list[tuple[str, str]]]
-    """SHA-256 -> identities of tap tests and their directions."""
+    """Identities and directions of tap tests, by SHA-256 of the content."""
 
     @classmethod
     def of(cls, taps: Sequence[TapEntry]) -> StoredContents:
-        """Those of committed tap tests, by their file and by the file that they were replayed from."""
+        """List the tap files and the recorded files of committed tap tests."""
         contents = cls({})
         for tap in taps:
             for digest in filter(None, (tap.source_sha256, tap.sha256)):
@@ -77,15 +79,11 @@ class StoredContents:
         return contents
 
     def find_tap(self, digest: str, description: Description) -> str | None:
-        """The tap test of a content; one of several responses is known only where it is stored in this direction."""
+        """Find the tap test of a content. One of several responses must have the same direction."""
         for tap_id, direction in self.by_digest.get(digest, ()):
             if description.response is None or direction == (description.direction or direction):
                 return tap_id
         return None
-
-    def add(self, digest: str, tap: TapTest) -> None:
-        """A tap test that is going to be stored."""
-        self.by_digest.setdefault(digest, []).append((tap.id, tap.circumstances.direction))
 
 
 def store_recordings(
@@ -97,42 +95,68 @@ def store_recordings(
     keep_going: bool = False,
     progress: ReplayProgressCallback = lambda _what, _done, _of: None,
 ) -> ReplayOutcome:
-    """Commit recorded files, each once, oldest first; all are read and judged before the first one is stored.
+    """Store recorded files as tap tests, each once and oldest first. Call it under the lock.
 
-    DataError, and nothing is stored, where one cannot be used, with all of these; keep_going: the others are stored.
-    workers: who reads and fits; what they find is the same. To be called under the lock.
+    All files are read and evaluated before the first one is stored.
+
+    Parameters
+    ----------
+    folder
+        Folder of the machine.
+    files
+        Paths of the recorded files.
+    description
+        Facts that the files do not state.
+    workers
+        Processes that read and fit. The result does not depend on them.
+    keep_going
+        Whether usable files are stored if others are rejected.
+    progress
+        Callback for progress.
+
+    Returns
+    -------
+    ReplayOutcome
+        Tap tests, rejected files and assumed defaults.
+
+    Raises
+    ------
+    DataError
+        If a file cannot be used. Nothing is stored then.
     """
     remove_prepared_files(folder)
     digests, unread = compute_digests(files)
     if unread and len(files) == 1:
         raise unread[files[0]]
-    refused = {file: explain_file_error(file, error) for file, error in unread.items()}
+    rejected = {file: explain_file_error(file, error) for file, error in unread.items()}
     contents, todo = StoredContents.of(folder.taps()), dict[str, Path]()
     ids = {digest: contents.find_tap(digest, description) or "" for digest in digests.values()}
     for file, digest in digests.items():
         if not ids[digest]:
             todo.setdefault(digest, file)
     try:
-        ready, wrong = _prepare_files(folder, todo, description, workers, alone=len(files) == 1, progress=progress)
-        refused |= {file: wrong[digest] for file, digest in digests.items() if digest in wrong}
-        if refused and not (keep_going and len(refused) < len(files)):
-            raise DataError(format_rejections({file: refused[file] for file in files if file in refused}, len(files)))
+        ready, faults = _prepare_files(folder, todo, description, workers, alone=len(files) == 1, progress=progress)
+        rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
+        if rejected and not (keep_going and len(rejected) < len(files)):
+            raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
         ready.sort(key=lambda tap: tap.created)
         if ready:
-            folder.commit_files({tap.temporary_path: tap.entry for tap in ready})
+            folder.commit_files({prepared_path(folder, tap): tap.entry for tap in ready})
             progress("store", len(ready), len(ready))
     finally:
         remove_prepared_files(folder)
     ids |= {tap.digest: tap.entry.id for tap in ready}
-    used = {file: ids[digests[file]] for file in files if file not in refused}
-    known = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
-    taken = dict.fromkeys(text for tap in ready for text in tap.assumed_facts)
+    used = {file: ids[digests[file]] for file in files if file not in rejected}
+    already_stored = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
+    assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
-    return ReplayOutcome([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
+    return ReplayOutcome(
+        [used[file] for file in files if file in used], already_stored, [*fits], rejected, assumed_facts, fits
+    )
 
 
 def compute_digests(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:
-    """SHA-256 of each file, and what is wrong with those that cannot be read."""
+    """Compute the SHA-256 of each file. Return the errors of unreadable files too."""
     digests, unread = dict[Path, str](), dict[Path, OSError]()
     for file in files:
         try:
@@ -150,29 +174,31 @@ def _prepare_files(
     *,
     alone: bool,
     progress: ReplayProgressCallback,
-) -> tuple[list[PreparedTap], dict[str, str]]:
-    """Files by their digests, made ready; by digest why some cannot be used, the error itself where it stands alone."""
+) -> tuple[list[TapDraft], dict[str, str]]:
+    """Prepare files by digest. Return the reason for each unusable file, or raise its error if it is the only file."""
     if alone and not workers.scheduler:
         return [prepare_tap(folder, file, description) for file in todo.values()], {}
-    ready, wrong = list[PreparedTap](), dict[str, str]()
+    ready, faults = list[TapDraft](), dict[str, str]()
     results = zip(todo, prepare_all_taps(folder, [*todo.values()], description, workers), strict=True)
     for number, (digest, result) in enumerate(results, 1):
         if isinstance(result, str):
-            wrong[digest] = result
+            faults[digest] = result
         elif result.digest != digest:
-            wrong[digest] = "it changes while it is read; wait until it is written"
+            faults[digest] = "it changes while it is read; wait until it is written"
         else:
             ready.append(result)
         progress("read", number, len(todo))
-    return ready, wrong
+    return ready, faults
 
 
-def format_rejections(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str:
-    """All files that cannot be used, and what can be done; stored: the others are."""
-    lines = group_by_message((str(file), why) for file, why in refused.items())
-    if len(refused) == n:
+def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = False) -> str:
+    """Format the reasons for rejected files of n, and whether the others are stored."""
+    lines = group_by_message((str(file), why) for file, why in rejected.items())
+    if len(rejected) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
-    rest_text = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
-    if len(refused) == 1:
+    rest_text = (
+        "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
+    )
+    if len(rejected) == 1:
         return f"{lines[0]} (1 of {n} files; {rest_text})"
-    return "\n".join([f"{len(refused)} of {n} files cannot be used; {rest_text}", *lines])
+    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest_text}", *lines])

@@ -57,7 +57,7 @@ def fleet_row(machine: FleetMachine) -> dict[str, Any]:
         "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
         "next_limit": build_limit_row(ahead),
         "limit": next_limit_text(ahead, dated.time),
-        "forecast": build_forecast_rows(summary.fates, summary.limits),
+        "forecast": build_forecast_rows(summary.forecasts, summary.limits),
         "has_port": summary.has_port,
         "programs": summary.programs,
         "points": worst.points if worst else (),

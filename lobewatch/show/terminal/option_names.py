@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 OPTION_NAMES: Mapping[str, str] = {
     # acquisition.files
@@ -34,6 +35,26 @@ OPTION_NAMES: Mapping[str, str] = {
     "ModeEdits.fix": "--fix",
     "modal.synthesize_frf": "lobewatch modes --figure",
     "numpy.conj": "on the command line: --conjugate",
+    # lobewatch.logbook and lobewatch.fleet
+    "Description.date": "--date",
+    "Description.date_pattern": "--date-pattern",
+    "Description.direction": "--direction",
+    "DynamicsSource.FRF": "--source frf",
+    "DynamicsSource.MODES": "--source modes",
+    "ProgramTable.depth_mm": "--depth",
+    "ProgramTable.material": "--material",
+    "ProgramTable.speed_rpm": "--speed",
+    "ProgramTable.tool": "--tool",
+    "SeriesStatus.direction": "--direction",
+    "SeriesStatus.tool": "--tool",
+    "acknowledge_alarms.until": "--until",
+    "calibrate_joints.mode": "--mode",
+    "calibrate_joints.tools": "--tool",
+    "compare_lobes.cut": "--cut",
+    "evaluate_requested.names": "--program",
+    "fit_file_modes": "lobewatch modes",
+    "make_machine_folder": "lobewatch init",
+    "store_recordings.keep_going": "--keep-going",
     # lobewatch.machine
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
@@ -41,32 +62,28 @@ OPTION_NAMES: Mapping[str, str] = {
     "MachineFolder.accept": "replay --accept",
     "MachineFolder.contents": "lobewatch history",
     "MaintenanceEvent.time": "--date",
-    "ProgramTable.depth_mm": "--depth",
     "ProgramTable.direction": "--direction",
     "ProgramTable.feed_per_tooth_mm": "--feed-per-tooth",
-    "ProgramTable.material": "--material",
     "ProgramTable.name": "--save",
     "ProgramTable.radial_depth_mm": "--radial",
-    "ProgramTable.speed_rpm": "--speed",
     "ProgramTable.teeth": "--teeth",
-    "ProgramTable.tool": "--tool",
     "ProgramTable.tool_diameter_mm": "--diameter",
     "accept_settings.keys": "--accept",
     "build_power_reading.power_kw": "--power",
     "choose_cut.cut": "--cut",
     "choose_cut.program": "--program",
+    "exclude_entry": "exclude",
     "exclude_entry.reason": "--reason",
     "find_setup_question.name": "--edit",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_updates.accept_settings": "lobewatch check MACHINE --accept",
     "folder_updates.add_event": "lobewatch event",
-    "folder_updates.exclude_entry": "exclude",
+    "folder_updates.exclude_entry": "lobewatch exclude",
     "folder_updates.store_cut": "observe",
     "lobes.materials_by_name": "lobewatch materials",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
     # lobewatch.measurement, lobewatch.tool, lobewatch.history
-    "Description.averages": "--averages",
     "LobeChart.source": "--source",
     "Window.hit_at": "--hit-at",
     "Window.start": "--window-start",
@@ -81,9 +98,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "sensor_checks.check_skew": "lobewatch sensors --skew",
     "session.TapSession": "lobewatch tap",
     # acquisition.devices, lobewatch.tap, lobewatch.sensors
-    "Description.pulses": "--pulses",
-    "Description.sensor": "--sensor",
-    "Description.tacho": "--tacho",
     "EmulationSetup.tcp": "--tcp",
     "MountingVariation.bad_share": "--bad-clampings",
     "MountingVariation.scatter": "--scatter",
@@ -120,3 +134,12 @@ _NAMES = re.compile(rf"\b(?:{'|'.join(map(re.escape, sorted(OPTION_NAMES, key=le
 def with_option_names(text: str) -> str:
     """Replace the library fields and functions that a message names by their options and commands."""
     return _NAMES.sub(lambda match: OPTION_NAMES[match[0]], text)
+
+
+def with_option_names_inside(value: Any) -> Any:
+    """Replace the names in all texts of a value made of dicts, lists and texts."""
+    if isinstance(value, dict):
+        return {key: with_option_names_inside(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [with_option_names_inside(entry) for entry in value]
+    return with_option_names(value) if type(value) is str else value

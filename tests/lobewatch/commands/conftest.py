@@ -42,7 +42,7 @@ Run = Callable[..., Said]
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Runs a command in an empty folder."""
+    """Run a command in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def command(*arguments: object) -> Said:
@@ -58,7 +58,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 @pytest.fixture
 def trial(run: Run) -> MachineFolder:
-    """A machine folder with the example spindle."""
+    """Make a machine folder with the example spindle."""
     assert run("init", "trial", "--example").code == 0
     return MachineFolder("trial")
 
@@ -77,7 +77,7 @@ class Checked(Said):
         return self.out.splitlines()[-1]
 
     def line(self, name: str) -> str:
-        """What is said of a program below the table."""
+        """Return the text on a program below the table."""
         (found,) = (line for line in self.out.splitlines() if line.startswith(f"{name}: "))
         return found
 
@@ -87,7 +87,7 @@ Check = Callable[..., Checked]
 
 @pytest.fixture
 def check(shop: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Check:
-    """Runs `lobewatch check` on the shop, or on another folder."""
+    """Run `lobewatch check` on the shop or another folder."""
 
     def command(*options: str, folder: Path | None = None) -> Checked:
         monkeypatch.setattr(sys, "argv", ["lobewatch", "check", str(folder or shop.path), *options])
@@ -104,7 +104,7 @@ def check(shop: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixt
 
 @pytest.fixture
 def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Takes the search for settings out of tests that are not about it."""
+    """Skip the search for settings in tests of other things."""
     monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice())
 
 
@@ -195,7 +195,7 @@ class Server:
 
 @pytest.fixture(scope="session")
 def server() -> Iterator[Server]:
-    """A server; skips where there is none, but not in continuous integration."""
+    """Start a server; skip without one, except in continuous integration."""
     if not (INITDB and POSTGRES) and "CI" not in os.environ:
         pytest.skip("PostgreSQL is not installed")
     with tempfile.TemporaryDirectory() as folder:
@@ -206,7 +206,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def plant(server: Server) -> str:
-    """An empty database by its name."""
+    """Make an empty database and return its name."""
     name = f"plant_{time.monotonic_ns()}"
     server.ask(f"CREATE DATABASE {name}")
     return name

@@ -42,7 +42,7 @@ class Terminal:
         os.close(self._master)
 
     def wait_for(self, words: str, seconds: float = 40.0) -> str:
-        """What has come since the last call, up to these words."""
+        """Return the output since the last call, up to a text."""
         end = time.monotonic() + seconds
         while (at := self.text.find(words, self._seen)) < 0:
             assert self._read(max(end - time.monotonic(), 0.0)), f"{words!r} has not come:\n{self.text}"

@@ -49,7 +49,7 @@ def said(*arguments: object) -> tuple[int, str]:
 
 
 def check_all(plant: Path, folder: Path) -> None:
-    """What every command says of a folder is valid; JSON and CSV hold what they say."""
+    """Check that JSON and CSV of every command are valid and hold the names."""
     status = json.loads(said("status", plant, "--json")[1])
     (line,) = csv.DictReader(io.StringIO(said("status", plant, "--csv")[1]))
     assert line["name"].lstrip("'") == status["machines"][0]["name"].lstrip("'")

@@ -41,7 +41,7 @@ calibration_date = 2026-01-15
 
 @pytest.fixture
 def machines(tmp_path: Path) -> tuple[MachineFolder, MachineFolder]:
-    """That of the computer with the DATAQ, and that of the other one."""
+    """Make the folders of the computer with the DATAQ and of the other computer."""
     for name in ("pi", "office"):
         make_machine_folder(tmp_path / name, "surrogate_machine.toml")
     toml = tmp_path / "pi" / "machine.toml"

@@ -33,7 +33,7 @@ LONG = "long end mill"
 
 
 def worn(folder: MachineFolder, tool: str, bearings: float = 0.8) -> Spindle:
-    """The truth: other bearings, a joint half as stiff radially and 1.7 times as stiff against tilting as drawn."""
+    """Return the true spindle: other bearings, a joint half as stiff radially and 1.7 times as stiff in tilting."""
     drawn = folder.machine.model(tool)
     joints = [
         replace(one, stiffness=0.5 * one.stiffness, rotational_stiffness=1.7 * one.rotational_stiffness)
@@ -44,7 +44,7 @@ def worn(folder: MachineFolder, tool: str, bearings: float = 0.8) -> Spindle:
 
 
 def tap(folder: MachineFolder, tool: str, day: int, bearings: float = 0.8) -> None:
-    """A tap test without noise; structural damping puts poles above natural frequencies, the lines make up for it."""
+    """Make a tap test without noise; the shift of poles by structural damping is compensated."""
     lines = LINES * (1 + LOSS**2) ** 0.25
     frf = Frf(LINES, receptance(worn(folder, tool, bearings), lines, loss_factor=LOSS), np.full(LINES.size, 0.9999), 10)
     about = Circumstances("m", datetime(2026, 3, day, tzinfo=UTC), tool, "x", "", folder.toml.read_text("utf-8"))
@@ -52,7 +52,7 @@ def tap(folder: MachineFolder, tool: str, day: int, bearings: float = 0.8) -> No
 
 
 def machine(path: Path) -> MachineFolder:
-    """The example with a joint behind its tool and a third tool, all modes looked at."""
+    """Make the example machine with a joint behind its tool and a third tool."""
     make_machine_folder(path, "surrogate_machine.toml")
     toml = path / "machine.toml"
     text = toml.read_text("utf-8").replace("bearings = [", JOINT, 1).replace("[1200, 2200]", "[300, 5800]")

@@ -28,7 +28,7 @@ from tests.lobewatch.commands.conftest import Run, refused
 
 @pytest.fixture
 def device(trial: MachineFolder) -> Iterator[TapsEmulator]:
-    """An emulated DAQ on the example spindle."""
+    """Start an emulated DAQ on the example spindle."""
     table = trial.machine.spindle
     assert table is not None
     structure = build_structure(table.build(), table.damping_ratio)

@@ -45,7 +45,7 @@ def export(*arguments: object) -> dict[str, Any]:
 
 
 def lines(folder: Path, columns: str = "month, folder, tap_id, frequency_hz") -> list[tuple[Any, ...]]:
-    """What DuckDB reads there, in order."""
+    """Read the rows with DuckDB, in order."""
     with closing(duckdb.connect()) as base:
         place = f"read_parquet('{folder}/*/*.parquet', hive_partitioning = true, hive_types_autocast = false)"
         return base.sql(f"SELECT {columns} FROM {place} ORDER BY ALL").fetchall()

@@ -45,7 +45,7 @@ def mills(shop: Shop, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A transaction a machine."""
+    """Export with one transaction for each machine."""
     monkeypatch.setattr(table_postgres, "POSTGRES_BATCH_TAPS", 1)
 
 

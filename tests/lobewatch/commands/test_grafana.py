@@ -51,7 +51,7 @@ def panels(within: dict[str, Any] = BOARD) -> Iterator[dict[str, Any]]:
 
 
 def of(kind: str) -> dict[str, dict[str, Any]]:
-    """The panels of a kind of data source, by title."""
+    """List the panels of a kind of data source, by title."""
     return {panel["title"]: panel for panel in panels() if panel.get("datasource", {}).get("type") == kind}
 
 
@@ -59,7 +59,7 @@ POSTGRES, DUCKDB = of("grafana-postgresql-datasource"), of("motherduck-duckdb-da
 
 
 def filled(panel: dict[str, Any], **variables: str) -> str:
-    """The query of a panel as Grafana sends it."""
+    """Return the query of a panel as Grafana sends it."""
     (target,) = panel["targets"]
     text = re.sub(r"\$__timeFilter\((\w+)\)", r"\1 BETWEEN '2026-01-20' AND '2026-12-31'", target["rawSql"])
     for name, value in {"machine:sqlstring": "'a','b'", **variables}.items():

@@ -135,7 +135,7 @@ def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(s
     told = json.loads(run(shop, *arguments, "--json").stdout)
     assert (told["word"], told["reason"]) == ("cannot tell", "unexplained-tone")
     assert told["unexplained_tone_hz"] == pytest.approx(1712.3, abs=0.1)
-    assembly = shop.logbook.ask(Analysis.assembly_or_reason, "reference")
+    assembly = shop.logbook.query(Analysis.assembly_or_reason, "reference")
     modes = [mode.frequency for mode in (*assembly.x, *assembly.y)]
     nearest = min(modes, key=lambda mode: abs(mode - 1712.3))
     said = run(shop, *arguments).stdout.splitlines()[0]
@@ -143,7 +143,7 @@ def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(s
 
 
 def with_tacho(path: Path, chatter: float | None = None) -> Path:
-    """The recording with two pulses a turn of a tachometer beside it."""
+    """Add a tachometer signal with two pulses a turn to the recording."""
     heading, *rows = recording(path, chatter).read_text().splitlines()
     pulses = np.where(np.arange(len(rows)) / RATE * 2 * TURN % 1 < 0.2, 4.8, 0.1)
     path.write_text("\n".join([f"{heading},S4", *(f"{row},{v}" for row, v in zip(rows, pulses, strict=True))]) + "\n")

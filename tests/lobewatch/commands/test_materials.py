@@ -28,6 +28,7 @@ def materials(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
     return command
 
 
+@pytest.mark.quick
 def test_a_material_is_shown_with_range_other_names_and_sources(materials: Materials) -> None:
     code, out, _ = materials("1.0503")
     assert code == 0
@@ -48,6 +49,7 @@ def test_all_are_listed_without_their_sources(materials: Materials) -> None:
     assert "sources: lobewatch materials NAME, or --json" in out
 
 
+@pytest.mark.quick
 def test_rows_of_json_carry_units_ranges_and_a_source(materials: Materials) -> None:
     code, out, _ = materials("--json")
     rows = {row["name"]: row for row in json.loads(out)["materials"]}

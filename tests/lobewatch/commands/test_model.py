@@ -48,7 +48,7 @@ LINES = np.arange(2.0, 6000.0, 2.0)
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """The surrogate, its band wide enough for the long tool too."""
+    """Make the surrogate machine with a band wide enough for the long tool."""
     make_machine_folder(tmp_path / "trial", "surrogate_machine.toml")
     toml = tmp_path / "trial" / "machine.toml"
     toml.write_text(toml.read_text("utf-8").replace("[1200, 2200]", "[800, 2200]"), "utf-8")
@@ -63,7 +63,7 @@ def bearing_stiffness(found: dict[str, Any]) -> float:
 def tapped(
     folder: MachineFolder, factor: float, tool: str = "reference", day: int = 1, direction: TapDirection = "x"
 ) -> TapTest:
-    """A noiseless tap test of the model with its bearings softened by `factor`.
+    """Make a noiseless tap test of the model with its bearings softened by `factor`.
 
     Its damping is structural, which puts poles (1 + eta^2)^(1/4) above natural frequencies: the lines make up for it.
     """
@@ -142,7 +142,7 @@ def damping(mode: Any) -> float:
 
 
 def with_program(folder: MachineFolder) -> None:
-    """A program of the long tool, tapped nowhere."""
+    """Add a program of the long tool, which is never tapped."""
     program = EXAMPLE_PROGRAM.format(tool=TOOL)
     toml = folder.toml.read_text("utf-8")
     folder.toml.write_text(

@@ -40,7 +40,7 @@ def frequencies(shop: Shop) -> list[float]:
 
 
 def tapped(shop: Shop) -> str:
-    """A tap test of three modes; its identity."""
+    """Store a tap test with three modes, and return its identity."""
     about = Circumstances("m", shop.start, "reference", "x", "", shop.folder.toml_text)
     tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, synthesize_frf(MODES, LINES).accelerance))
     shop.folder.commit(tap)

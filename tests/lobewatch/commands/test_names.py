@@ -32,7 +32,7 @@ RUNS = "=cmd|' /C calc'!A0"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """The example, whose machine, tool and first program have a name like a formula, and one tap test."""
+    """Make the example machine with formula-like names and one tap test."""
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     toml = tmp_path / "m" / "machine.toml"
     text = toml.read_text("utf-8").replace("high_rpm = 24000", "high_rpm = 24000\nsteps = 300")

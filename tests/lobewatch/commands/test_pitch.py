@@ -34,7 +34,7 @@ def ask(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
 
 
 def simulated(tool: Assembly, pitch: list[float], speed: float, depth: float) -> DelayedCase:
-    """A slot of the shop (fed along x) with the modes of a tool."""
+    """Make a slot of the shop (fed along x) with the modes of a tool."""
     sides = ((tool.x or (), 0.0), (tool.y or (), math.pi / 2))
     modes = tuple((m.frequency, m.damping_ratio, m.stiffness, angle) for side, angle in sides for m in side)
     whole = tuple(round(angle) for angle in pitch)

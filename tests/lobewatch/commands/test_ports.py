@@ -67,7 +67,7 @@ class Said(NamedTuple):
 
 @pytest.fixture
 def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MachineFolder:
-    """The example machine with the sensors of a DATAQ device, in the working directory."""
+    """Make the example machine with the sensors of a DATAQ device in the working directory."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
     make_machine_folder(Path("trial"), "surrogate_machine.toml")
@@ -78,7 +78,7 @@ def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MachineFolder:
 
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Runs a command."""
+    """Run a command."""
 
     def command(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["lobewatch", *arguments])

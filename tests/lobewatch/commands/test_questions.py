@@ -49,14 +49,14 @@ def run(*arguments: object) -> Result:
 
 
 def refused(*arguments: object) -> str:
-    """The one sentence of an error."""
+    """Return the one sentence of an error."""
     with pytest.raises(ValueError, match="--accept") as said:
         run(*arguments)
     return str(said.value)
 
 
 def standing(shop: Shop, days: float = 1.0) -> MachineStatus:
-    found: MachineStatus = shop.logbook.standing(shop.start + timedelta(days=days))
+    found: MachineStatus = shop.logbook.status(shop.start + timedelta(days=days))
     return found
 
 
@@ -261,9 +261,9 @@ def test_a_replay_can_be_accepted_at_once(shop: Shop, beam: Path) -> None:
 
 def test_no_other_tool_is_predicted_from_a_test_in_question(shop: Shop) -> None:
     shop.tap_both()
-    sure = shop.logbook.calibrated.tap_id
+    sure = shop.logbook.calibrated_measurement.tap_id
     shop.tap(30, 1713.0 * 0.8)
-    assert shop.logbook.calibrated.tap_id == sure
+    assert shop.logbook.calibrated_measurement.tap_id == sure
 
 
 def test_what_an_ended_replay_has_stored_is_not_stored_twice(shop: Shop, beam: Path) -> None:

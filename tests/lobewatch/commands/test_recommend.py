@@ -17,7 +17,7 @@ SAVED = ("--save", "from the answer")
 
 @pytest.fixture
 def run(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Runs a command on the machine of the shop: exit code, stdout, stderr."""
+    """Run a command on the machine of the shop: exit code, stdout, stderr."""
 
     def call(name: str, *words: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", name, str(shop.path), *words])

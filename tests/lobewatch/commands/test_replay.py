@@ -329,7 +329,7 @@ def test_what_is_asked_of_many_tests_is_one_sentence_and_takes_one_answer(shop: 
     assert "date 2024-01-01 00:00 to 2024-01-20 00:00" in preview
     said = run("replay", shop.path, narrow, *SAID).stdout
     assert said.count("do not cover [mode] band_hz") == 1
-    (remark,) = (remark for remark in shop.logbook.standing().remarks if remark.code == "other-band")
+    (remark,) = (remark for remark in shop.logbook.status().remarks if remark.code == "other-band")
     first, *_, last = [entry.id for entry in shop.folder.taps()]
     assert remark.about == f"20 tap tests, {first} to {last}"
     answer = f"lobewatch replay {shop.path} {shop.path / 'taps'} --accept other-band"
@@ -343,7 +343,7 @@ def test_one_answer_is_for_those_that_ask_the_same(shop: Shop, narrow: Path) -> 
     wider = frf(narrow.parent / "wider 20240201.csv", heading="Freq,Real,Imag")
     shop.edit("band_hz = [1000, 2400]", "band_hz = [1000, 9000]")
     run("replay", shop.path, *sorted(narrow.iterdir())[:2], wider, *SAID)
-    one, other = (remark for remark in shop.logbook.standing().remarks if remark.code == "other-band")
+    one, other = (remark for remark in shop.logbook.status().remarks if remark.code == "other-band")
     assert one.about.startswith("2 tap tests, ")
     assert other.about.startswith("tap test ")
     run(*one.cure.partition("lobewatch ")[2].split())

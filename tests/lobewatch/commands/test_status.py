@@ -25,7 +25,7 @@ def run(*arguments: object) -> Result:
 
 @pytest.fixture
 def mills(shop: Shop, tmp_path: Path) -> Path:
-    """A good machine tapped just now, a worn one, one never tapped, one whose machine.toml is broken."""
+    """Make a good machine, a worn one, one never tapped, and one with a broken machine.toml."""
     shop.put("")
     new, worn, good, bad = (tmp_path / "mills" / name for name in ("new", "worn", "good", "bad"))
     shutil.copytree(shop.path, new)

@@ -16,7 +16,7 @@ Shop = Any
 
 @pytest.fixture
 def run(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Runs a command on the machine of the shop: exit code, stdout, stderr."""
+    """Run a command on the machine of the shop: exit code, stdout, stderr."""
 
     def call(name: str, *words: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", name, str(shop.path), *words])

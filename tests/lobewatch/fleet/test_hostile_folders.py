@@ -111,7 +111,7 @@ def in_time() -> Iterator[None]:
 
 @pytest.fixture
 def plant(shop: Shop, tmp_path: Path) -> Path:
-    """The good machine alone in a plant."""
+    """Put only the good machine into a fleet folder."""
     shop.run(("A", 12900, 1.5))
     shop.tap_both()
     shop.tap_both(30.0, 0.999)
@@ -120,7 +120,7 @@ def plant(shop: Shop, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command, none of which may hang or be surprised."""
+    """Run a command that must neither hang nor fail unexpectedly."""
 
     def command(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", *map(str, arguments)])

@@ -26,7 +26,7 @@ LONG_AGO = -1500.0
 
 
 def tap_months(shop: Shop, falls: list[float], begin: int = 0) -> list[str]:
-    """A test a month in x, fallen by so much (%) each; their identities."""
+    """Add one test a month in x with these frequency drops (%), and return their identities."""
     return [
         shop.tap(LONG_AGO + MONTH * (begin + i), 1713.0 * (1 - (fall + WIGGLE[(begin + i) % 5]) / 100))
         for i, fall in enumerate(falls)
@@ -42,11 +42,11 @@ def at(shop: Shop, months: float) -> datetime:
 
 
 def alarms(shop: Shop, months: float) -> list[Alarm]:
-    return list(shop.logbook.standing(at(shop, months)).alarms)
+    return list(shop.logbook.status(at(shop, months)).alarms)
 
 
 def codes(shop: Shop, months: float) -> set[str]:
-    return {remark.code for remark in shop.logbook.standing(at(shop, months)).remarks}
+    return {remark.code for remark in shop.logbook.status(at(shop, months)).remarks}
 
 
 @pytest.fixture
@@ -184,8 +184,8 @@ def test_journal_lines_of_acknowledgements_outlast_a_rebuild(mill: Shop, run: Ru
 def test_a_small_alarm_reads_unlike_one_past_a_limit(shop: Shop, run: Run, step: float, is_early: bool) -> None:
     shop.put("")
     tap_months(shop, falling(18, step=step))
-    found = shop.logbook.standing(at(shop, 18))
-    assert (found.light, found.is_early) == ("alarm", is_early)
+    found = shop.logbook.status(at(shop, 18))
+    assert (found.status, found.is_early) == ("alarm", is_early)
     (row,) = run("status", shop.path, "--json").json["machines"]
     assert row["is_early"] is is_early
     assert ("early alarm" in run("status", shop.path).out) is is_early
@@ -215,7 +215,7 @@ def test_two_clampings_of_one_day_are_two_points_where_that_is_said(shop: Shop) 
     for hour, reclamped in ((0, False), (1, False), (2, True)):
         conditions = Conditions(reclamped=reclamped)
         shop.tap(LONG_AGO + MONTH * 12 + hour / 24, 1713.0 * 0.98, conditions=conditions)
-    (series,) = shop.logbook.standing(at(shop, 13)).series
+    (series,) = shop.logbook.status(at(shop, 13)).series
     assert len(series.trend.points) == 14
     assert "decay" in codes(shop, 13)
 

@@ -35,7 +35,7 @@ def decays(frequency: float, seed: int) -> list[Hit]:
 
 @pytest.fixture
 def shops(shop: Shop, new_shop: type[Shop], tmp_path: Path) -> tuple[Shop, Shop]:
-    """The same fall of 18 months in both: with force, and without."""
+    """Make the same drop over 18 months with force and without force."""
     bare, falls = new_shop(tmp_path / "without-force"), falling(18)
     for either in (shop, bare):
         either.put("")

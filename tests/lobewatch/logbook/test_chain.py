@@ -83,7 +83,7 @@ def live_tap(
 
 
 def up_to_date(folder: MachineFolder) -> tuple[History, list[Measurement]]:
-    """The history as somebody finds it who opens the folder now, and every measurement."""
+    """Return the history of a newly opened folder, and every measurement."""
     logbook = Logbook.open(folder.path)
     return logbook.history, [logbook.measurement(tap.id) for tap in logbook.taps]
 

@@ -49,7 +49,7 @@ def turned(phase_deg: float, std: float = 0.0) -> Mode:
 
 
 def of(modes: Sequence[Mode]) -> Assembly:
-    """A tool tapped in both directions, alike."""
+    """Return a tool tapped alike in both directions."""
     return Assembly("reference", START, "T", modes, modes, ("x", "y"), None, {"x": "T", "y": "T"}, False, ())
 
 

@@ -64,7 +64,7 @@ def day(shop: Shop, days: float) -> datetime:
 
 
 def codes(shop: Shop, days: float) -> list[str]:
-    return [remark.code for remark in shop.logbook.standing(day(shop, days)).remarks]
+    return [remark.code for remark in shop.logbook.status(day(shop, days)).remarks]
 
 
 def analysed(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> list[str]:
@@ -82,7 +82,7 @@ def analysed(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def newest_id(shop: Shop) -> str:
-    found: str = shop.logbook.newest().id
+    found: str = shop.logbook.newest_tap().id
     return found
 
 
@@ -100,11 +100,11 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     for entry in shop.folder.taps():
         if entry.id != out:
             other.commit(shop.folder.read(entry))
-    before = shop.logbook.standing(day(shop, 61))
+    before = shop.logbook.status(day(shop, 61))
     exclude_entry(shop.folder, out, "wrong tool")
     mine, never = shop.logbook, Logbook(other)
     at = day(shop, 61)
-    assert mine.standing(at) == never.status(at) != before
+    assert mine.status(at) == never.status(at) != before
     columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "rulings", "remarks")
     for row, same in zip(mine.history.rows, never.history.rows, strict=True):
         assert [getattr(row, name) for name in columns] == [getattr(same, name) for name in columns]
@@ -113,7 +113,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     pages = [re.sub(shown, "", render_report(one, "reference", "x"), flags=re.DOTALL) for one in (mine, never)]
     assert pages[0].split() == pages[1].split()
     include_entry(shop.folder, out)
-    assert shop.logbook.standing(at) == before
+    assert shop.logbook.status(at) == before
 
 
 def test_only_rows_after_an_exclusion_or_a_baseline_are_analysed_anew(
@@ -139,13 +139,13 @@ def test_a_new_baseline_follows_the_mode_of_a_rebuilt_spindle_and_ends_the_alarm
     event = add_event(shop.folder, "bearings replaced", day(shop, 45), new_baseline=True)
     assert codes(shop, 61) == ["one-direction"]
     logbook = shop.logbook
-    series = logbook.standing(day(shop, 61)).series_of("reference", "x")
+    series = logbook.status(day(shop, 61)).series_of("reference", "x")
     assert series is not None
     assert series.is_first
     assert logbook.assembly().directions == ("x",)
     assert logbook.history.rows[-1].frequency.value == pytest.approx(1713.0 * 1.2, abs=0.5)
     shop.tap(90, 1713.0 * 1.2 * 0.97)
-    (found,) = shop.logbook.standing(day(shop, 91)).series
+    (found,) = shop.logbook.status(day(shop, 91)).series
     assert found.fall.value == pytest.approx(3.0, abs=0.05)
     withdraw_event(shop.folder, event.id)
     assert "frequency-alarm" in codes(shop, 91)
@@ -155,8 +155,8 @@ def test_after_a_new_baseline_nothing_is_known_until_the_next_tap(shop: Shop) ->
     mill(shop)
     shop.tap_both()
     add_event(shop.folder, "spindle replaced", day(shop, 10), new_baseline=True)
-    standing = shop.logbook.standing(day(shop, 11))
-    assert (standing.light, [one.code for one in standing.remarks]) == ("unknown", ["never-tapped"])
+    standing = shop.logbook.status(day(shop, 11))
+    assert (standing.status, [one.code for one in standing.remarks]) == ("unknown", ["never-tapped"])
     assert [one.stability.value for one in shop.logbook.verdicts()] == ["unknown"]
     for command in ("check", "report", "lobes"):
         with pytest.raises(DataError, match=r"no tap test.* since the new baseline of 2026-01-25"):

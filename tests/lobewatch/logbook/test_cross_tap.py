@@ -50,7 +50,7 @@ def tap(shop: Shop, days: float, direction: TapDirection, modes: list[Mode], see
 
 @pytest.fixture
 def askew(shop: Shop) -> Shop:
-    """A spindle whose modes lie 35 degrees askew, tapped in x and y, with a narrow program."""
+    """Make a spindle with principal directions at 35 degrees, tapped in x and y, with a narrow program."""
     shop.put(NARROW)
     shown = project_modes(PAIR, turned_by(35))
     tap(shop, 0, "x", shown.x)

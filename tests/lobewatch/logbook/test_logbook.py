@@ -66,7 +66,7 @@ Shop = Any
 
 @pytest.fixture
 def path(shop: Shop) -> Path:
-    """The example machine, with few speeds and programs that are safe when it is new."""
+    """Make the example machine with few speeds and programs that are stable when it is new."""
     folder: Path = shop.path
     return folder
 
@@ -289,8 +289,8 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
         shop.tap_both(days, share)
     logbook = shop.logbook
     first, last = logbook.taps[1].id, logbook.taps[-1].id
-    assert [ruling.stability for ruling in logbook.rulings(first).values()] == [Stability.STABLE] * 3
-    assert [ruling.stability for ruling in logbook.rulings(last).values()].count(Stability.NOT_STABLE) == 2
+    assert [ruling.stability for ruling in logbook.stored_verdicts(first).values()] == [Stability.STABLE] * 3
+    assert [ruling.stability for ruling in logbook.stored_verdicts(last).values()].count(Stability.NOT_STABLE) == 2
     kept = [row.rulings is not None for row in shop.logbook.history.rows]
     assert kept == [False, True, False, False, False, True]
 
@@ -306,10 +306,10 @@ def test_a_program_is_judged_once_in_an_opened_logbook(shop: Shop, monkeypatch: 
     shop.tap_both()
     logbook = shop.logbook
     words = [found.stability for found in logbook.verdicts()]
-    logbook.standing(START)
+    logbook.status(START)
     (one,) = logbook.verdicts(names=["B"])
     assert (asked, one.stability, one.program.name) == (["A", "B", "C"], words[1], "B")
-    again = logbook.folder.read(logbook.newest())
+    again = logbook.folder.read(logbook.newest_tap())
     logbook.commit(replace(again, id=f"{again.id}-2", circumstances=replace(again.circumstances, operator="Kim")))
     logbook.verdicts()
     assert asked == ["A", "B", "C"] * 2
@@ -388,7 +388,7 @@ def test_somebody_elses_tap_is_noticed(path: Path) -> None:
     tap(path, 0, 1713.0)
     assert not logbook.is_current
     mine = Logbook.open(path)
-    mine.commit(logbook.folder.read(mine.newest()))
+    mine.commit(logbook.folder.read(mine.newest_tap()))
     assert mine.is_current
 
 

@@ -26,26 +26,26 @@ LONG = 90
 
 
 def machine(path: Path, address: str) -> Path:
-    """A machine that names a broker."""
+    """Make a machine that names a broker."""
     path.mkdir(parents=True)
     (path / "machine.toml").write_text(f'[machine]\nname = "{path.name}"\n[notify]\nmqtt = "{address}"\n', "utf-8")
     return path
 
 
 def run(*arguments: object) -> Result:
-    """A command in this process."""
+    """Run a command in this process."""
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
 
 
 def started(*arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:
-    """A command in a process of its own, which has to end, threads and all."""
+    """Run a command in a process of its own, which must end with all its threads."""
     program = f"import sys\n{before}\nsys.argv[0] = 'lobewatch'\nfrom lobewatch.cli import main\nmain()"
     command = [sys.executable, "-c", program, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=False)
 
 
 def received(broker: Mosquitto, topic: str | list[str], **how: Any) -> Any:
-    """The message that stands at a topic, or several of several."""
+    """Read the retained message of a topic, or of several topics."""
     ask: Any = subscribe.simple
     return ask(topic, qos=1, hostname="127.0.0.1", port=broker.port, **how)
 

@@ -122,7 +122,7 @@ def say_nothing_more(broker: FakeBroker, connection: socket.socket) -> None:
 
 
 def answer_byte_by_byte(broker: FakeBroker, connection: socket.socket) -> None:
-    """A byte every five seconds."""
+    """Send a byte every five seconds."""
     for byte in TAKEN:
         connection.sendall(bytes([byte]))
         if broker.ended.wait(5):

@@ -25,6 +25,7 @@ COMMANDS = re.findall(r"lobewatch ((?:status|trend|check|verify|serve)\b[^`>|\n]
 
 
 @pytest.mark.parametrize("line", COMMANDS)
+@pytest.mark.quick
 def test_each_command_is_understood(line: str) -> None:
     group = typer.main.get_command(app)
     assert isinstance(group, typer.core.TyperGroup)
@@ -45,6 +46,7 @@ def test_the_table_for_machine_toml_is_taken_with_the_password(monkeypatch: pyte
     assert broker == ("mqtt", "broker.example", 1883, "lobewatch", "...", "plant")
 
 
+@pytest.mark.quick
 def test_each_key_of_a_message_and_each_family_is_explained() -> None:
     summary = MachineSummary("m", (), "tap")
     now = datetime(2026, 1, 1, tzinfo=UTC)

@@ -91,7 +91,7 @@ def test_a_plant_of_bad_brokers_is_told_in_parallel_and_the_good_one_too(
         sentences |= {address.replace("mqtt", "mqtts"): rf"cannot be reached({LATE}| \(.*\))" for address in encrypted}
         mills = [machine(plant / f"m{number}", address) for number, address in enumerate(sentences)]
         said = started(
-            "status", plant, "--notify", before=f"from lobewatch.notify import mqtt; mqtt.PATIENCE = {PATIENCE}"
+            "status", plant, "--notify", before=f"from lobewatch.notify import mqtt; mqtt.MQTT_TIMEOUT = {PATIENCE}"
         )
     assert said.returncode == 2  # everything else is done
     notes = [line for line in said.stderr.splitlines() if "MQTT" in line]

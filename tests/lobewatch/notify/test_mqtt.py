@@ -87,10 +87,10 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
     mosquitto.start()
     program = (
         "import os, sys; from paho.mqtt.client import Client\n"
-        "from lobewatch.machine.settings.notify_table import broker_of\n"
+        "from lobewatch.machine.settings.notify_table import parse_broker\n"
         "from lobewatch.notify import mqtt\n"
         "Client.publish = lambda *_, **__: os._exit(1)\n"
-        "mqtt.send({broker_of(sys.argv[1]): {}})"
+        "mqtt.send_messages({parse_broker(sys.argv[1]): {}})"
     )
     subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
@@ -101,12 +101,14 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
 @pytest.mark.parametrize(
     "address", ["mqtt://", "http://host", "mqtt://host:99999", "mqtt://host/a/#", "host", "mqtt://me:secret@/x"]
 )
+@pytest.mark.quick
 def test_what_is_no_address_is_refused_without_telling_the_password(address: str) -> None:
     with pytest.raises(DataError, match="is no address of a broker; give mqtt://HOST") as refused:
         parse_machine_file(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
     assert "secret" not in str(refused.value)
 
 
+@pytest.mark.quick
 def test_user_password_port_and_prefix_stand_in_the_address() -> None:
     found = parse_broker("mqtts://me:p%40ss@broker.example/hall/")
     assert found == ("mqtts", "broker.example", 8883, "me", "p@ss", "hall")

@@ -52,7 +52,7 @@ class Browser:
         self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNT_TONES})
 
     def open(self, url: str, size: tuple[int, int] = (1280, 800), scheme: str = "light") -> None:
-        """A page in a window of this size, with nothing remembered."""
+        """Open a page in a window of this size, with an empty profile."""
         self.prefer(scheme)
         self.driver.execute_cdp_cmd(
             "Storage.clearDataForOrigin", {"origin": url.partition("/#")[0], "storageTypes": "all"}
@@ -68,7 +68,7 @@ class Browser:
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
 
     def prefer(self, scheme: str, media: str = "") -> None:
-        """What the system says of the screen: "light" or "dark"; media "print": as it would be printed."""
+        """Set the color scheme ("light" or "dark") and the medium ("print")."""
         wish = {"name": "prefers-color-scheme", "value": scheme}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": [wish]})
 
@@ -96,7 +96,7 @@ class Browser:
         return [(rule["id"], rule["nodes"][0]["html"]) for rule in answer["violations"]]
 
     def log(self, kind: str) -> list[dict[str, Any]]:
-        """New entries of a log of the browser."""
+        """Return new entries of a log of the browser."""
         return list(self.driver.execute("getLog", {"type": kind})["value"])
 
     def complaints(self) -> list[str]:
@@ -116,7 +116,7 @@ class Browser:
 
 @pytest.fixture(scope="module")
 def opened() -> Iterator[Browser]:
-    """A browser; skips where there is none, but not in continuous integration."""
+    """Start a browser; skip without one, except in continuous integration."""
     if not (CHROMIUM and DRIVER) and "CI" not in os.environ:
         pytest.skip("chromium and chromedriver are not installed")
     browser = Browser()
@@ -126,7 +126,7 @@ def opened() -> Iterator[Browser]:
 
 @pytest.fixture
 def browser(opened: Browser) -> Iterator[Browser]:
-    """A browser whose page must not complain."""
+    """Return a browser whose page must not log errors."""
     yield opened
     assert opened.complaints() == []
 

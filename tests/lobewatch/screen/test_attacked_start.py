@@ -1,5 +1,4 @@
-"""START and the screen of a cut under attack: each wrong request gets one error, nothing begins, and a right one is
-answered afterwards."""
+"""Attack START and the screen of a cut with wrong requests; each gets one error, and right requests still work."""
 
 from __future__ import annotations
 
@@ -75,7 +74,7 @@ def ask(server: WebServerThread, method: str, path: str, body: bytes = b"", **ch
 
 
 def connected(server: WebServerThread) -> socket.socket:
-    """A connection on which nothing is sent yet."""
+    """Open a connection without sending anything."""
     return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=10)
 
 
@@ -98,7 +97,7 @@ def begins(server: DashboardServer) -> bool:
 
 
 def tappable(path: Path, port: str) -> MachineFolder:
-    """The example machine with this port."""
+    """Make the example machine with this port."""
     toml = make_machine_folder(path / "mill", "surrogate_machine.toml")
     toml.write_text(toml.read_text("utf-8").replace("[daq]\n", f'[daq]\nport = "{port}"\n'), "utf-8")
     return MachineFolder(path / "mill")
@@ -106,7 +105,7 @@ def tappable(path: Path, port: str) -> MachineFolder:
 
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DashboardServer]:
-    """A machine that could be tapped, and its server."""
+    """Serve a machine that could be tapped."""
     path = tmp_path_factory.mktemp("shop")
     tappable(path, "/dev/nothing-here")
     with DashboardServer(path, token=TOKEN, watch_token=WATCH) as server:
@@ -115,7 +114,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DashboardServer]:
 
 @pytest.fixture
 def cut() -> Iterator[CutScreenServer]:
-    """The screen of a cut that is waited for."""
+    """Serve the screen of a cut that has not begun."""
     pictures = StatePublisher(CutState(1, CutStep.LISTENING, "mill-3, A at 12 000 rpm"), lambda: 0.0)
     with CutScreenServer(pictures, token=TOKEN, watch_token=WATCH) as server:
         yield server
@@ -215,10 +214,10 @@ def test_twenty_starts_at_once_after_a_failure_begin_one_test(tmp_path: Path, mo
             super().__init__(*args, **options)
 
     monkeypatch.setattr("lobewatch.screen.dashboard_server.LiveTest", Counted)
-    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(1.0))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server._release_memory", lambda: time.sleep(1.0))
     with DashboardServer(tmp_path, token=TOKEN) as server, ThreadPoolExecutor(20) as pool:
         assert ask(server, "POST", START, X)[0] == 200
-        while begun[0].running:
+        while begun[0].is_running:
             time.sleep(0.02)
         answers = [*pool.map(lambda _: ask(server, "POST", START, X), range(20))]
         assert answers == [(200, {"url": "/tap/mill/"})] * 20

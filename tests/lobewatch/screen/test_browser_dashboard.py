@@ -16,7 +16,7 @@ from acquisition import Circumstances, Hit, HitFlags, TapDirection, TapTest, fro
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.screen import machine_table as board
+from lobewatch.screen import dashboard_table as board
 from modal import Mode, synthesize_frf
 
 Browser = Any
@@ -28,14 +28,14 @@ LINES = [4.0 * line for line in range(1, 1000)]
 
 
 def tap(path: Path, days_ago: float, frequency: float, direction: TapDirection = "x") -> None:
-    """A tap test without noise."""
+    """Make a tap test without noise."""
     about = Circumstances("m", datetime.now(UTC) - timedelta(days=days_ago), "reference", direction)
     frf = synthesize_frf([Mode(frequency, 0.029, 3.5e7)], LINES)
     MachineFolder(path).commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 
 def machine(path: Path, daq: str = "") -> None:
-    """The example machine without its programs."""
+    """Make the example machine without its programs."""
     toml = make_machine_folder(path, "surrogate_machine.toml")
     text = toml.read_text("utf-8")
     begin, end = text.index("[[program]]"), text.index("# The spindle of the example")

@@ -58,7 +58,7 @@ def address(told: str) -> str:
 
 
 def check_page(browser: Browser) -> None:
-    """The word can be read from 3 m at all sizes, nothing is beside the page, and axe finds nothing, be it dark."""
+    """Check that the verdict is readable from 3 m at all sizes and that axe finds no problem."""
     for size in SIZES:
         browser.resize(size)
         browser.wait(lambda size=size: letters(browser) >= LEAST[size[0]])

@@ -15,7 +15,7 @@ import pytest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen import DashboardServer
 from lobewatch.screen.dashboard_server import LiveTest
-from tests.lobewatch.screen.test_dashboard import ask, hammered, machine
+from tests.lobewatch.screen.test_dashboard_server import ask, hammered, machine
 
 WINDOW = 20
 """Tap tests over which the median of the memory is taken: garbage comes and goes."""
@@ -24,7 +24,7 @@ kept: list[bytes] = []
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[DashboardServer]:
-    """A machine that somebody taps as fast as its hits are read; three hits are a test."""
+    """Make a machine tapped as fast as its hits are read; three hits make a test."""
     folder = machine(tmp_path / "mill", hits=3)
     with hammered(folder) as device:
         text = folder.toml.read_text("utf-8")
@@ -34,7 +34,7 @@ def served(tmp_path: Path) -> Iterator[DashboardServer]:
 
 
 def tap(server: DashboardServer, number: int) -> str:
-    """A tap test from START to its end, and the report after it, as a person looks at them; address of the report."""
+    """Run a tap test from START to its report, and return the address of the report."""
     assert ask(server, "POST", "/machines/mill/start", {"direction": "xy"[number % 2], "resume": False})[0] == 200
     deadline = time.monotonic() + 100
     while ask(server, "GET", "/machines")[1]["machines"][0]["running"]:

@@ -20,7 +20,7 @@ MODEL = "# The spindle of the example"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """The example with the first of its programs alone."""
+    """Make the example machine with its first program only."""
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     toml = tmp_path / "m" / "machine.toml"
     head, first, *_, last = toml.read_text("utf-8").split("[[program]]")

@@ -54,7 +54,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     now = logbook.history.rows[-1].time + timedelta(days=1)
     html = render_report(logbook, "reference", "x", now)
     first = first_screen(html)
-    standing = logbook.standing(now)
+    standing = logbook.status(now)
     light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.light]
     for words in (
         light,
@@ -99,7 +99,7 @@ def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
     now = shop.logbook.history.rows[-1].time + timedelta(days=40)
     html = render_report(shop.logbook, "reference", "x", now)
     words = unescape(re.sub(r"<svg.*?</svg>|<[^>]+>", " ", first_screen(html), flags=re.DOTALL))
-    reasons = [remark.finding for remark in shop.logbook.standing(now).remarks]
+    reasons = [remark.finding for remark in shop.logbook.status(now).remarks]
     assert sum("falling since" in reason or "fallen by" in reason for reason in reasons) == 4
     assert sum(reason in words for reason in reasons) == 1
     assert words.count("falling since") == 2  # the courses of x and y
@@ -143,7 +143,7 @@ def test_a_response_is_shown_from_below_its_lowest_mode_on(shop: Shop) -> None:
     """Lower down what an accelerometer says is divided by next to nothing, and a picture of it has no modes."""
     shop.edit("band_hz = [1200, 2200]", "")
     shop.tap(0, 1713.0)
-    material = shop.logbook.ask(collect_report_data, "reference", "x", None)
+    material = shop.logbook.query(collect_report_data, "reference", "x", None)
     low, high = material.response_band(Frf(np.arange(1.0, 6001.0), np.zeros(6000, complex)))
     lowest = min(frequency for frequency, *_ in material.last.modes)
     assert (low, high) == (pytest.approx(0.3 * lowest), 6000.0)
@@ -195,7 +195,7 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
         frequency *= 1 - float(random.choice([0.0, 0.002, 0.06]) * random.random())
         machine.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
     plant = Fleet({"m": machine.path}).assess_machines()
-    newest = machine.logbook.newest()
+    newest = machine.logbook.newest_tap()
     html = render_report(machine.logbook, newest.tool, newest.direction)
     assert run("report", path).exit_code == 0
     fleet = (path / "report.html").read_text("utf-8")

@@ -33,7 +33,7 @@ NEW, WORN = 1.28e9, 0.6661e9
 
 
 def machine(path: Path, daq: str = "", hits: int = 10) -> MachineFolder:
-    """The example machine."""
+    """Make the example machine."""
     toml = make_machine_folder(path, "surrogate_machine.toml")
     text = toml.read_text("utf-8").replace("[daq]\n", f"[daq]\n{daq}\n").replace("hits = 10", f"hits = {hits}")
     toml.write_text(text, "utf-8")
@@ -70,7 +70,7 @@ def ask(server: DashboardServer, method: str, path: str, body: object = None, to
 
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A worn machine, one tapped once, one never tapped, and one with a broken machine.toml."""
+    """Make a worn machine, one tapped once, one never tapped, and one with a broken machine.toml."""
     path = tmp_path_factory.mktemp("shop")
     worn = machine(path / "b-worn")
     tap(worn, NEW, DAY - timedelta(days=60))

@@ -214,8 +214,7 @@ def knocking_at(server: ScreenServer, held: int) -> Iterator[list[int]]:
 
 
 def tapped(path: Path, hits: int, held: int, realtime: bool = True) -> tuple[TapTest, float, int]:
-    """A guided test while so many half-sent requests are held at its screen; good hits a second after the first, and
-    how many requests were begun."""
+    """Run a guided test with many half-sent requests; return seconds of the good hits and the number of requests."""
     toml = make_machine_folder(path, "surrogate_machine.toml")
     toml.write_text(toml.read_text("utf-8").replace("hits = 10", f"hits = {hits}"), "utf-8")
     folder = MachineFolder(path)

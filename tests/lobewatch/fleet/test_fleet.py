@@ -36,6 +36,7 @@ def test_equal_frequencies_are_good_however_many(shop: Shop, count: int) -> None
     assert codes(shop, count) <= {"one-direction"}
 
 
+@pytest.mark.quick
 def test_an_event_before_the_first_tap_takes_nothing_away(shop: Shop) -> None:
     shop.put("")
     for number in range(2):

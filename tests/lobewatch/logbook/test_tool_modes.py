@@ -17,6 +17,7 @@ Shop = Any
 LONG = "long end mill"
 
 
+@pytest.mark.quick
 def test_scatter_is_the_half_width_of_95_percent_as_a_standard_deviation(shop: Shop) -> None:
     shop.put("[doubt]\nfrequency_percent = 0.98\n")
     shop.tap(0, 1713.0)

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.screen import machine_table as board
-from tests.lobewatch.screen.test_dashboard import ask
+from lobewatch.screen import dashboard_table as board
+from tests.lobewatch.screen.test_dashboard_server import ask
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""

@@ -82,7 +82,7 @@ def test_a_live_test_replayed_gives_equal_modes_and_words(
 
 
 def keeps_source(logbook: Logbook, file: Path) -> bytes:
-    """What the tap test that a file was replayed to keeps of its bytes; the file is known again by its SHA-256."""
+    """Return the stored bytes of a replayed file; its SHA-256 is known again."""
     tap_id = logbook.replay_all([file], Description()).already_stored[file]
     entry = next(tap for tap in logbook.taps if tap.id == tap_id)
     source = logbook.folder.read(entry).source

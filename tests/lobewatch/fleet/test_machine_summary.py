@@ -68,8 +68,8 @@ def test_it_says_at_any_time_what_the_standing_says(tapped: Shop) -> None:
     summary = read_summary(tapped.path, now(tapped, 62.0))
     assert summary is not None
     for days in (61.0, 89.9, 90.2, 400.0, 3.0):
-        told, expected = summary.status_at(now(tapped, days), tapped.path), tapped.logbook.standing(now(tapped, days))
-        assert (told.status, told.remarks, told.next_step) == (expected.light, expected.remarks, expected.next_step)
+        told, expected = summary.status_at(now(tapped, days), tapped.path), tapped.logbook.status(now(tapped, days))
+        assert (told.status, told.remarks, told.next_step) == (expected.status, expected.remarks, expected.next_step)
         assert told.days_left == pytest.approx(expected.days_left)
     assert {"overdue", "frequency-warn"} <= {
         one.code for one in summary.status_at(now(tapped, 91.0), tapped.path).remarks
@@ -115,7 +115,7 @@ def test_that_of_another_folder_or_another_week_does_not_count(tapped: Shop, tmp
     assert read_summary(tmp_path / "other", now(tapped)) is None
     assert kept(tapped)
     assert read_summary(tapped.path, now(tapped) + SUMMARY_LIFETIME) is None
-    newest = tapped.path / "taps" / f"{tapped.logbook.newest().id}.h5"
+    newest = tapped.path / "taps" / f"{tapped.logbook.newest_tap().id}.h5"
     newest.write_bytes(newest.read_bytes()[:-1])
     assert not kept(tapped)
 
@@ -141,7 +141,7 @@ def test_whoever_alters_a_machine_leaves_its_standing_beside_it(shop: Shop) -> N
 def test_a_machine_whose_lock_is_held_is_told_without_a_file(tapped: Shop) -> None:
     with MachineFolder(tapped.path).locked():
         ((_, _, summary, _),) = Fleet({"m": tapped.path}).assess_machines(now(tapped))
-    assert summary.newest_tap_id == tapped.logbook.newest().id
+    assert summary.newest_tap_id == tapped.logbook.newest_tap().id
     assert not (tapped.path / "standing.json").exists()
 
 
@@ -174,9 +174,8 @@ def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
     assert "program-" in dated.remarks[0].code
     found = Logbook.open(tapped.path).status(now(tapped))
     assert (dated.status, dated.remarks) == (found.status, found.remarks)
-    assert summary.programs == {
-        name: one.stability for name, one in (tapped.logbook.history.rows[-1].rulings or {}).items()
-    }
+    stored = tapped.logbook.history.rows[-1].verdicts or {}
+    assert summary.programs == {name: one.stability for name, one in stored.items()}
 
 
 def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:

@@ -1,4 +1,4 @@
-"""Table of all machines for the dashboard, with the changes since the last request."""
+"""Keep the table of all machines for the dashboard, with the changes since a request."""
 
 from __future__ import annotations
 
@@ -18,33 +18,34 @@ from acquisition import DataError
 from lobewatch.fleet.fleet import Fleet, FleetMachine, find_machines
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.fleet.fleet_status import fleet_row
+from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 from lobewatch.tap.spool import count_interrupted_hits
 
 MACHINE_POLL_INTERVAL = 4.0
-"""Time between two looks at the files at least (s), whatever the number of pages; chosen."""
+"""Shortest time between two polls of the files (s), for all pages together; chosen."""
 
 
 class _MachineRow(NamedTuple):
-    """The row of one machine."""
+    """Row of one machine."""
 
     inputs: tuple[Any, ...]
-    """Ground that it was made on: the same again would give the same row."""
+    """Data that the row was made from."""
     content: msgspec.Raw
-    """Row as JSON."""
+    """Row, encoded as JSON."""
     change: int
-    """Number of the change that made it so."""
+    """Number of the change that made this row."""
 
 
-class MachineTable:
-    """The rows of all machines of a folder, worst first, each with the number of its last change.
+class DashboardTable:
+    """Rows of all machines of a folder, most severe first, each with the number of its last change.
 
-    Machines come and go with their folders. One look at the files serves all pages that ask within LOOK_EVERY.
+    Machines come and go with their folders. One poll serves all pages within MACHINE_POLL_INTERVAL.
     """
 
     def __init__(self, path: Path) -> None:
-        """Brings the histories up to date; DataError where there is no machine."""
+        """Assess the machines. DataError if there is no machine."""
         self._path = path
-        self.fleet = Fleet(find_machines(path))
+        self.fleet = Fleet(find_machines(path), with_option_names)
         self._start = secrets.token_hex(4)
         self._change = 0
         self._rows: dict[str, _MachineRow] = {}
@@ -55,16 +56,16 @@ class MachineTable:
         self._poll()
 
     def assess_machines(self) -> list[FleetMachine]:
-        """Of the machines that are there now."""
-        with suppress(DataError):  # none at all: the folder may be away for a while, and each of them says so
+        """Assess the machines that are present now."""
+        with suppress(DataError):  # a missing folder may come back; each machine reports it
             self.fleet.set_machines(find_machines(self._path))
         return self.fleet.assess_machines()
 
     def updates_since(self, known: str, running: Collection[str]) -> dict[str, Any]:
-        """What has changed since a known version; all, where it is none of this server.
+        """Return the changes since a version of the table, or all rows if the version is not of this server.
 
-        running: machines that a test runs on. What has changed are rows, each with its place in the new list, in order
-        of these places, and the names of machines that are gone.
+        Changes are new rows with their places in the table, in order, and the names of missing machines. `running`
+        holds the machines with a running tap test.
         """
         start, _, number = known.partition("-")
         with self._lock:
@@ -84,41 +85,36 @@ class MachineTable:
         }
 
     def _poll(self) -> None:
-        """Look at the files, and number what has changed."""
+        """Assess the machines and number the changes."""
         change = self._change + 1
-        rows = {standing.key: self._row(standing, change) for standing in self.assess_machines()}
+        rows = {machine.key: self._row(machine, change) for machine in self.assess_machines()}
         self._gone |= dict.fromkeys(self._rows.keys() - rows.keys(), change)
         self._gone = {key: number for key, number in self._gone.items() if key not in rows}
         numbers = [row.change for row in rows.values()]
         self._change = max([self._change, *numbers, *self._gone.values()])
         self._rows, self._polled = rows, time.monotonic()
 
-    def _row(self, standing: FleetMachine, change: int) -> _MachineRow:
-        """That of the last look, where it would be the same again."""
-        standing = _round_days_left(standing)
-        interrupted, running = _count_interrupted_hits(standing.path), standing.key in self._running
-        dated = standing.current._replace(time=standing.current.time.replace(hour=0, minute=0, second=0, microsecond=0))
-        ground = (standing.summary, dated, interrupted, running)
-        last = self._rows.get(standing.key)
-        if last is not None and last.inputs == ground:
+    def _row(self, machine: FleetMachine, change: int) -> _MachineRow:
+        """Make the row of a machine, or keep the last one if nothing has changed."""
+        days = machine.current.days_left  # rounded as pages show them, else every poll would change every row
+        current = machine.current._replace(days_left=None if days is None else math.floor(days))
+        interrupted, running = _count_interrupted_hits(machine.path), machine.key in self._running
+        today = current.time.replace(hour=0, minute=0, second=0, microsecond=0)
+        inputs = (machine.summary, current._replace(time=today), interrupted, running)
+        last = self._rows.get(machine.key)
+        if last is not None and last.inputs == inputs:
             return last
-        row = fleet_row(standing) | {"interrupted": interrupted, "running": running}
-        content = msgspec.Raw(msgspec.json.encode(row))
-        return _MachineRow(ground, content, last.change if last is not None and last.content == content else change)
-
-
-def _round_days_left(standing: FleetMachine) -> FleetMachine:
-    """Days left rounded down, as pages show them: what changes with every look would be sent with every look."""
-    left = standing.current.days_left
-    return standing._replace(current=standing.current._replace(days_left=left if left is None else math.floor(left)))
+        row = fleet_row(machine._replace(current=current)) | {"interrupted": interrupted, "running": running}
+        content = msgspec.Raw(msgspec.json.encode({key: with_option_names_inside(value) for key, value in row.items()}))
+        return _MachineRow(inputs, content, last.change if last is not None and last.content == content else change)
 
 
 def _count_interrupted_hits(folder: Path) -> dict[str, int]:
-    """Hits of the interrupted tests of a machine, by direction."""
+    """Count the hits of the interrupted tap tests of a machine, by direction."""
     try:
-        if not os.path.isdir(f"{folder}/spool"):  # noqa: PTH112 - of thousands of machines at every look
+        if not os.path.isdir(f"{folder}/spool"):  # noqa: PTH112 - fast for thousands of machines
             return {}
         is_empty = not any(path.is_dir() for path in (folder / "spool").iterdir())
         return {} if is_empty else count_interrupted_hits(MachineFolder(folder))
     except (OSError, ValueError):
-        return {}  # the row says what is wrong
+        return {}  # the row shows what is wrong

@@ -79,6 +79,7 @@ async def next_state(feed: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
         assert message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY)
 
 
+@pytest.mark.quick
 def test_the_page_needs_no_token_and_tells_nothing(session: Session) -> None:
     with ScreenServer(session, token=TOKEN) as server:
         assert server.url == f"{server.origin}/#token={TOKEN}"
@@ -101,6 +102,7 @@ def test_every_token_is_another() -> None:
 
 
 @pytest.mark.parametrize("token", ["", "short", "has a space in it", "ä" * 20, "x#y" * 9])
+@pytest.mark.quick
 def test_a_token_that_does_not_fit_into_an_address_is_refused(session: Session, token: str) -> None:
     with pytest.raises(ValueError, match="12 to 200 characters"):
         ScreenServer(session, token=token)
@@ -165,6 +167,7 @@ def test_with_the_token_it_is(session: Session) -> None:
         assert session.stopped.is_set()
 
 
+@pytest.mark.quick
 def test_the_token_to_watch_shows_and_alters_nothing(session: Session) -> None:
     session.hit()
     seen: list[dict[str, Any]] = []
@@ -275,6 +278,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
         follow(server, talk)
 
 
+@pytest.mark.quick
 def test_the_curves_arrive_as_they_were(session: Session) -> None:
     session.hit()
     plots: LiveCurves = session.state.plots

@@ -31,7 +31,7 @@ def tap_series(shop: Shop, percents: NDArray[np.float64], first: int = 0, **said
 
 
 def trend_of(shop: Shop) -> Trend:
-    trend = shop.logbook.standing().series[0].trend
+    trend = shop.logbook.status().series[0].trend
     assert isinstance(trend, Trend)
     return trend
 
@@ -165,6 +165,6 @@ def test_a_fall_that_has_slowed_down_is_said_to_settle(new_shop: type[Shop], tmp
     for shop, fall in ((run_in, -1.0 * (1 - np.exp(-months / 3))), (worn, -0.05 * months)):
         shop.put("")
         tap_series(shop, fall + 0.05 * random.normal(size=24))
-    said = [next(r for r in shop.logbook.standing().reasons if r.code == "decay").text for shop in (run_in, worn)]
+    said = [next(r for r in shop.logbook.status().reasons if r.code == "decay").text for shop in (run_in, worn)]
     assert "settling" in said[0]
     assert "settling" not in said[1]

@@ -49,7 +49,7 @@ def worn(shop: Shop) -> Shop:
 
 
 def words_after(shop: Shop, fall: float) -> dict[str, Stability]:
-    """The words with both directions fallen by so much of what they are now."""
+    """Return the verdicts after both directions have dropped by these shares."""
     shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
     return {one.program.name: one.stability for one in shop.logbook.verdicts()}
 
@@ -103,9 +103,9 @@ def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
             damping_ratio=0.029 * (1 + 0.002 * (-1) ** i) * (1.2 if i > 8 else 1),
             stiffness=3.5e7 * (1 + 0.002 * (-1) ** i) * (0.9 if i > 9 else 1),
         )
-    found = shop.logbook.standing(shop.logbook.history.rows[-1].time)
+    found = shop.logbook.status(shop.logbook.history.rows[-1].time)
     said = [str(remark) for remark in found.remarks if remark.code == "value-changed"]
-    assert found.light == "good"
+    assert found.status == "good"
     assert any("damping ratio rose at once before 2026-05-30, by 19." in one for one in said)
     assert any("stiffness K fell at once before 2026-06-14, by 10." in one for one in said)
     assert not any("bearing" in one for one in said)
@@ -266,7 +266,7 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
 
 
 def printed_of(shop: Shop, tap_id: str) -> str:
-    """What is printed of a tap test."""
+    """Return the printed text on a tap test."""
     return "\n".join(map(str, measurement_texts(shop.logbook.measurement(tap_id), shop.logbook)))
 
 

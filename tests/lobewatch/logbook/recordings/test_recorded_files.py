@@ -1,0 +1,47 @@
+"""Recorded files are found by path, folder and pattern, and dated by their names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from acquisition import DataError
+from lobewatch.logbook.recordings.recorded_files import find_recordings, parse_date_in_name
+from lobewatch.logbook.recordings.store_recordings import format_rejections, group_by_message
+
+pytestmark = pytest.mark.quick
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "date"),
+    [
+        ("tap_20240501.csv", "%Y%m%d", "2024-05-01T00:00:00"),
+        ("3.7.24 x.mat", "%d.%m.%y", "2024-07-03T00:00:00"),
+        ("2024-May-02_0915.lvm", "%Y-%b-%d_%H%M", "2024-05-02T09:15:00"),
+    ],
+)
+def test_a_date_in_a_name_is_found(name: str, pattern: str, date: str) -> None:
+    assert parse_date_in_name(Path(name), pattern).replace(tzinfo=None).isoformat() == date
+
+
+@pytest.mark.parametrize(("pattern", "text"), [("%Q", "give it with %Y, %y"), ("%Y%m%d", "no date like")])
+def test_a_name_without_a_date_and_a_pattern_without_a_directive_are_rejected(pattern: str, text: str) -> None:
+    with pytest.raises(ValueError, match=text) as error:
+        parse_date_in_name(Path("tap.csv"), pattern)
+    assert "Description.date_pattern" in str(error.value)
+
+
+def test_files_of_a_folder_are_recordings_or_passed_over(tmp_path: Path) -> None:
+    for name, text in (("a.csv", "1,2\n3,4\n"), ("b.pdf", "x"), (".c.csv", "1,2\n")):
+        (tmp_path / name).write_text(text, "utf-8")
+    assert find_recordings([tmp_path]) == ([tmp_path / "a.csv"], [tmp_path / "b.pdf"])
+    assert find_recordings([tmp_path / "a.csv", tmp_path / "*.pdf"])[0] == [tmp_path / "a.csv", tmp_path / "b.pdf"]
+    with pytest.raises(DataError, match="no file matches"):
+        find_recordings([tmp_path / "*.mat"])
+
+
+def test_equal_messages_are_grouped_and_many_files_counted() -> None:
+    assert group_by_message([(name, "bad") for name in "abcde"]) == ["a, b, c and 2 more: bad"]
+    text = format_rejections({Path("a"): "bad"}, 2)
+    assert text == "a: bad (1 of 2 files; nothing is stored; store_recordings.keep_going stores the others)"

@@ -41,7 +41,7 @@ class RowRecord(msgspec.Struct, array_like=True, gc=False):
     operator: str = ""
 
 
-CONVERTED_FIELDS = ("number", "time", "baseline", "conditions", "rulings", "software")
+CONVERTED_FIELDS = ("number", "time", "baseline", "conditions", "verdicts", "software")
 """Fields that a record has otherwise than a row."""
 SHARED_FIELDS = tuple(name for name in RowRecord.__struct_fields__ if name not in CONVERTED_FIELDS)
 """Fields that both have alike."""

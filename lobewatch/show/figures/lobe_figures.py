@@ -15,10 +15,10 @@ from matplotlib.dates import AutoDateLocator, DateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
 from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
@@ -36,11 +36,10 @@ from lobewatch.show.figures.drawing import (
     new_axes,
     save_figure,
 )
+from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
 from lobewatch.verdicts import Setting, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
-
-Floats = NDArray[np.float64]
 
 DEPTH_COLORMAP = "cividis"
 """Colours of depth: dark is shallow, bright is deep, in grey too."""
@@ -170,7 +169,7 @@ def _map_limit(depth: Floats) -> float:
 
 def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     """Line and band of the spindle at speed; depths (mm) end at the deepest."""
-    label = f"at speed, learnt from {learnt.n_cuts} test cut{'s' if learnt.n_cuts > 1 else ''}"
+    label = f"at speed, learnt from {count_noun(learnt.n_cuts, 'test cut')}"
     left = "98 % of what test cuts have left open"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)

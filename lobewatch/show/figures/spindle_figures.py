@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
 
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
+from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook.chart_data import ModelFigureData
 from lobewatch.show.figures.drawing import ALARM_ORANGE, FIGURE_STYLE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
@@ -172,7 +172,7 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     axes.yaxis.set_major_locator(MaxNLocator(4))
 
 
-def _mobility(frequency: NDArray[np.float64], receptance: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _mobility(frequency: Floats, receptance: Complexes) -> Complexes:
     """Mobility (mm/s/N)."""
     return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
 
@@ -184,7 +184,6 @@ def _phase_text(mode: Mode) -> str:
     return f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°"
 
 
-Floats = NDArray[np.float64]
 STEEL_GREY = "#c9d3dc"
 MODE_LINES = ((NEWEST_BLUE, "-"), (ALARM_ORANGE, "--"), (GOOD_GREEN, "-."), (FIRST_GREY, ":"))
 """Colour and dashes of the modes, in order."""

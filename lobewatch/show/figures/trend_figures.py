@@ -11,14 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobewatch.arrays import Floats
 from lobewatch.machine.settings.setup_tables import LimitsTable
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import ALARM_ORANGE, EVENT_GREY, FIRST_GREY, NEWEST_BLUE, new_axes
-
-Floats = NDArray[np.float64]
 
 TREND_FIGURE_SIZE = (8.0, 2.8)
 """Size of a picture of one value (inches)."""
@@ -96,8 +94,8 @@ def plot_frf(
 
 def plot_trend(
     times: Sequence[datetime],
-    values: NDArray[np.float64],
-    stds: NDArray[np.float64],
+    values: Floats,
+    stds: Floats,
     label: str,
     limits: LimitsTable | None = None,
     marks: TrendMarks = NO_MARKS,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from acquisition import DataError
 from acquisition.file_io import make_folder, sync_folder
+from lobewatch.arrays import Floats, Indices
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
 from lobewatch.machine.folder_lock import FolderLock
 from lobewatch.show.terminal.output import format_csv_cell
@@ -97,8 +98,6 @@ CREATE VIEW taps AS SELECT folder, machine, tap_id, strftime('%Y-%m-%dT%H:%M:%SZ
 """One line a tap test is the view `taps`; what repeats stands once."""
 _POWERS_OF_TEN = 10.0 ** np.arange(23)
 """Powers of ten that are numbers of the computer."""
-
-Floats = NDArray[np.float64]
 
 
 def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
@@ -184,7 +183,7 @@ def _number_cells(numbers: Floats) -> list[str]:
     return cells[2:-2].replace("null", "").replace(".0,", ",").split("],[")
 
 
-def round_significant(values: Floats, digits: NDArray[np.intp]) -> Floats:
+def round_significant(values: Floats, digits: Indices) -> Floats:
     """Values to significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
     with np.errstate(divide="ignore", invalid="ignore"):
         places = digits - 1 - np.floor(np.log10(np.abs(values)))

@@ -24,7 +24,8 @@ KEY_COLUMNS = ("folder", "tap_id", "time")
 COLUMN_TYPES = dict.fromkeys(TAP_NUMBER_COLUMNS, "double precision") | {"time": "timestamptz", "series": "integer"}
 COLUMN_DEFINITIONS = ", ".join(f"{name} {COLUMN_TYPES.get(name, 'text')}" for name in EXPORT_COLUMNS)
 CREATE_TABLE = f"""
-CREATE TABLE IF NOT EXISTS {POSTGRES_TABLE} ({COLUMN_DEFINITIONS}, counts boolean NOT NULL, PRIMARY KEY ({", ".join(KEY_COLUMNS)}))
+CREATE TABLE IF NOT EXISTS {POSTGRES_TABLE}
+  ({COLUMN_DEFINITIONS}, counts boolean NOT NULL, PRIMARY KEY ({", ".join(KEY_COLUMNS)}))
 """
 CREATE_HYPERTABLE = f"SELECT create_hypertable('{POSTGRES_TABLE}', 'time', chunk_time_interval => INTERVAL '1 month')"
 CREATE_INCOMING = (
@@ -38,13 +39,14 @@ INCOMING_VALUES = ", ".join(
 UPDATED_COLUMNS = [name for name in (*EXPORT_COLUMNS, "counts") if name not in KEY_COLUMNS]
 UPSERT = f"""
 INSERT INTO {POSTGRES_TABLE} SELECT {INCOMING_VALUES}, true FROM incoming
-ON CONFLICT ({", ".join(KEY_COLUMNS)}) DO UPDATE SET {", ".join(f"{name} = excluded.{name}" for name in UPDATED_COLUMNS)}
+ON CONFLICT ({", ".join(KEY_COLUMNS)})
+  DO UPDATE SET {", ".join(f"{name} = excluded.{name}" for name in UPDATED_COLUMNS)}
 WHERE ({", ".join(f"{POSTGRES_TABLE}.{name}" for name in UPDATED_COLUMNS)})
   IS DISTINCT FROM ({", ".join(f"excluded.{name}" for name in UPDATED_COLUMNS)})
 """
 MARK_EXCLUDED = f"""
-UPDATE {POSTGRES_TABLE} SET counts = false WHERE counts AND folder = ANY(%s)
-  AND NOT EXISTS (SELECT FROM incoming WHERE (incoming.folder, incoming.tap_id) = ({POSTGRES_TABLE}.folder, {POSTGRES_TABLE}.tap_id))
+UPDATE {POSTGRES_TABLE} AS stored SET counts = false WHERE counts AND folder = ANY(%s)
+  AND NOT EXISTS (SELECT FROM incoming WHERE (incoming.folder, incoming.tap_id) = (stored.folder, stored.tap_id))
 """
 
 

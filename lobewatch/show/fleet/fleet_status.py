@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
-from rich.cells import cell_len, set_cell_size
-
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
@@ -19,7 +17,7 @@ from lobewatch.monitoring.threshold_dates import (
     build_limit_row,
     find_next_limit,
 )
-from lobewatch.show.terminal.output import format_csv, make_printable
+from lobewatch.show.terminal.output import align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
@@ -86,12 +84,10 @@ FLEET_HEADINGS = ("machine", "light", "fallen (%)", "last tap", "limit ahead")
 
 
 def fleet_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A line a machine, with its worst reason and the next step below it."""
-    lines = [FLEET_HEADINGS, *map(_fleet_cells, rows)]
-    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
-    shown = ["  ".join(map(set_cell_size, line, widths)).rstrip() for line in lines]
+    """Return a line for each machine, with its worst reason and the next step below it."""
+    lines = align_columns([FLEET_HEADINGS, *map(_fleet_cells, rows)])
     texts = [[], *map(_machine_notes, rows)]
-    return "\n".join(part for line, below in zip(shown, texts, strict=True) for part in (line, *below))
+    return "\n".join(part for line, below in zip(lines, texts, strict=True) for part in (line, *below))
 
 
 def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -11,11 +11,11 @@ import jinja2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import DataError
 from acquisition.file_io import atomic_write, make_folder
 from dsm import WhirlMap, mode_shapes
+from lobewatch.arrays import Complexes, Floats
 from lobewatch.paper import PaperStudy, printed
 from lobewatch.paper.finite_elements import ELEMENT_COUNTS, ElementKind
 from lobewatch.show.figures.drawing import ALARM_ORANGE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE, new_axes, save_figure
@@ -70,7 +70,7 @@ def _plot_response(study: PaperStudy, part: str) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     tap = study.tap
 
-    def values(receptance: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def values(receptance: Complexes) -> Floats:
         return (receptance.real if part == "Re" else receptance.imag) * 1e6
 
     axes.plot(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.show.programs.verdicts import verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.output import remark_json, remark_lines
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import count_noun, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
@@ -63,12 +64,8 @@ def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvi
 
 
 def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> dict[str, Any]:
-    """All programs; remarks: on the files."""
-    return {
-        "programs": [advice_json(program) for program in programs],
-        **count_unsafe(programs),
-        "remarks": [remark_json(remark) for remark in remarks],
-    }
+    """Return all programs with advice, and how many may not be run; remarks: on the files."""
+    return {"programs": [advice_json(program) for program in programs], **count_unsafe(programs), "remarks": remarks}
 
 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
@@ -83,16 +80,16 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
     ]
 
 
+ADVICE_FIELDS = json_fields("""
+    was_stable_at_first=first_verdict.is_stable verdict_at_first=first_verdict.stability advice=advice.best
+    advice_here=advice.deepest_here tolerable_decay=advice.tolerable_drop remarks
+""")
+
+
 def advice_json(program: ProgramAdvice) -> dict[str, Any]:
-    """One program."""
-    return verdict_json(program.verdict) | {
-        "was_stable_at_first": None if program.first_verdict is None else program.first_verdict.is_stable,
-        "verdict_at_first": None if program.first_verdict is None else program.first_verdict.stability,
-        "advice": setting_json(program.advice.best),
-        "advice_here": setting_json(program.advice.deepest_here),
-        "tolerable_decay": program.advice.tolerable_drop,
-        "remarks": [asdict(remark) for remark in program.remarks],
-    }
+    """Return one program with its verdict and advice."""
+    settings = {"advice": setting_json(program.advice.best), "advice_here": setting_json(program.advice.deepest_here)}
+    return verdict_json(program.verdict) | ADVICE_FIELDS(program) | settings
 
 
 def frequency_margin_text(advice: Advice) -> str:
@@ -122,8 +119,7 @@ def check_summary_text(programs: Sequence[ProgramAdvice], others: int) -> str:
     beyond = count_unsafe(programs)["beyond_drive"]
     texts += [f"{beyond} beyond the drive"] if beyond else []
     texts += [f"{others} without a speed or a depth"] if others else []
-    number = len(programs) + others
-    return f"{number} program{'s' if number > 1 else ''}: {', '.join(texts)}"
+    return f"{count_noun(len(programs) + others, 'program')}: {', '.join(texts)}"
 
 
 def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
@@ -202,17 +198,12 @@ def _floor_depth_text(depth: float) -> str:
     return f"{math.floor(depth * 1e5) / 100:.2f}"
 
 
+SETTING_FIELDS = json_fields("speed_rpm depth_mm window_rpm depth_margin frequency_left=drop_margin")
+
+
 def setting_json(setting: Setting | None) -> dict[str, Any] | None:
-    """One setting."""
-    if setting is None:
-        return None
-    return {
-        "speed_rpm": setting.speed_rpm,
-        "depth_mm": setting.depth_mm,
-        "window_rpm": list(setting.window_rpm),
-        "depth_margin": setting.depth_margin,
-        "frequency_left": setting.drop_margin,
-    }
+    """Return a recommended speed and depth with its robustness."""
+    return None if setting is None else SETTING_FIELDS(setting)
 
 
 def format_rpm(speed: float) -> str:

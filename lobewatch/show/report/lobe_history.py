@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from lobes import StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
@@ -30,8 +30,6 @@ from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.frequency_drop import model_softening
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 from modal import Mode
-
-Floats = NDArray[np.float64]
 
 
 class LobeDiagram(NamedTuple):

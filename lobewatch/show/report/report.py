@@ -16,7 +16,7 @@ from lobewatch.monitoring.status_rules import StatusLevel
 from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS
 from lobewatch.show.history import condition_texts
 from lobewatch.show.report.page import make_gauge, render_page, write_page
-from lobewatch.show.report.report_data import ReportData, collect_report_data
+from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
 from lobewatch.show.report.summary import make_summary
@@ -56,31 +56,28 @@ def render_report(
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
 ) -> dict[str, Any]:
-    """All that the template shows, from one analysis."""
-    material = collect_report_data(analysis, tool, direction, now)
-    groups = [make(material) for make in sections]
-    has_plots = any(section.has_plot for group in groups for section in group)
-    return {"groups": groups, "has_plots": has_plots, "numbering": count(1), **_page_frame(material)}
-
-
-def _page_frame(material: ReportData) -> dict[str, Any]:
-    """What stands above the sections and below them."""
-    machine, last, tap = material.machine, material.last, material.newest
+    """Return all that the template shows, from one analysis."""
+    data = collect_report_data(analysis, tool, direction, now)
+    groups = [make(data) for make in sections]
+    machine, last, tap = data.machine, data.last, data.newest
     return {
+        "groups": groups,
+        "has_plots": any(section.has_plot for group in groups for section in group),
+        "numbering": count(1),
         "name": machine.machine.name,
         "tool": last.tool,
         "direction": last.direction,
-        "first": material.rows[0].time,
+        "first": data.rows[0].time,
         "last": last.time,
-        "n_taps": len(material.rows),
-        "as_of": material.outlook.status.time.astimezone(),
+        "n_taps": len(data.rows),
+        "as_of": data.outlook.status.time.astimezone(),
         "label": machine.spindle.label if machine.spindle else "",
-        "first_screen": make_summary(material),
+        "first_screen": make_summary(data),
         "tap_id": tap.id,
         "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(last.conditions)],
         "good": len(tap.accepted),
         "hits": len(tap.hits),
-        "software": material.analysis.history.software,
+        "software": analysis.history.software,
     }
 
 

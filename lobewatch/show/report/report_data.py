@@ -161,19 +161,19 @@ class ValueTrend(NamedTuple):
         return plot_trend(times, values, stds, self.value.label, self.limits, self.marks, self.curve, size)
 
 
-def make_value_trend(material: ReportData, value: SeriesValue) -> ValueTrend | None:
+def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     """What is drawn of a value of the series; None where too few tap tests know it."""
-    rows = material.rows
+    rows = data.rows
     estimates = [(row.time, getattr(row, value.field)) for row in rows if getattr(row, value.field).is_known]
     if len(estimates) < MIN_TAPS_FOR_VALUE:
         return None
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
-    events = [(event.time, event.text) for event in material.analysis.files.events if event.time >= since]
+    events = [(event.time, event.text) for event in data.analysis.files.events if event.time >= since]
     numbers = [estimate.value / value.scale for _, estimate in estimates]
     near = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
-    aside = [(row.time, getattr(row, value.field).value / value.scale) for row in material.excluded_rows]
+    aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
     marks = TrendMarks(events, [(time, number) for time, number in aside if near[0] <= number <= near[1]])
-    is_followed, trend = value is FREQUENCY_VALUE, material.series.trend
-    limits = material.machine.limits if is_followed else None
+    is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
+    limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None
     return ValueTrend(value, estimates, aside, marks, limits, course)

@@ -10,15 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobewatch.arrays import Floats
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.trend_figures import TrendCurve
-
-Floats = NDArray[np.float64]
 
 MAX_RESPONSE_LINES = 1500
 """Lines of a response that are given, at most."""
@@ -44,46 +42,41 @@ def tabulate_value(
     unit: str,
     scale: float,
     estimates: Iterable[tuple[datetime, Estimate]],
-    aside: Iterable[tuple[datetime, float]],
-    course: TrendCurve | None,
+    excluded: Iterable[tuple[datetime, float]],
+    curve: TrendCurve | None,
 ) -> NumberTable:
-    """A value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
+    """Tabulate a value over time: tests, excluded tests, the fitted line, and the 80 % band of the forecast.
 
-    scale: of the unit; the values of `estimates` alone are in SI.
+    The values of `estimates` are in SI, `scale` is the size of the unit shown; the others are in this unit.
     """
     lines: list[list[Any]] = [
         ["test", _day_text(time), estimate.value / scale, estimate.std / scale, "", ""] for time, estimate in estimates
     ]
-    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in aside]
-    if course is not None:
-        past = course.days.size - course.days_ahead.size
-        lines += [
-            ["fitted", _day_text(date_of_days(day)), value, "", "", ""]
-            for day, value in zip(course.days[:past].tolist(), course.line[:past].tolist(), strict=True)
-        ]
-        ahead = np.column_stack([course.days_ahead, course.line[past:], course.low, course.high])[::10]
-        lines += [
-            ["forecast", _day_text(date_of_days(day)), value, "", low, high] for day, value, low, high in ahead.tolist()
-        ]
+    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in excluded]
+    if curve is not None:
+        days = [_day_text(date_of_days(day)) for day in curve.days.tolist()]
+        past = curve.days.size - curve.days_ahead.size
+        fitted = zip(days[:past], curve.line[:past].tolist(), strict=True)
+        lines += [["fitted", day, value, "", "", ""] for day, value in fitted]
+        ahead = np.column_stack([curve.line[past:], curve.low, curve.high]).tolist()
+        band = list(zip(days[past:], ahead, strict=True))[::10]
+        lines += [["forecast", day, value, "", low, high] for day, (value, low, high) in band]
     return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
 
 
 def tabulate_lobes(speed_rpm: Floats, depths: Mapping[str, Floats]) -> NumberTable:
-    """Lines over speed (n,), depths in m by what each is called."""
+    """Tabulate limiting depths (m, by name) over speed."""
     heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
-    step = math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)
-    return NumberTable(
-        heads, np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])[::step].tolist()
-    )
+    columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])
+    return NumberTable(heads, columns[:: math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)].tolist())
 
 
 def tabulate_response(frf: Frf) -> NumberTable:
-    """A frequency response in its band; no more lines than one can see."""
-    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
+    """Tabulate a frequency response and its coherence, in no more lines than a figure can show."""
     coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
-    columns = (frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence)
-    lines = np.column_stack([column[::step] for column in columns])
-    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], lines.tolist())
+    columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
+    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
+    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
 
 
 def _day_text(time: datetime) -> str:

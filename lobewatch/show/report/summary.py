@@ -34,9 +34,9 @@ TABLE_REASON_CODES = (
 """Reasons that stand on the first screen as a series, a program or a date, unless they are the first."""
 
 
-def make_summary(material: ReportData) -> dict[str, Any]:
+def make_summary(data: ReportData) -> dict[str, Any]:
     """What the first screen shows, as the template takes it."""
-    standing, limits = material.outlook.status, material.machine.limits
+    standing, limits = data.outlook.status, data.machine.limits
     worst = standing.series[0]
     return {
         **_status_content(standing),
@@ -45,10 +45,10 @@ def make_summary(material: ReportData) -> dict[str, Any]:
         else None,
         "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
         "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
-        "programs": [_program_content(program, material) for program in material.programs],
-        "no_dates": no_dates_text(material.outlook),
-        "tap": _next_tap_text(standing, material.machine),
-        "pictures": list(draw_summary_figures(material)),
+        "programs": [_program_content(program, data) for program in data.programs],
+        "no_dates": no_dates_text(data.outlook),
+        "tap": _next_tap_text(standing, data.machine),
+        "pictures": list(draw_summary_figures(data)),
     }
 
 
@@ -90,8 +90,8 @@ def _series_content(series: SeriesStatus) -> dict[str, str]:
     return {"name": series.name, "change": change_text(series), "course": "; ".join(course) or since}
 
 
-def _program_content(program: ProgramAdvice, material: ReportData) -> dict[str, str]:
-    name, word, outlook = program.verdict.program.name, program.verdict.stability, material.outlook
+def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]:
+    name, word, outlook = program.verdict.program.name, program.verdict.stability, data.outlook
     return {
         "name": name,
         "kind": VERDICT_STYLES[word].css_class,
@@ -139,17 +139,17 @@ class SummaryFigure(NamedTuple):
     """The <svg> element."""
 
 
-def draw_summary_figures(material: ReportData) -> Iterator[SummaryFigure]:
+def draw_summary_figures(data: ReportData) -> Iterator[SummaryFigure]:
     """Course of the frequency, or the response of an only tap test; lobes where there are any."""
-    points, diagram = make_value_trend(material, FREQUENCY_VALUE), material.lobe_diagram
+    points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.curve is not None else ""
-        caption = f"Natural frequency in {material.last.direction} (Hz){ahead}"
+        caption = f"Natural frequency in {data.last.direction} (Hz){ahead}"
         figure = points.figure(SMALL_FIGURE_SIZE)
         figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
         yield SummaryFigure(caption, render_svg(figure))
-    elif (frf := material.newest.frf) is not None:
-        figure = plot_frf(None, frf, material.response_band(frf), SMALL_FIGURE_SIZE)
+    elif (frf := data.newest.frf) is not None:
+        figure = plot_frf(None, frf, data.response_band(frf), SMALL_FIGURE_SIZE)
         yield SummaryFigure("Receptance at the tool tip", render_svg(figure))
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""

@@ -12,7 +12,8 @@ import os
 import re
 import sys
 import webbrowser
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import starmap
 from typing import Annotated, Any, Literal, Protocol
 
 import typer
@@ -68,11 +69,13 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
-    """One JSON object (numbers that are not finite become null), or the texts and tables."""
+    """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
-        exact = CONTROL_CHARACTERS.sub(
-            _escape_control, json.dumps(_json_value(payload), allow_nan=False, indent=2, ensure_ascii=False)
-        )
+        import msgspec  # only JSON output waits for it
+
+        plain = _json_value(msgspec.to_builtins(payload, enc_hook=_to_list))
+        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
+        exact = CONTROL_CHARACTERS.sub(_escape_control, exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
         else:
@@ -81,19 +84,41 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
     for text in texts:
         if isinstance(text, str):
             results.file.write(f"{make_printable(text)}\n")
-            continue
-        least = text.min_table_width if isinstance(text, SafeTable) else 0
-        results.print(text, width=max(Console().width, least) if least else None)
+        else:
+            width = text.min_table_width if isinstance(text, SafeTable) else 0
+            results.print(text, width=max(Console().width, width) if width else None)
 
 
-def new_table(*headings: str) -> Table:
-    """An empty table; a heading that begins with "<" names a column of text, with "~" one that may be broken."""
-    rows = SafeTable(box=None, pad_edge=False, header_style="bold")
+def new_table(*headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
+    """Return a table; a heading that begins with "<" names a column of text, with "~" one that may be wrapped."""
+    table = SafeTable(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        breaks = heading.startswith("~")
-        justify: Literal["left", "right"] = "left" if breaks or heading.startswith("<") else "right"
-        rows.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not breaks, overflow="fold")
-    return rows
+        wraps = heading.startswith("~")
+        justify: Literal["left", "right"] = "left" if wraps or heading.startswith("<") else "right"
+        table.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not wraps, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def align_columns(rows: Sequence[Sequence[str]], numbers: Container[int] = ()) -> list[str]:
+    """Return a line of text for each row, its cells as wide as their columns; numbers: columns to align right."""
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+
+    def align(column: int, cell: str) -> str:
+        gap = " " * (widths[column] - cell_len(cell))
+        return gap + cell if column in numbers else cell + gap
+
+    return ["  ".join(starmap(align, enumerate(row))).rstrip() for row in rows]
+
+
+def count_noun(count: int, noun: str) -> str:
+    """Return a number and its noun, in the plural above one.
+
+    >>> count_noun(1, "cut"), count_noun(3, "cut")
+    ('1 cut', '3 cuts')
+    """
+    return f"{count} {noun}{'s' if count > 1 else ''}"
 
 
 def _max_cell_width(cells: Iterable[RenderableType]) -> int:
@@ -106,7 +131,7 @@ def _one_line(cell: str) -> str:
 
 
 def make_printable(text: str) -> str:
-    """Replace control characters except newline and tab, and library names by their options."""
+    """Replace control characters but newline and tab, and name options instead of fields of the library."""
     return CONTROL_CHARACTERS.sub(
         lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
     )
@@ -124,14 +149,11 @@ def _json_value(value: Any) -> Any:
         return [_json_value(entry) for entry in value]
     if isinstance(value, str):
         return with_option_names(value)
-    if hasattr(value, "tolist"):
-        return _json_value(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def remark_json(remark: Remark) -> dict[str, str]:
-    """One remark."""
-    return {"code": remark.code, "about": remark.about, "text": remark.text, "cure": remark.cure}
+def _to_list(array: Any) -> Any:
+    return array.tolist()
 
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
@@ -155,10 +177,10 @@ def format_csv(lines: Iterable[Sequence[Any]]) -> str:
 
 
 def format_csv_cell(value: Any) -> str:
-    """One cell; before a text that would be a formula stands an apostrophe, which keeps it a text."""
-    text = "" if value is None else str(value)
-    if isinstance(value, str) and FORMULA_START.match(text):
-        text = f"'{text}"
+    """Return one cell, empty for None and NaN; an apostrophe keeps a text that would be a formula a text."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    text = f"'{value}" if isinstance(value, str) and FORMULA_START.match(value) else str(value)
     return '"{}"'.format(text.replace('"', '""')) if re.search('[",\r\n]', text) else text
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from types import TracebackType
 from typing import Protocol, Self
 
 from rich.console import Console
@@ -45,16 +44,14 @@ class TapPrinter:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="tap printer", daemon=True)
         self._before = session.state
-        self._told = 0
+        self._n_printed = 0
 
     def __enter__(self) -> Self:
         """Begin to print."""
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Print what is left."""
         self._ended.set()
         self._thread.join()
@@ -68,7 +65,7 @@ class TapPrinter:
         """Print what is new in a state."""
         before, self._before = self._before, state
         if state.title != before.title:
-            self._told = 0
+            self._n_printed = 0
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
         for check in state.checks:
@@ -84,12 +81,12 @@ class TapPrinter:
         self._print_hits(state)
 
     def _print_hits(self, state: TapState) -> None:
-        for hit in state.hits[self._told :]:
+        for hit in state.hits[self._n_printed :]:
             if hit.earlier:
                 continue
             good = sum(not earlier.flags for earlier in state.hits[: hit.number])
             self._console.print(f"{good:3d} / {state.wanted}  {hit_markup(hit)}  ({hit.peak})")
-        self._told = len(state.hits)
+        self._n_printed = len(state.hits)
 
 
 def hit_markup(hit: ListedHit) -> str:

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from types import TracebackType
 from typing import Any, Self
 
 from rich.align import Align
@@ -46,9 +45,7 @@ class KeyReader:
             tty.setcbreak(sys.stdin, termios.TCSADRAIN)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """The terminal as it was."""
         if sys.platform != "win32" and self._before is not None:
             import termios
@@ -134,14 +131,12 @@ class TerminalScreen:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the last picture; the terminal as it was."""
         self._ended.set()
         self._thread.join()
         self._live.stop()
-        self._keys.__exit__(kind, error, trace)
+        self._keys.__exit__()
 
     def _watch(self) -> None:
         """Keys and bells."""
@@ -181,7 +176,7 @@ class TerminalScreen:
     def _ask_tool(self) -> str:
         """A line that is typed, the screen standing still meanwhile."""
         self._live.stop()
-        self._keys.__exit__(None, None, None)
+        self._keys.__exit__()
         self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")
         try:
             return sys.stdin.readline().strip()
@@ -243,21 +238,13 @@ def _banner(state: TapState) -> RenderableType:
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 
-def _levels_text(force: float, response: float) -> str:
-    return f"force {format_rounded(force, digits=2)} N rms, {_response_text(response)}"
-
-
-def _response_text(response: float) -> str:
-    return f"response {format_rounded(response, digits=2)} m/s^2 rms"
-
-
 def _level_line(state: TapState) -> str:
-    """Levels, and how far the mean has come."""
+    """Return the levels of the sensors, and how far the mean has settled."""
     texts = []
     if state.levels is not None:
-        force, response = state.levels
-        texts.append(_response_text(response) if force is None else _levels_text(force, response))
+        force, response = (level and format_rounded(level, digits=2) for level in state.levels)
+        texts.append(("" if force is None else f"force {force} N rms, ") + f"response {response} m/s^2 rms")
     if state.mean_change is not None:
-        moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
-        texts.append(f"{moves}; it has settled" if state.settled else moves)
+        text = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
+        texts.append(f"{text}; it has settled" if state.settled else text)
     return "   ".join(texts) or " "

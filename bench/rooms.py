@@ -70,11 +70,17 @@ class House:
     @property
     def rooms(self) -> list[str]:
         """Folders with modules, as packages."""
-        return sorted({self.room(module) for module in self.paths})
+        return sorted(name for name, path in self.paths.items() if path.name == "__init__.py")
 
     def room(self, module: str) -> str:
-        """The folder of a module, as a package."""
-        return module if self.paths[module].name == "__init__.py" else module.rpartition(".")[0]
+        """Return the folder of a module as a package; a module next to subfolders counts as a room of its own."""
+        folder = module.rpartition(".")[0]
+        return module if self.paths[module].name == "__init__.py" or folder in self._with_subfolders else folder
+
+    @cached_property
+    def _with_subfolders(self) -> set[str]:
+        packages = {name for name, path in self.paths.items() if path.name == "__init__.py"}
+        return {name.rpartition(".")[0] for name in packages if "." in name}
 
     @cached_property
     def arrows(self) -> Mapping[tuple[str, str], list[Import]]:
@@ -124,6 +130,16 @@ class House:
                 if isinstance(node, ast.ClassDef):
                     where[node.name].append(module)
         return where
+
+    @staticmethod
+    def constants(tree: ast.Module) -> list[str]:
+        """Return the names in capitals that a module binds at its top level."""
+        bound = (
+            node.targets[0] if isinstance(node, ast.Assign) else node.target
+            for node in tree.body
+            if isinstance(node, ast.Assign | ast.AnnAssign)
+        )
+        return [node.id for node in bound if isinstance(node, ast.Name) and re.fullmatch(r"_?[A-Z][A-Z0-9_]*", node.id)]
 
     def _taken(self, module: str) -> Iterator[Import]:
         holders = [node for node in ast.walk(self.trees[module]) if _hides(node)]

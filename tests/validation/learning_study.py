@@ -1,6 +1,6 @@
 """Test cuts on spindles that are not of the prior of the learning, judged by a simulation in time.
 
-Truths are drawn by other rules than those of `lobewatch.cuts.learning.priors`; words and frequencies come from
+Truths are drawn by other rules than those of `lobewatch.cuts.learning.prior_samples`; words and frequencies come from
 `acquisition.emulation.simulate_cuts` (chips, run-out, loss of contact), the optimum from the textbook form of the lobes
 of a slot (below): neither shares code with the learner.
 """

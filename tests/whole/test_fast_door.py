@@ -61,12 +61,13 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
     [
         ("from acquisition import *", {"scipy.signal", "scipy.stats"}),
         (
-            "from modal import *\nfrom lobes import *\nimport lobewatch.logbook.logbook, lobewatch.decay.standing",
+            "from modal import *\nfrom lobes import *\n"
+            "import lobewatch.logbook.logbook, lobewatch.monitoring.machine_status",
             NUMERICAL,
         ),
         ("import dsm", NUMERICAL - {"scipy.linalg"}),
-        ("import acquisition.ports, acquisition.atomic, acquisition.errors, acquisition.remark", HEAVY),
-        ("import lobewatch, lobewatch.machine.new_folder", HEAVY),
+        ("import acquisition.ports, acquisition.file_io, acquisition.errors", HEAVY),
+        ("import lobewatch, lobewatch.machine.folder_files", HEAVY),
         ("import lobewatch.logbook.logbook", {"asyncio", "multiprocessing", "acquisition.emulation.emulated_device"}),
     ],
 )

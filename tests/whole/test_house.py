@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +12,17 @@ from statistics import mean
 import pytest
 from rooms import PACKAGES, House
 
+from lobewatch.commands import COMMANDS
+
 ROOT = Path(__file__).parents[2]
 HOUSE = House(ROOT)
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
 DOOR = ("lobewatch.cli", "lobewatch.commands")
 """What a person starts: it imports when it knows what is wanted."""
-DOMAIN = ("machine", "measuring", "tool", "verdicts", "cuts", "history", "decay", "logbook", "plant")
+DOMAIN = ("machine", "measurement", "tool", "verdicts", "cuts", "history", "monitoring", "logbook", "fleet")
+"""Rooms that neither print nor draw."""
+LIBRARY = (*DOMAIN, "tap", "sensors", "paper")
+"""Rooms whose texts name fields of the library; `show`, `screen` and `commands` put the options in their place."""
 
 
 def bodies(path: Path) -> Iterator[tuple[str, int]]:
@@ -95,3 +101,28 @@ def test_the_domain_never_prints(room: str) -> None:
     for path in (ROOT / "lobewatch" / room).rglob("*.py"):
         names = {node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)}
         assert not names & {"print", "Console"}, path
+
+
+OPTION = re.compile(rf"(?<![\w-])--[a-z][\w-]+|\blobewatch (?:{'|'.join(COMMANDS)})\b")
+"""An option or a command of the command line."""
+
+
+@pytest.mark.parametrize(
+    "package", ["acquisition", "modal", "dsm", "lobes", *(f"lobewatch/{room}" for room in LIBRARY)]
+)
+def test_the_library_names_no_option_and_no_command(package: str) -> None:
+    named = [
+        f"{path.relative_to(ROOT)}: {text}"
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for text in texts(ast.parse(path.read_text("utf-8")))
+        if OPTION.search(text)
+    ]
+    assert named == []
+
+
+def texts(tree: ast.Module) -> Iterator[str]:
+    """Yield the string constants of a module that are no docstrings."""
+    documented = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented:
+            yield node.value

@@ -16,15 +16,15 @@ from lobewatch.show.trend import reach_text
 from lobewatch.tap.demo import DemoTap, LevelForecast, SpindleState
 
 STATE_KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
-"""Names of the figures of a SpindleState in JSON."""
+"""JSON keys of the values of a SpindleState."""
 STATE_NAMES = ("f_1", "zeta", "K", "bearing stiffness")
-"""Names of these figures for people."""
+"""Names of the values of a SpindleState for people."""
 DEMO_COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
-"""Heading, size of the unit and decimals."""
+"""Heading, size of the unit and decimals of each value."""
 
 
 def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
-    """All tap tests, and the forecast beside the truth."""
+    """Return all tap tests of the demo, and the forecast with the true dates."""
     levels = {
         forecast.level: {**forecast.reached.to_row(), "truth": _date_text(forecast.truth)} for forecast in forecasts
     }

@@ -28,14 +28,14 @@ def cut_text(cut: CutEntry) -> str:
 
 
 def cut_summary_text(cut: CutEntry) -> str:
-    """Name, speed and depth of a test cut, what it sounded like, and its power."""
+    """Return name, speed and depth of a test cut, its result, and its power."""
     named = cut.program or "reference cut"
     words = f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {cut_result_text(cut)}, by {cut.by}"
     return words if cut.power is None else f"{words}; {power_text(cut.power, cut.cut)}"
 
 
 def cut_result_text(cut: CutEntry) -> str:
-    """Sound of a test cut, in words."""
+    """Return the result of a test cut in words."""
     heard: str = cut.word
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
@@ -56,13 +56,13 @@ def cut_json(cut: CutEntry) -> dict[str, Any]:
 
 
 def saved_cut_remarks(logbook: Logbook, cut: CutEntry, earlier: Sequence[CutEntry]) -> list[Remark]:
-    """What is to be said of a cut that was heard and kept; earlier: those kept before."""
+    """Return the remarks on a cut that was saved; earlier: cuts saved before."""
     contrary = find_contradicting_cuts(cut, earlier) if cut.is_usable else ()
     return [*untapped_remarks(logbook, cut), *map(contradiction_remark, contrary)]
 
 
 def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
-    """A remark that the tool was never tapped; none where it was."""
+    """Return a remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
     text = "was never tapped: the cut is kept, and counts when it is"
@@ -70,22 +70,22 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
 
 
 def contradiction_remark(cut: CutEntry) -> Remark:
-    """A remark that a cut was heard otherwise before."""
+    """Return a remark that an earlier cut at the same point had another result."""
     text = f"heard otherwise at the same point ({cut_summary_text(cut)}); both are kept"
     cure = f"lobewatch exclude MACHINE {cut.id} --reason TEXT takes out the one that is wrong"
     return Remark("cuts-contradict", cut.id, text, cure)
 
 
 ROW_FIELDS = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
-"""Field of a row by its name in CSV and JSON."""
+"""Field of a row for each JSON key and CSV column."""
 HISTORY_HEADINGS = (
     ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
 )
 NUMBER_COLUMNS = 4, 5, 6
-"""Columns of numbers."""
+"""Columns that are aligned to the right."""
 MIN_SHORT_NAME = 6
-"""Characters of the shortest name of a tap test, an end of its identity: "x_ecbf"."""
+"""Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
 CONDITION_NAMES = tuple(field.name for field in fields(Conditions))
 HISTORY_COLUMNS = ("time", "kind", "id", "tool", "direction")
 CONDITION_FORMATS = {
@@ -97,11 +97,11 @@ CONDITION_FORMATS = {
     "reclamped": "clamped anew",
     "note": "note: {}",
 }
-"""Words for a condition of a tap test, by its name."""
+"""Words for each condition of a tap test."""
 
 
 def event_text(event: MaintenanceEvent) -> str:
-    """For people."""
+    """Return an event in one line."""
     baseline = " (new baseline)" if event.new_baseline else ""
     return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
 
@@ -128,7 +128,7 @@ def acknowledgement_json(acknowledgement: Acknowledgement) -> dict[str, Any]:
 
 
 def history_json(logbook: Logbook) -> dict[str, Any]:
-    """The whole history; an excluded tap test has no values, those of one that is kept count for nothing."""
+    """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
@@ -166,9 +166,9 @@ def history_lines(logbook: Logbook) -> list[str]:
 
 
 def shorten_ids(ids: Sequence[str]) -> list[str]:
-    """The shortest end of each identity that no other contains, of six characters at least.
+    """Return the shortest end of each identity that no other identity contains, of six characters at least.
 
-    Commands take it in place of the identity.
+    Commands accept it instead of the identity.
     """
     names, size = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
     left = [name for name in names if len(name) > size]
@@ -225,7 +225,7 @@ def _excluded_json(tap: TapEntry) -> dict[str, Any]:
 
 
 def _utc_text(time: datetime) -> str:
-    """A time as text, all alike, so that they sort."""
+    """Return a time as text of one form, which sorts by time."""
     return time.astimezone(UTC).isoformat(timespec="microseconds")
 
 
@@ -235,7 +235,7 @@ def _value_text(line: Mapping[str, Any], name: str, scale: float) -> str:
 
 
 def _note_text(line: Mapping[str, Any]) -> str:
-    """Its text or reason, conditions, what is asked, and the verdicts of then."""
+    """Return text or reason of an entry, or conditions, questions and verdicts of a tap test."""
     if "text" in line:
         return f"{line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
     under = condition_texts(Conditions.from_mapping(line["conditions"]))

@@ -45,7 +45,7 @@ def measurement_json(measurement: Measurement, logbook: Logbook) -> dict[str, An
 
 
 def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
-    """A measurement for people."""
+    """Return a measurement in words."""
     named = [f"tool {m.tool}", f"direction {m.direction}", *condition_texts(_tap_conditions(m, logbook))]
     texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
     if m.modes:
@@ -66,7 +66,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
 
 
 def _remaining_preload(measurement: Measurement, logbook: Logbook) -> RemainingPreload | None:
-    """Compare the preload with that at the start of the series, as it was known then."""
+    """Compare the preload with that at the start of the series, as it was known at that time."""
     series = logbook.history.series(measurement.tool, measurement.direction)
     rows = [row for row in series if row.time <= measurement.time]
     if not rows or rows[-1].tap_id != measurement.tap_id:
@@ -79,7 +79,6 @@ def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
 
 
 def _question_text(question: Remark) -> str:
-    """A question with its code."""
     return f"question ({question.code}): {question.text}"
 
 

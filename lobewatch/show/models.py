@@ -15,7 +15,7 @@ from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 
 NODE_STIFFNESS_RATIO = 1e4
-"""Times the static stiffness at the tip: where that of a mode is higher, the tip is a node of it."""
+"""Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
 
 
 CALIBRATION_FIELDS = json_fields("""
@@ -147,7 +147,7 @@ def _joint_entry_lines(calibration: JointCalibration) -> list[str]:
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
-    """Joints as they stand in machine.toml."""
+    """Return joints as lines of machine.toml."""
     if not joints:
         return []
     lines = [

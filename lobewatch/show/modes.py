@@ -19,17 +19,17 @@ from modal import Mode, Trust, assess_trust, trust_rules
 TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
 """Order in which modes are shown."""
 TRUST_SYMBOLS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
-"""Marks behind a mode."""
+"""Mark after a mode."""
 MIN_SHOWN_PHASE = 1.0
-"""Phase of a modal constant worth a column (degrees)."""
+"""Smallest phase of a modal constant that is shown (degrees)."""
 MIN_SHOWN_CORRELATION = 0.5
-"""Correlation of errors that a person should know."""
+"""Smallest correlation of errors that is shown."""
 FOUND_AGAIN_NOTE = "again: how many of the other measurements have it within 0.5 %"
-"""Line below a table with that column."""
+"""Line below a table with the column "again"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
-"""Words for where a fact on a file is from."""
+"""Words for the origin of a fact on a file."""
 NON_FILE_ORIGINS = "option", "default"
-"""Origins of facts that a file does not say itself."""
+"""Origins of facts that are not in the file."""
 
 
 MODE_FIELDS = json_fields("""
@@ -89,7 +89,7 @@ def mode_table(modes: Sequence[Mode]) -> Table:
 
 
 def mode_notes(modes: Sequence[Mode]) -> list[str]:
-    """Lines below a table of modes: where ± comes from, what is found again, and correlated errors."""
+    """Return lines below a table of modes: source of ±, matches, correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
     how = "jackknife" if all(mode.has_stiffness for mode in modes) else "by how each moves the fit"
     lines = [f"± is the standard error over the {hits} hits ({how}, {hits - 1} degrees of freedom)"] if hits else []
@@ -128,7 +128,7 @@ def _grouped_lines(remarks: list[Remark]) -> list[str]:
 
 
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
-    """How many modes are trusted, doubtful and rejected, in a line."""
+    """Return how many modes are trusted, doubtful and rejected."""
     count = Counter(assess_trust(mode) for mode in modes)
     counts = ", ".join(f"{count[trust]} {trust}" for trust in TRUST_ORDER)
     looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
@@ -138,7 +138,7 @@ def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
 
 
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
-    """Which modes have hammer and sensor apart, and which are doubtful and rejected by which rules, a line each."""
+    """Return which modes are no driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in TRUST_ORDER[1:]:
@@ -212,6 +212,6 @@ def _frf_text(file_modes: FileModes) -> str:
 
 
 def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGIN_WORDS)) -> list[str]:
-    """Facts on a file, a line for each place that it is from."""
+    """Return the facts on a file, a line for each origin."""
     texts = {origin: [f"{fact.name} {fact.value}" for fact in facts if fact.origin == origin] for origin in origins}
     return [f"{ORIGIN_WORDS[origin]}: {'; '.join(words)}" for origin, words in texts.items() if words]

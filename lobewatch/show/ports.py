@@ -67,7 +67,7 @@ def _answer_text(scanned: ScannedPort) -> str:
 
 
 def _ports_summary(ports: tuple[ScannedPort, ...]) -> str:
-    """How many answer, and the next step."""
+    """Return how many devices answer, and the next step."""
     answering = [(listed.port.device, listed.answer.driver) for listed in ports if listed.answer]
     if not answering:
         return (

@@ -27,38 +27,35 @@ from lobewatch.show.terminal.output import emit, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
-"""Names of the steps of a replay for people."""
+"""Names of the steps of a replay."""
 REBUILD_PROGRESS_STEP = 10
-"""Tap tests between two lines of a rebuild."""
+"""Number of tap tests between two progress lines of a rebuild."""
 
 
 class ReplayProgress:
-    """A bar a step, on a terminal only; called with the step, how many files are done, and of how many."""
+    """Progress bar of each step of a replay, shown on a terminal only."""
 
     def __init__(self) -> None:
-        """Nothing is shown yet."""
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bars = Progress(*columns, console=notes, transient=True, disable=not notes.is_terminal)
         self._tasks: dict[str, int] = {}
 
     def __enter__(self) -> Self:
-        """Begin to show."""
         self._bars.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take the bars away."""
         self._bars.stop()
 
     def __call__(self, step: str, done: int, of: int) -> None:
-        """So many are done."""
+        """Update the bar of a step: so many files are done, of so many."""
         if step not in self._tasks:
             self._tasks[step] = self._bars.add_task(REPLAY_STEP_NAMES[step], total=of)
         self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
 
 
 def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
-    """A line every few tap tests of the machine of this name; called with how many are done, and of how many."""
+    """Return a function that prints a progress line every few tap tests of this machine."""
 
     def show(done: int, of: int) -> None:
         if done % REBUILD_PROGRESS_STEP == 0:
@@ -68,7 +65,7 @@ def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
 
 
 MAX_PREVIEWS_IN_FULL = 6
-"""Files that are told in full at most; more of them get a line each."""
+"""Largest number of files that are shown in full."""
 
 
 def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
@@ -117,7 +114,7 @@ def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
 
 
 def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
-    """How many would be stored, are known, refused and passed over."""
+    """Return how many files would be stored, are known, rejected and passed over."""
     fresh = sum(preview.tap is not None for preview in previews)
     n_known = sum(bool(preview.stored_tap_id) for preview in previews)
     refused = sum(bool(preview.rejection) for preview in previews)
@@ -151,7 +148,7 @@ def _mode_text(mode: Mode) -> str:
 
 
 def _hits_text(preview: ReplayPreview) -> str:
-    """Hits with their verdicts."""
+    """Return the number of hits by verdict."""
     if preview.tap is None or not preview.tap.hits:
         return "an FRF"
     words = Counter(flags.words for flags in preview.tap.flags)
@@ -170,7 +167,7 @@ def _preview_row(preview: ReplayPreview) -> list[str]:
 
 
 def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
-    """Lines on what was taken for want of a word, asked and refused; each once."""
+    """Return assumed facts, questions and rejections, each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
     asked = (
         (preview.file.name, f"question ({question.code}): {question.text}")
@@ -188,7 +185,7 @@ def _refused_lines(previews: Sequence[ReplayPreview]) -> list[str]:
 
 
 def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
-    """Facts, those that are another for each of many files as the first and the last."""
+    """Return facts, with values that differ in many files as the first and the last."""
     values: dict[tuple[str, Origin], list[str]] = {}
     for fact in facts:
         values.setdefault((fact.name, fact.origin), []).append(fact.value)
@@ -198,11 +195,11 @@ def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
 
 
 MAX_TAPS_IN_FULL = 3
-"""Tap tests that are told in full at most; more of them are summed up."""
+"""Largest number of tap tests that are shown in full."""
 MIN_FILES_TO_COUNT = 12
-"""Files of a replay above which those that were stored already are told by their number ..."""
+"""Largest number of files of which all known ones are listed."""
 MAX_KNOWN_LISTED = 3
-"""... unless these at most were."""
+"""Largest number of known files that are always listed."""
 
 
 def emit_replay(
@@ -227,7 +224,6 @@ def emit_replay(
 
 
 def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
-    """Files that were stored already: each where they are few."""
     if n_files > MIN_FILES_TO_COUNT and len(stored) > MAX_KNOWN_LISTED:
         notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
         return
@@ -287,16 +283,16 @@ def _series_cells(tests: Sequence[HistoryRow]) -> list[str]:
 
 
 class MachineRebuild(NamedTuple):
-    """Outcome of a rebuild of one machine."""
+    """Outcome of rebuilding one machine."""
 
     repairs: Sequence[str]
-    """Sentences on the files that were mended, a line each."""
+    """Sentences on repaired files."""
     n_taps: int
     """Number of tap tests in the new history."""
     is_saved: bool
-    """Whether the new history is on the disk."""
+    """Whether the new history is on disk."""
     remarks: Sequence[Remark]
-    """Remarks on the machine after it."""
+    """Remarks on the machine after the rebuild."""
 
 
 def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
@@ -305,7 +301,7 @@ def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
-    """One machine for people."""
+    """Return the outcome of rebuilding one machine in words."""
     if rebuild.is_saved:
         history = f"history.rows: made anew from {rebuild.n_taps} tap test(s)"
     else:
@@ -314,11 +310,11 @@ def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
 
 
 def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> dict[str, Any]:
-    """The machines of a folder, by name."""
+    """Return the outcomes of rebuilding the machines of a folder, by name."""
     return {"machines": {name: rebuild_json(rebuild) for name, rebuild in rebuilds.items()}}
 
 
 def folder_rebuild_texts(rebuilds: Mapping[str, MachineRebuild], n_machines: int) -> list[str]:
-    """The machines of a folder for people; n_machines: those that could not be rebuilt too."""
+    """Return the outcomes of rebuilding a folder in words; n_machines: failed ones included."""
     lines = [f"{name}: {text}" for name, rebuild in rebuilds.items() for text in rebuild_texts(rebuild)]
     return [*lines, f"{len(rebuilds)} of {n_machines} machines rebuilt"]

@@ -78,7 +78,7 @@ def mass_check_json(check: MassCheck) -> dict[str, Any]:
 
 
 def mass_check_texts(check: MassCheck) -> list[str]:
-    """The verdict, and what to change where."""
+    """Return the result of the mass check, and what to change where."""
     ratio = check.calibration.ratio
     if check.calibration.sizes_agree:
         return [str(check.calibration)]
@@ -97,7 +97,7 @@ def skew_check_json(check: SkewCheck) -> dict[str, Any]:
 
 
 def skew_check_texts(check: SkewCheck) -> list[str]:
-    """The skew, and where to enter it."""
+    """Return the skew, and where to enter it."""
     skew, channel = check.measured, check.channel
     if check.place is None:
         entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"

@@ -23,11 +23,11 @@ FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
     " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
-"""What stands below every table of dates."""
+"""Note below every table of forecast dates."""
 UNKNOWN_NOW_TEXT = "unknown now, see check"
-"""In place of the dates of a program on which there is no word."""
+"""Text instead of the dates of a program without a verdict."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
-"""Characters of the plot itself."""
+"""Size of the plot area (characters)."""
 CHART_POINT, CHART_LINE = "o", "."
 
 
@@ -101,7 +101,7 @@ def no_dates_text(outlook: MachineForecast) -> str:
 
 
 def trend_sentence(series: SeriesStatus) -> str:
-    """Course of the series so far, in a sentence."""
+    """Return the trend of the series in a sentence."""
     trend = series.trend
     if trend is None:
         return f"{series.name}: unknown"
@@ -116,7 +116,7 @@ def trend_sentence(series: SeriesStatus) -> str:
 
 
 def rate_text(trend: Trend) -> str:
-    """Change in % a month at the last point, with its 95 % interval; empty below 8 points."""
+    """Return the change in % a month at the last point, with its 95 % interval; empty below 8 points."""
     rate = trend.rate
     if rate is None:
         return ""
@@ -127,20 +127,20 @@ def rate_text(trend: Trend) -> str:
 
 
 def change_since_start_text(series: SeriesStatus) -> str:
-    """How far it has fallen since it started; of an only test, that there is nothing to compare it with."""
+    """Return the frequency change since the series started."""
     if series.is_baseline:
         return "first test, nothing to compare it with yet"
     return f"frequency {change_text(series)} since the first tests" if series.drop.is_known else "unknown"
 
 
 def change_text(series: SeriesStatus) -> str:
-    """Change of the frequency since the series started, with its standard error."""
+    """Return the frequency change since the series started, with its standard error."""
     fall = series.drop
     return f"{format_with_error(-fall.value, fall.std)} %" if fall.is_known else "unknown"
 
 
 def trend_text(trend: Trend) -> str:
-    """Its course: since when it falls where that rings, else the shape that fits it best; empty below 8 points."""
+    """Return since when the frequency drops, or else the shape that fits best; empty below 8 points."""
     fallen, since = trend.open_drop, trend.drop_since
     if fallen is not None and since is not None:
         course = f"{'fell at once before' if fallen.change.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
@@ -180,7 +180,7 @@ def _alarm_json(trend: Trend) -> dict[str, Any] | None:
 
 
 def reach_text(reach: ThresholdDates, now: datetime) -> str:
-    """When something is reached, for people."""
+    """Return when a limit is reached in words."""
     if reach.is_measured:
         return "already"
     if reach.forecast_end is None:

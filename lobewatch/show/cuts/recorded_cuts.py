@@ -30,16 +30,16 @@ FAULT_TEXTS: Mapping[str, str] = {
     "a cut gives to chatter; cut a little deeper, and listen for it without the cut",
     "slow-sampling": "fewer than three multiples of tooth passing are heard at this sample rate; take a higher one",
 }
-"""Fault and cure by the reason why it cannot be told."""
+"""Fault and remedy for each reason why chatter cannot be told from a stable cut."""
 
 
 MICROPHONE_NOTE = (
     "by microphone: it hears the shop too, so that a tone of another machine that runs in the cut alone is not known "
     "from one of the cut, and it does not tell how far the tool moves"
 )
-"""What a microphone cannot tell."""
+"""Limits of a recording by microphone."""
 MIN_RATE_FACTOR = 2 * MIN_TOOTH_HARMONICS
-"""Sample rate over tooth passing from which on enough multiples are below half of it."""
+"""Sample rate over tooth-passing frequency that holds enough harmonics of tooth passing."""
 
 
 NEXT_STEP_TEXTS: Mapping[str, str] = {
@@ -48,16 +48,16 @@ NEXT_STEP_TEXTS: Mapping[str, str] = {
     "flip": "cut at another speed, or less deep; lobewatch suggest names the next test cut",
     "cannot tell": "listen again; this one teaches nothing",
 }
-"""Next step by the word."""
+"""Next step for each verdict on a recorded cut."""
 
 
 def next_step_text(comparison: CutComparison) -> str:
-    """The next step, in a line."""
+    """Return the next step after a recorded cut."""
     return NEXT_STEP_TEXTS[comparison.detected.verdict]
 
 
 def reason_text(comparison: CutComparison) -> str:
-    """What the word rests on, or why it cannot be told, in a line."""
+    """Return what the verdict on a recorded cut rests on, or why there is none."""
     heard = comparison.detected
     return _fault_text(comparison) if heard.verdict == "cannot tell" else _energy_text(heard.energy_ratio)
 
@@ -81,7 +81,6 @@ def _fault_text(comparison: CutComparison) -> str:
 
 
 def _speed_conflict_text(comparison: CutComparison) -> str:
-    """Both speeds, and what is to be looked at."""
     heard, set_rpm = comparison.detected, comparison.setting.speed_rpm
     measured, lines = heard.measured_rpm or math.nan, heard.distant_rpm
     both = f"{measured:.1f} rpm, not the {lines:.1f} rpm that {'was set' if lines == set_rpm else 'the lines fit'}"
@@ -97,7 +96,7 @@ def _energy_text(ratio: float) -> str:
 
 
 def cut_verdict_text(comparison: CutComparison) -> str:
-    """The word, in a line."""
+    """Return the verdict on a recorded cut, with the chatter frequency or the fault."""
     heard, chatter = comparison.detected, comparison.detected.chatter
     if heard.verdict == "cannot tell":
         return f"cannot tell ({heard.reason}): {_fault_text(comparison)}"

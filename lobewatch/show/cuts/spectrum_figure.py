@@ -30,9 +30,9 @@ LINE_KIND_MARKS = {
     "air": ("there in air", EVENT_GREY, "x"),
     "chatter": ("chatter", ALARM_ORANGE, "D"),
 }
-"""Label, colour and mark of lines."""
+"""Label, grey-safe mark and paint of each kind of spectral line."""
 MIN_SHOWN_AMPLITUDE = 1e-4
-"""Share of the loudest amplitude down to which is drawn."""
+"""Smallest amplitude drawn, as a share of the largest."""
 
 
 def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
@@ -41,7 +41,7 @@ def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
 
 
 def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
-    """Amplitude over frequency, a panel for each cut; the word alone where it did not get as far as a spectrum."""
+    """Plot amplitude over frequency, a panel for each cut; only its title where there is no spectrum."""
     figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
     for axis, comparison in zip(axes, comparisons, strict=True):
         _draw_spectrum(axis, comparison)
@@ -49,7 +49,6 @@ def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
 
 
 def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
-    """One cut."""
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
@@ -72,7 +71,6 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
 
 
 def _draw_modes(axis: Axes, assembly: Assembly) -> None:
-    """Modes of the tool as it was tapped."""
     for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
         for number, mode in enumerate(modes or ()):
             label = f"modes in {name}, at rest" if number == 0 else None

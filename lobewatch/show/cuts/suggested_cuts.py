@@ -52,7 +52,7 @@ def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequen
 
 
 def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> list[str | Table]:
-    """The same for people."""
+    """Return the pockets of a cut as a table, and why no depth is known."""
     heading = f"{cut}: pockets by frequency and damping, the largest removal rate first; how deep, test cuts tell"
     return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
 
@@ -101,7 +101,7 @@ def _observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
 
 
 def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, float] | None:
-    """Speed (rpm) and depth (m) of the next cut, in the pocket nearest to the program; None where all is heard."""
+    """Return speed (rpm) and depth (m) of the next cut, in the nearest pocket; None where all are done."""
     wanted = depths[0].next_depth(first) if depths else None
     return None if wanted is None else (depths[0].speed_rpm, wanted)
 
@@ -206,7 +206,7 @@ def _interval_text(interval: Interval) -> str:
 
 
 def learned_remarks(learning: LearningResult) -> Iterator[Remark]:
-    """What was left out, and what the cuts say nothing of."""
+    """Return remarks on rejected cuts, and on what the cuts do not determine."""
     yield from inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, learning.program.name)
     if learning.accepted_cuts and not learning.posterior.n_frequencies:
         text = "f not learnt: no chatter frequency was heard yet"

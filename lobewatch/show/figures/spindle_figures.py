@@ -20,26 +20,28 @@ from lobewatch.show.figures.drawing import ALARM_ORANGE, FIGURE_STYLE, FIRST_GRE
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 
 CIRCLES_PER_ROW = 4
-"""Circles in a row."""
+"""Number of circles in a row."""
 MAX_CIRCLES = 8
-"""Circles at most: of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
+"""Largest number of circles: the most trusted modes, then those with the highest peaks."""
 MIN_LABEL_SPACING = 0.014
-"""Between labels of modes that are close (share of the axis)."""
+"""Smallest distance between labels of close modes (share of the axis)."""
 LEGEND_SHARE = 0.08
-"""Room for it below all lines (share of the axis)."""
+"""Room for the legend below all lines (share of the axis)."""
 ORDER_AXIS_TOP = 10.5
-"""Just above the poles of the highest order."""
+"""Upper end of the axis of model orders."""
 CIRCLE_HALF_WIDTHS = 3.0
-"""A circle is drawn over this many half-power half-widths on either side."""
+"""Range of a circle on either side of its resonance (half-power half-widths)."""
 
 
 TRUST_MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
-"""Mark behind the frequency of a mode."""
+"""Mark after the frequency of a mode."""
 
 
 def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
-    """|Accelerance| measured, fitted and what is left; LSCF poles of every order, with those named that are stable but
-    no modes; circle and phase of each mode. Of free decays the spectrum of the first one, and no circles."""
+    """Plot the accelerance with its fit and residual, the stabilization chart, and a mobility circle of each mode.
+
+    Stable poles without a mode are labelled. Free decays are shown as the spectrum of the first one, without circles.
+    """
     circles = sorted((mode for mode in modes if mode.has_stiffness), key=_circle_rank)[:MAX_CIRCLES]
     rows = -(-len(circles) // CIRCLES_PER_ROW)
     with mpl.rc_context(FIGURE_STYLE):
@@ -55,7 +57,7 @@ def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
 
 
 def _circle_rank(mode: Mode) -> tuple[int, float]:
-    """Trusted modes first, of those the one with the highest peak."""
+    """Return a sort key: trusted modes first, among them those with the highest peak."""
     return list(Trust).index(assess_trust(mode)), -(mode.frequency**2) * mode.peak
 
 
@@ -101,7 +103,7 @@ def _frequency_text(frequency: float) -> str:
 
 
 def _spread_labels(places: Sequence[float], least: float) -> list[float]:
-    """Rising places, each moved up as far as it must be to stand this far from the one before."""
+    """Return rising positions, each moved up to the least distance from the one before."""
     moved: list[float] = []
     for place in places:
         moved.append(max(place, moved[-1] + least) if moved else place)
@@ -146,7 +148,7 @@ def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequ
 
 
 def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) -> None:
-    """Mobility of the mode over its resonance: lines measured, with all that is fitted beside it taken off; the fit.
+    """Draw the mobility circle of a mode near its resonance: measured minus all other modes, and fitted.
 
     The line from the origin to the natural frequency has the angle of the modal constant: 0 degrees for a real mode of
     a driving point.
@@ -164,7 +166,8 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM_ORANGE, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(
-        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\nmobility (mm/s/N)",
+        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\n"
+        "mobility (mm/s/N)",
         fontsize=8,
     )
     axes.tick_params(labelsize=7)
@@ -173,12 +176,12 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
 
 
 def _mobility(frequency: Floats, receptance: Complexes) -> Complexes:
-    """Mobility (mm/s/N)."""
+    """Return the mobility (mm/s/N)."""
     return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
 
 
 def _phase_text(mode: Mode) -> str:
-    """Phase of the modal constant against that of a real mode, with its error."""
+    """Return the phase of the modal constant with its standard error, or "real"."""
     if not mode.phase_deg:
         return "real"
     return f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°"
@@ -186,11 +189,11 @@ def _phase_text(mode: Mode) -> str:
 
 STEEL_GREY = "#c9d3dc"
 MODE_LINES = ((NEWEST_BLUE, "-"), (ALARM_ORANGE, "--"), (GOOD_GREEN, "-."), (FIRST_GREY, ":"))
-"""Colour and dashes of the modes, in order."""
+"""Paint and dashes of the modes, in order."""
 
 
 def plot_model(picture: ModelFigureData) -> Figure:
-    """All pictures of the model on one page."""
+    """Plot all figures of a model on one page."""
     with mpl.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(12.0, 10.0), layout="constrained")
         axes: dict[str, Axes] = figure.subplot_mosaic(
@@ -208,7 +211,7 @@ def plot_model(picture: ModelFigureData) -> Figure:
 
 
 def draw_shaft(axes: Axes, spindle: Spindle) -> None:
-    """Longitudinal section to scale, the tool tip at the left; bearings are triangles, joints dashed lines."""
+    """Draw the shaft to scale, the tool tip at the left, with triangles for bearings and dashed lines for joints."""
     start = 0.0
     for segment in spindle.segments:
         _draw_segment(axes, segment, start)
@@ -241,7 +244,7 @@ def _draw_segment(axes: Axes, segment: Segment, start: float) -> None:
 
 
 def _radius_at(spindle: Spindle, position: float) -> float:
-    """Largest outer radius of the segments that reach a place (m)."""
+    """Return the largest outer radius (m) of the segments at a position (m)."""
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
     slack = 1e-6 * ends[-1]
     near = [
@@ -253,7 +256,7 @@ def _radius_at(spindle: Spindle, position: float) -> float:
 
 
 def draw_shapes(axes: Axes, modes: Modes) -> None:
-    """Deflection of each mode, scaled to its largest, upwards at the tip."""
+    """Draw the deflection of each mode over its largest one, positive at the tip."""
     for number, (colour, dashes) in zip(range(modes.frequency.size), MODE_LINES, strict=False):
         shape = modes.deflection[number]
         shape = shape / np.max(np.abs(shape)) * (np.sign(shape[0]) or 1.0)
@@ -266,7 +269,7 @@ def draw_shapes(axes: Axes, modes: Modes) -> None:
 
 
 def draw_stiffness_curve(axes: Axes, curve: tuple[Floats, Floats], points: tuple[Floats, Floats]) -> None:
-    """Frequency over bearing stiffness, with the tap tests on it."""
+    """Draw frequency over bearing stiffness, with the tap tests."""
     axes.semilogx(curve[0] / 1e6, curve[1], color=NEWEST_BLUE, lw=1.6, label="model")
     if points[0].size:
         axes.plot(points[0] / 1e6, points[1], "o", color=FIRST_GREY, ms=4, label="tap tests")
@@ -276,7 +279,7 @@ def draw_stiffness_curve(axes: Axes, curve: tuple[Floats, Floats], points: tuple
 
 
 def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
-    """Forward and backward whirl over speed, seen from the housing and from the shaft."""
+    """Draw forward and backward whirl frequencies over speed, in the fixed and in the rotating frame."""
     speed = whirl.speed_rpm / 1e3
     for number, (colour, _) in zip(range(whirl.forward.shape[0]), MODE_LINES, strict=False):
         first = number == 0
@@ -298,7 +301,7 @@ def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
 
 
 def draw_model_frf(axes: Axes, model: Frf, measured: Frf | None) -> None:
-    """Magnitude of receptance, model against measured."""
+    """Draw the magnitude of the receptance of the model and of the newest tap test."""
     if measured is not None:
         shown = measured.in_band((float(model.frequency[0]), float(model.frequency[-1])))
         axes.semilogy(

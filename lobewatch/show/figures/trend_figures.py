@@ -19,40 +19,40 @@ from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import ALARM_ORANGE, EVENT_GREY, FIRST_GREY, NEWEST_BLUE, new_axes
 
 TREND_FIGURE_SIZE = (8.0, 2.8)
-"""Size of a picture of one value (inches)."""
+"""Size of a figure of one value (inches)."""
 FORECAST_SHARE = 0.5
-"""Share of the length of the series that is drawn beyond it."""
+"""Forecast time drawn, as a share of the length of the series."""
 
 
 class TrendMarks(NamedTuple):
-    """Marks beside a trend."""
+    """Marks next to a trend."""
 
     events: Sequence[tuple[datetime, str]] = ()
-    """Times and texts of what was done."""
+    """Times and texts of maintenance events."""
     excluded: Sequence[tuple[datetime, float]] = ()
-    """Values that do not count."""
+    """Times and values of excluded tap tests."""
 
 
 NO_MARKS = TrendMarks()
 
 
 class TrendCurve(NamedTuple):
-    """The fitted line of a series and what it may become, in the unit of the series."""
+    """Fitted line of a series and its forecast, in the unit of the series."""
 
     days: Floats
     """Days since 1970, from the first point on, shape (n,)."""
     line: Floats
-    """Values of the mixture, shape (n,)."""
+    """Values of the fitted mixture, shape (n,)."""
     days_ahead: Floats
     """Days since 1970, from the last point on, shape (m,)."""
     low: Floats
-    """Values that are undercut with a chance of 10 %, shape (m,)."""
+    """10 % quantile of the forecast, shape (m,)."""
     high: Floats
-    """Values that are exceeded with a chance of 10 %, shape (m,)."""
+    """90 % quantile of the forecast, shape (m,)."""
 
 
 def make_trend_curve(trend: Trend) -> TrendCurve | None:
-    """The curve of a trend; None below 8 points."""
+    """Return the curve of a trend; None below 8 points."""
     forecast = trend.forecast
     if forecast is None:
         return None
@@ -68,9 +68,9 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
 def plot_frf(
     earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
 ) -> Figure:
-    """Real and imaginary part of receptance and coherence, the newest and the first test.
+    """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test.
 
-    size: of a picture (inches) that has room for the receptance alone.
+    size: of a smaller figure (inches) that shows the receptance only.
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
@@ -102,9 +102,9 @@ def plot_trend(
     course: TrendCurve | None = None,
     size: tuple[float, float] = TREND_FIGURE_SIZE,
 ) -> Figure:
-    """A value over time with its 95 % interval; with limits, where its fall calls for attention.
+    """Plot a value over time with its 95 % interval, and the limits of its drop where given.
 
-    limits: in % of the first value of the course, else of the first value; size: of the picture (inches).
+    limits: in % of the first value of the curve, or else of the first value; size: of the figure (inches).
     """
     figure, (axes,) = new_axes(1, size)
     days = date2num(times)

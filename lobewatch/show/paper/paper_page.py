@@ -23,13 +23,13 @@ from lobewatch.show.figures.spindle_figures import draw_shaft, draw_shapes
 from lobewatch.show.paper.paper_text import paper_cells
 
 PAPER_FIGURE_SIZE = (8.0, 4.4)
-"""Inches."""
+"""Size of a figure (inches)."""
 PAPER_MARK: dict[str, Any] = {"color": ALARM_ORANGE, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
 """Mark of a number of the paper."""
 RESPONSE_BAND = (1300.0, 2200.0)
-"""Frequencies of Figs. 5 and 6 (Hz)."""
+"""Frequency range of Figs. 5 and 6 (Hz)."""
 MAX_DEPTH_RATIO = 6.0
-"""Depth up to which lobes are drawn, in lowest limits of the new spindle."""
+"""Largest depth drawn, in lowest limits of the new spindle."""
 
 
 def _plot_shaft(study: PaperStudy) -> Figure:
@@ -167,10 +167,10 @@ def _plot_paper_lobes(study: PaperStudy) -> Figure:
 
 
 class PaperFigure(NamedTuple):
-    """A figure of the page."""
+    """Figure of the page."""
 
     caption: str
-    """What it shows."""
+    """Caption of the figure."""
     draw: Callable[[PaperStudy], Figure]
     """Function that draws it."""
 
@@ -185,15 +185,15 @@ PAPER_FIGURES: Mapping[str, PaperFigure] = {
     "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_imaginary_part),
     "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _plot_paper_lobes),
 }
-"""Figures 3 and 5 to 10, and the convergence of the finite elements, by the names of their files."""
+"""Figures 3 and 5 to 10, and the convergence of the finite elements, by file name."""
 
 
 PAPER_PAGE_NAME = "paper.md"
-"""Name of the page, and of its template."""
+"""Name of the page and of its template."""
 
 
 def render_paper_page(study: PaperStudy) -> str:
-    """The page in Markdown."""
+    """Return the page in Markdown."""
     template = resources.files("lobewatch.show.paper").joinpath(PAPER_PAGE_NAME).read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     return environment.from_string(template).render(study=study, cells=paper_cells, figures=PAPER_FIGURES)

@@ -57,7 +57,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> l
 
 
 def _at_speed_lines(comparison: LobeComparison) -> list[str]:
-    """What holds at rest and what at speed, where test cuts have taught of a program."""
+    """Return what holds for the rotating spindle where test cuts were used."""
     taught = [verdict for verdict in comparison.verdicts if verdict.n_cuts]
     if not taught:
         return []

@@ -16,7 +16,7 @@ from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 
 MAX_MATERIALS_IN_FULL = 5
-"""Most materials whose sources are said."""
+"""Largest number of materials that are shown with their sources."""
 
 
 MATERIAL_FIELDS = json_fields("""
@@ -76,6 +76,6 @@ def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) ->
 
 
 def power_text(power: CutPower, cut: Cut) -> str:
-    """A power, and the Kt that it says beside that which the cut was taken for."""
+    """Return the power of a cut, its Kt, and that of machine.toml."""
     by_power, known = power.tangential / 1e6, cut.tangential / 1e6
     return f"{power.watts / 1e3:.4g} kW say Kt {by_power:.0f} N/mm2, machine.toml {known:.0f}"

@@ -23,7 +23,7 @@ from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, P
 from lobewatch.verdicts.recommendation import Recommendation
 
 UNIT_FEED_MM = 0.1
-"""Feed per tooth (mm) that chips are said for where it is not known."""
+"""Feed per tooth (mm) of the removal rate where the feed is not known."""
 
 
 PROGRAM_FIELDS = json_fields("name tool material teeth tool_diameter_mm radial_depth_mm")
@@ -76,12 +76,12 @@ def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> dict[st
 
 
 def cutting_speed(setting: Setting, program: ProgramTable) -> float:
-    """Speed of the edge (m/min)."""
+    """Return the cutting speed vc (m/min)."""
     return math.pi * program.tool_diameter_mm * setting.speed_rpm / 1e3
 
 
 def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
-    """Chips a minute (cm3/min) at a feed per tooth (mm)."""
+    """Return the material removal rate (cm3/min) at a feed per tooth (mm)."""
     area = setting.depth_mm * program.radial_mm[1]
     return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
@@ -100,7 +100,7 @@ def _alternative_text(setting: Setting, answer: Recommendation) -> str:
 
 
 def saved_lines(folder: Path, name: str) -> list[str]:
-    """Where the setting was saved as a program, and what to do next."""
+    """Return where the setting was saved as a program, and the next step."""
     return [f"saved in {folder / 'machine.toml'} as program {name!r}", f"next: {format_command('check', folder)}"]
 
 
@@ -141,12 +141,11 @@ def _removal_rate_text(setting: Setting, answer: Recommendation) -> str:
 
 
 def _other_remarks(answer: Recommendation) -> list[Remark]:
-    """Remarks that are said apart from its lines."""
     return [remark for remark in answer.remarks if remark.code not in LINE_REMARK_CODES]
 
 
 HIDDEN_PITCH_CODES = ("doubt-decides",)
-"""Remarks on the word, which is not said here."""
+"""Codes of remarks on the verdict, which this output does not show."""
 
 
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> dict[str, Any]:
@@ -204,7 +203,7 @@ def _pitch_limit_text(depth: float) -> str:
 
 
 def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
-    """What to have ground, what that asks of the feed, and where it holds."""
+    """Return the proposed pitches, the uneven chips that they make, and where they hold."""
     proposed, program = proposal.proposed, proposal.verdict.program
     at = f"at {format_rpm(program.speed_rpm)} rpm"
     if proposed is None:

@@ -24,22 +24,22 @@ from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
 UNCERTAINTY_PAGE = "docs/lobes.md"
-"""Page that says where the sizes come from."""
+"""Page that explains the uncertainties."""
 NOT_ROTATING_TEXT = (
     "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
     "chatter once it turns and cuts, where frequency, damping, stiffness and cutting force may differ; plausible, not "
     "measured."
 )
-"""Sentences that a table of verdicts is read by."""
+"""Note on reading a table of verdicts."""
 FROM_MACHINE_FILE = "machine.toml"
 UNCERTAINTY_KEYS = "frequency", "damping_ratio", "stiffness", "phase_deg"
 DEGREES_PER_RADIAN = 180 / np.pi
 MIN_SHOWN_WIDTH = 5e-5
-"""A smaller half-width is not told."""
+"""Smallest half-width that is shown."""
 
 
 FACTOR_NAMES = {"tangential": "Kt", "ratio": "Kr/Kt"}
-"""Names of the learned factors that no direction belongs to."""
+"""Names of learned factors without a direction."""
 
 
 def factor_text(name: str) -> str:
@@ -80,7 +80,7 @@ def at_speed_text(verdicts: Sequence[Verdict]) -> str:
 
 
 def uncertainty_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
-    """Doubt of the programs, a line for all that have it alike."""
+    """Return the uncertainty of the programs, a line for each group with the same one."""
     named: dict[str, list[str]] = {}
     for verdict in verdicts:
         if verdict.samples is not None and verdict.assembly is not None:
@@ -154,7 +154,7 @@ def _coefficient_parts(verdict: Verdict, uncertainty: Uncertainty, machine: Mach
 
 
 def _widths_text(widths: Floats) -> str:
-    """Half-widths of frequency, damping ratio, stiffness and phase; those that are next to nothing are left out."""
+    """Return half-widths of frequency, damping ratio, stiffness and phase, without negligible ones."""
     named = zip(("frequency", "damping", "stiffness"), widths[:3].tolist(), strict=True)
     texts = [f"{name} {_half_width_text(width)}" for name, width in named if width > MIN_SHOWN_WIDTH]
     texts += [f"phase ±{DEGREES_PER_RADIAN * widths[3]:.2g} deg"] if widths[3] > MIN_SHOWN_WIDTH else []
@@ -172,12 +172,12 @@ def _span_text(span: FactorRange) -> str:
 
 
 class VerdictStyle(NamedTuple):
-    """How a word looks."""
+    """Style of a verdict."""
 
     symbol: str
-    """Character beside it, for those who do not see its colour."""
+    """Character that tells verdicts apart without color."""
     css_class: str
-    """Class in the report."""
+    """Class in the style sheet of the report."""
     style: str
     """Style in a terminal."""
 
@@ -188,7 +188,7 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
     Stability.NOT_STABLE: VerdictStyle("✗", "bad", "bold red"),
     Stability.UNKNOWN: VerdictStyle("?", "doubt", "bold"),
 }
-"""The four words, everywhere: each is its own text."""
+"""Style of each verdict, the same everywhere."""
 VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
 
 
@@ -222,25 +222,25 @@ def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> T
 
 
 def limits_text(verdict: Verdict) -> str:
-    """The limit in the middle of the doubt (mm), and how low and high it may be."""
+    """Return the median limit (mm) with its band."""
     band = band_text(verdict)
     return limit_text(verdict) + (f" ({band})" if band else "")
 
 
 def limit_text(verdict: Verdict) -> str:
-    """The limit in the middle of the doubt (mm)."""
+    """Return the median limit (mm)."""
     return "-" if math.isnan(verdict.limit) else _depth_text(verdict.limit, verdict)
 
 
 def band_text(verdict: Verdict) -> str:
-    """How low and high the limit may be (mm); empty where that is not known, or more than is looked at."""
+    """Return the band of the limit (mm); empty where it is unknown or beyond the search."""
     if math.isnan(verdict.limit_low) or math.isinf(verdict.limit_low):
         return ""
     return f"{_depth_text(verdict.limit_low, verdict)}..{_depth_text(verdict.limit_high, verdict)}"
 
 
 def chatter_risk_text(verdict: Verdict) -> str:
-    """Chance of chatter once the spindle turns."""
+    """Return the chatter risk with the spindle rotating."""
     if math.isnan(verdict.chatter_risk):
         return "-"
     percent = round(100 * verdict.chatter_risk)
@@ -248,19 +248,19 @@ def chatter_risk_text(verdict: Verdict) -> str:
 
 
 def margin_text(verdict: Verdict) -> str:
-    """The margin of a program in depth."""
+    """Return the margin of a program in depth."""
     return f"{100 * verdict.depth_margin:+.0f} %" if math.isfinite(verdict.depth_margin) else "-"
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """The word, with what must be said in the same breath."""
+    """Return the verdict, with "beyond the drive" and "(predicted)" where they apply."""
     predicted = verdict.stability is not Stability.UNKNOWN and not verdict.is_measured
     words = [verdict.stability.value, *(["beyond the drive"] if verdict.is_beyond_drive else [])]
     return ", ".join(words) + (" (predicted)" if predicted else "")
 
 
 def is_safe(verdict: Verdict) -> bool:
-    """Whether it may be run: stable, and not beyond the drive."""
+    """Return whether a program may be run: stable, and within the drive limits."""
     return verdict.stability is Stability.STABLE and not verdict.is_beyond_drive
 
 
@@ -275,7 +275,7 @@ def _depth_text(depth: float, verdict: Verdict) -> str:
 
 
 def _searched_depth(verdict: Verdict) -> float:
-    """Depth (m) up to which every draw was looked at."""
+    """Return the depth (m) up to which every sample was searched."""
     if math.isinf(verdict.limit) or verdict.samples is None:
         return MAX_PROGRAM_DEPTH_RATIO * verdict.program.depth_mm / 1e3
     force = verdict.samples.rows.tangential

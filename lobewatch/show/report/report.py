@@ -49,7 +49,7 @@ def render_report(
     now: datetime | None = None,
     sections: Sequence[SectionMaker] = SECTIONS,
 ) -> str:
-    """HTML of one series (tool and direction); ValueError where it holds no tap test. now: None for the clock's."""
+    """Return the HTML of one series; raise ValueError where it has no tap test. now: None for the current time."""
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
 
 
@@ -82,7 +82,7 @@ def _report_content(
 
 
 SPARK_WIDTH, SPARK_HEIGHT = 140, 32
-"""Size of a small course, in its own units."""
+"""Size of a small trend line, in units of the figure."""
 
 
 def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Path | None, now: datetime) -> Path:
@@ -93,7 +93,7 @@ def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Pa
 
 
 def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) -> str:
-    """HTML of a line a machine, in the order of the rows."""
+    """Return the HTML of a fleet, a line for each machine, in the order of the rows."""
     lights = [row["light"] for row in rows]
     counts = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
     numbers = NumberTable(FLEET_COLUMNS, [[_enum_value(row[column]) for column in FLEET_COLUMNS] for row in rows])
@@ -106,7 +106,7 @@ def _enum_value(value: Any) -> Any:
 
 
 def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A machine as the template takes it."""
+    """Return a machine as the template takes it."""
     left, last = row["days_left"], row["last_tap"]
     due = (
         "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
@@ -132,7 +132,7 @@ def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def programs_text(words: Mapping[str, str]) -> str:
-    """The programs that may not be run, by the word on them, and how many are stable."""
+    """Return the programs that may not be run, by verdict, and how many are stable."""
     named: dict[str, list[str]] = {}
     for program, word in words.items():
         named.setdefault(word, []).append(program)
@@ -142,7 +142,7 @@ def programs_text(words: Mapping[str, str]) -> str:
 
 
 def spark_points(points: Sequence[tuple[float, float]]) -> str:
-    """The course of a series (days, %) as the points of a small polyline; empty below two points."""
+    """Return a trend (days, %) as points of a small polyline; empty below two points."""
     if len(points) < 2:
         return ""
     days, percents = zip(*points, strict=True)

@@ -19,11 +19,11 @@ from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.trend_figures import TrendCurve
 
 MAX_RESPONSE_LINES = 1500
-"""Lines of a response that are given, at most."""
+"""Largest number of lines of a response or a diagram."""
 
 
 class NumberTable(NamedTuple):
-    """A table."""
+    """Table of numbers behind a figure or table."""
 
     heads: Sequence[str]
     """Headings of the columns, with units."""
@@ -32,7 +32,7 @@ class NumberTable(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The table as JSON that can stand within a page; what is not finite is null."""
+        """Table as JSON that can be embedded in HTML, with null for infinite and NaN."""
         lines = [[_json_value(value) for value in line] for line in self.lines]
         exact = json.dumps({"heads": list(self.heads), "lines": lines}, ensure_ascii=False, separators=(",", ":"))
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")
@@ -90,23 +90,23 @@ def _json_value(value: Any) -> Any:
 
 
 class Paragraph(NamedTuple):
-    """A sentence or a few."""
+    """Paragraph of text."""
 
     text: str
-    """Text; nothing is shown where it is empty."""
+    """Text; an empty one is not shown."""
     is_small: bool = False
-    """Whether it stands in small letters, as what is to be known beside."""
+    """Whether it is shown in small letters, as a note."""
 
 
 class BulletList(NamedTuple):
-    """A list of lines."""
+    """Bullet list."""
 
     lines: Sequence[str]
-    """Text of each."""
+    """Text of each item."""
 
 
 class TableCell(NamedTuple):
-    """A cell with the colour of a verdict or light."""
+    """Cell with the paint of a verdict or status."""
 
     text: str
     """Text of the cell."""
@@ -115,36 +115,36 @@ class TableCell(NamedTuple):
 
 
 class DataTable(NamedTuple):
-    """A table."""
+    """Table."""
 
     heads: Sequence[str]
     """Headings of the columns, with units."""
     rows: Sequence[Sequence[str | TableCell]]
     """Cells of each row."""
     kind: str = ""
-    """Classes of the style sheet: "words" for text to the left."""
+    """Classes of the style sheet: "words" aligns text to the left."""
     if_empty: str = ""
-    """Text in place of the rows where there are none."""
+    """Text instead of rows where there are none."""
     numbers: NumberTable | None = None
-    """The table with all digits, to be saved as CSV."""
+    """Table with all digits, to be saved as CSV."""
     key: str = ""
     """Name of the numbers in the page."""
 
 
 class Drawing(NamedTuple):
-    """A picture."""
+    """Figure."""
 
     svg: str
     """The <svg> element."""
     numbers: NumberTable | None = None
-    """Numbers of the picture, to be saved as CSV."""
+    """Numbers of the figure, to be saved as CSV."""
 
 
 class Fragment(NamedTuple):
-    """A piece of the page with a template of its own."""
+    """Part of the page with a template of its own."""
 
     template: str
-    """File beside report.html."""
+    """Template file in this folder."""
     content: Mapping[str, Any]
     """Values that the template shows."""
 
@@ -153,18 +153,18 @@ SectionPart = Paragraph | BulletList | DataTable | Drawing | Fragment
 
 
 class Section(NamedTuple):
-    """A heading with what stands below it, each part on lines of its own."""
+    """Heading with the parts below it."""
 
     heading: str
     """Heading; empty for none."""
     parts: Sequence[SectionPart]
-    """Parts below the heading, from above."""
+    """Parts below the heading, from the top."""
     is_framed: bool = True
-    """Whether a line end stands before and after it in the file; without any meaning on the page."""
+    """Whether blank lines surround it in the file, without any effect on the page."""
     has_plot: bool = False
-    """Whether the page must bring the script that plots."""
+    """Whether the page needs the plot script."""
 
 
 def make_figure_section(heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Section:
-    """A picture below what is to be known to read it; numbers: what is drawn."""
+    """Make a section of a figure below a note on reading it; numbers: data of the figure."""
     return Section(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])

@@ -45,7 +45,7 @@ from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
 
 
 def make_figures(data: ReportData) -> list[Section]:
-    """A section for each picture that there is something to draw for."""
+    """Make all figures that have data."""
     makers = make_value_figures, make_lobe_figure, make_waterfall, make_frequency_response
     return [section for make in makers for section in make(data)]
 
@@ -86,7 +86,7 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
 
 
 def make_waterfall(data: ReportData) -> list[Section]:
-    """The depths over speed and time: how the pockets move."""
+    """Make a map of limiting depth over speed and time."""
     course = data.lobe_history
     if course is None or not np.isfinite(course.depth).any():
         return []
@@ -96,7 +96,7 @@ def make_waterfall(data: ReportData) -> list[Section]:
 
 
 def make_frequency_response(data: ReportData) -> list[Section]:
-    """Receptance of the newest test, and of the first; nothing where no force was measured."""
+    """Make the receptance of the newest test and of the first; nothing where no force was measured."""
     first, newest = data.first, data.newest.frf
     if newest is None:
         return []
@@ -107,23 +107,23 @@ def make_frequency_response(data: ReportData) -> list[Section]:
 
 
 def make_lobe_history(data: ReportData) -> list[Section]:
-    """The diagrams one by one, with a slider."""
+    """Make the lobe diagrams over time, with a slider."""
     if data.lobe_history is None:
         return []
     return [Section("", [Fragment("lobe_course.html", {"course": data.lobe_history})], has_plot=True)]
 
 
 SectionMaker = Callable[[ReportData], Sequence[Section]]
-"""What makes some sections of the report; none where there is nothing to show."""
+"""Function that makes some sections of the report, none where there is nothing to show."""
 CHANGE_VALUES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
     ("stiffness", "stiffness K (N/µm)", 1e6),
     ("bearing_stiffness", "bearing stiffness (N/µm)", 1e6),
 )
-"""Field of a row, what the table calls it, and the size of its unit."""
+"""Field of a row, its name in the table, and the size of its unit."""
 MODEL_CHANGE_VALUES = (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal"))
-"""Field of a row from the model, and what the table calls it."""
+"""Field of a row from the model, and its name in the table."""
 
 
 def make_programs(data: ReportData) -> list[Section]:
@@ -144,7 +144,7 @@ def make_programs(data: ReportData) -> list[Section]:
 
 
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
-    """A row of the table, as `lobewatch check` says it."""
+    """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
     return {
         "name": verdict.program.name,
@@ -165,7 +165,7 @@ def _verdict_cell(word: Stability, text: str) -> TableCell:
 
 
 def make_forecast(data: ReportData) -> list[Section]:
-    """When programs stop holding; nothing where no test can be compared with."""
+    """Make the forecast dates; nothing for a single test."""
     if data.series.trend is None or data.series.is_baseline:
         return []
     course = Paragraph(f"{trend_sentence(data.series)}.")
@@ -176,7 +176,7 @@ def make_forecast(data: ReportData) -> list[Section]:
 
 
 def make_notes(data: ReportData) -> list[Section]:
-    """Remarks on the newest test of the series, and on x and y of its tool as they are known now."""
+    """Make remarks on the newest test of the series, and on both directions of its tool."""
     of_tap = [remark for remark in data.last.remarks if remark.code not in DIRECTION_CODES]
     of_tool = [remark for remark in data.assembly.remarks if remark.code in DIRECTION_CODES]
     return [
@@ -185,7 +185,7 @@ def make_notes(data: ReportData) -> list[Section]:
 
 
 def make_changes(data: ReportData) -> list[Section]:
-    """What was measured first and last, and the change by the formula of the light; of an only test, what it says."""
+    """Make the table of the first and the newest values and their change; of a single test only its values."""
     history = data.series.history
     rows = [*_measured_changes(history), *_model_changes(history)]
     if not rows:
@@ -258,4 +258,4 @@ SECTIONS: tuple[SectionMaker, ...] = (
     make_tap_tests,
     make_provenance,
 )
-"""Functions that make the sections, in the order of the page; each gives none where there is nothing to show."""
+"""Functions that make the sections, in the order of the page."""

@@ -25,17 +25,17 @@ from lobewatch.verdicts import Stability
 
 UNKNOWN_FATE = ProgramForecast(NO_FORECAST, NO_FORECAST)
 MAX_SUMMARY_REASONS = 3
-"""Reasons, and series, on the first screen; the others stand below it."""
+"""Largest number of reasons and of series in the summary."""
 TABLE_REASON_CODES = (
     *("frequency-alarm", "frequency-warn", "decay"),
     *("program-not-stable", "program-doubtful", "program-unknown"),
     "overdue",
 )
-"""Reasons that stand on the first screen as a series, a program or a date, unless they are the first."""
+"""Codes of reasons that the tables of the summary show, unless they are the worst."""
 
 
 def make_summary(data: ReportData) -> dict[str, Any]:
-    """What the first screen shows, as the template takes it."""
+    """Make the summary as the template takes it."""
     standing, limits = data.outlook.status, data.machine.limits
     worst = standing.series[0]
     return {
@@ -53,7 +53,7 @@ def make_summary(data: ReportData) -> dict[str, Any]:
 
 
 def _status_content(standing: MachineStatus) -> dict[str, Any]:
-    """The light in words, the reasons, the next step."""
+    """Return the status in words, the reasons and the next step."""
     first, others = _pick_reasons(standing)
     shown = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD][
         : MAX_SUMMARY_REASONS - 1
@@ -68,7 +68,7 @@ def _status_content(standing: MachineStatus) -> dict[str, Any]:
 
 
 def _pick_reasons(standing: MachineStatus) -> tuple[list[Remark], list[Remark]]:
-    """The worst, of the series that fell most; those beside it that nothing else of the first screen shows."""
+    """Return the worst reason, of the series with the largest drop, and those that the summary shows nowhere else."""
     plain, order = set(standing.reasons), {series.name: place for place, series in enumerate(standing.series)}
     alike = [remark for remark in standing.remarks if remark.code == standing.remarks[0].code]
     first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
@@ -81,7 +81,7 @@ def _has_changed(series: SeriesStatus) -> bool:
 
 
 def _series_content(series: SeriesStatus) -> dict[str, str]:
-    """Name, change, course and rate; of an only test, that it is the first."""
+    """Return name, change, trend and rate of a series."""
     if series.is_baseline:
         return {"name": series.name, "change": "first test", "course": "nothing to compare it with yet"}
     trend = series.trend
@@ -110,7 +110,7 @@ def _until_text(word: Stability, fate: ProgramForecast, now: datetime) -> str:
 
 
 def alternative_text(program: ProgramAdvice) -> str:
-    """Speed and depth to go to, in a few words."""
+    """Return the recommended speed and depth in a few words."""
     assembly, settings = program.verdict.assembly, (program.advice.best, program.advice.deepest_here)
     if program.verdict.stability is Stability.STABLE:
         return "as it is"
@@ -131,16 +131,16 @@ def _next_tap_text(standing: MachineStatus, machine: Machine) -> str:
 
 
 class SummaryFigure(NamedTuple):
-    """A small picture."""
+    """Small figure of the summary."""
 
     caption: str
-    """What it shows."""
+    """Caption of the figure."""
     svg: str
     """The <svg> element."""
 
 
 def draw_summary_figures(data: ReportData) -> Iterator[SummaryFigure]:
-    """Course of the frequency, or the response of an only tap test; lobes where there are any."""
+    """Draw the trend of the frequency, or the response of a single tap test, and the lobes where there are any."""
     points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.curve is not None else ""

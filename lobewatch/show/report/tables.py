@@ -30,15 +30,15 @@ TAP_TABLE_HEADS = (
     *("time", "tool", "direction", "f_n (Hz)", "zeta (%)", "K (N/um)"),
     *("bearing stiffness (N/um)", "temperature (degC)"),
 )
-"""Headings of the tap tests as numbers."""
+"""Headings of the numbers of tap tests."""
 TAP_VALUE_FORMATS = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
-"""Format and size of the unit of f_n, zeta, K and the stiffness of a bearing."""
+"""Format and size of the unit of f_n, zeta, K and the bearing stiffness."""
 COUNTING_TEXT = "Those that count, the newest first"
 """Words for what a list holds."""
 
 
 def make_series(data: ReportData) -> list[Section]:
-    """A line for each, the one that fell most first."""
+    """Make a table of the series, the largest drop first."""
     heads = ["tool", "direction", "light", "points", "newest", "change", "rate"]
     rows = [_series_row(series) for series in data.outlook.status.series]
     return [Section("Tools and directions", [DataTable(heads, rows, "words")], is_framed=False)]
@@ -60,7 +60,7 @@ def _series_row(series: SeriesStatus) -> list[str | TableCell]:
 
 
 def make_events(data: ReportData) -> list[Section]:
-    """A line for each event of the machine, each word on an alarm, each test that does not count, oldest first."""
+    """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
     files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
     lines = [(event.time, event_day_text(event)) for event in files.events]
@@ -75,7 +75,7 @@ def make_events(data: ReportData) -> list[Section]:
 
 
 def event_day_text(event: MaintenanceEvent) -> str:
-    """Day and text of an event."""
+    """Return day and text of an event."""
     return f"{event.time.astimezone():%Y-%m-%d}: {event.text}{' (new baseline)' if event.new_baseline else ''}"
 
 
@@ -99,7 +99,7 @@ def _cut_row(cut: CutEntry) -> list[str]:
 
 
 def make_tap_tests(data: ReportData) -> list[Section]:
-    """Date, tool, direction, values, words of then; the same as numbers, oldest first."""
+    """Make the table of tap tests, the newest first, and their numbers, the oldest first."""
     history = data.analysis.history.current
     heads = ["when", "tool", "in", "frequency (Hz)", "damping (%)", "stiffness (N/µm)", "bearings (N/µm)", "said of it"]
     numbers = NumberTable(TAP_TABLE_HEADS, [_tap_values(row) for row in history])
@@ -131,14 +131,14 @@ FAILURE_MODE = (
     "loss of stiffness of bearings, joints and clamping, seen as a fall of the natural frequency that is followed at "
     "the tool tip, spindle standing"
 )
-"""Failure mode."""
+"""Failure mode that is monitored."""
 NOT_DETECTED: Sequence[str] = (
     "damage that leaves the stiffness as it is: pitting, cage, lubrication, seals, unbalance, motor, drawbar below its "
     "clamping force",
     "what heat and speed do to the preload while the spindle turns",
     "what has happened since the newest tap test",
 )
-"""What no tap test shows."""
+"""Damage that no tap test detects."""
 ALARM_CONFIDENCE = (
     "alarm: two clampings running, each with a chance of 1 in 2000 of being scatter alone; of 100 healthy series 5 "
     "raise one in 60 clampings"

@@ -8,7 +8,7 @@ from functools import reduce
 from typing import Any
 
 FIELD_PATTERN = re.compile(r"(\w+)(?:=([\w.]+))?(?:([*/])([\d.e]+))?")
-"""Key, path of the attribute, and the factor or divisor of its unit."""
+"""Key, attribute path, and factor or divisor of a unit."""
 
 JsonFields = Callable[[Any], dict[str, Any]]
 """Function that makes the JSON object of a record."""

@@ -31,41 +31,41 @@ from lobewatch.show.terminal.option_names import with_option_names
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
 REPLACEMENT_CHARACTER = "\ufffd"
-"""Character that is shown for a control character."""
+"""Character shown instead of a control character."""
 
 
 class SafeConsole(Console):
-    """A console that texts cannot steer: of all control characters in them, only newline and tab pass."""
+    """Console that texts cannot control: newline and tab are the only control characters that pass."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        """What is printed, piece by piece; the pieces that rich itself steers the terminal with are marked as such."""
+        """Render without control characters, except those that rich itself writes."""
         for piece in super().render(renderable, options):
             yield piece if piece.control else piece._replace(text=make_printable(piece.text))
 
 
 class SafeTable(Table):
-    """A table whose rows cannot be broken: newline and tab do not pass either."""
+    """Table whose rows cannot be broken: newline and tab do not pass, either."""
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
-        """One row."""
+        """Add a row."""
         super().add_row(*(_one_line(cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
     @property
     def min_table_width(self) -> int:
-        """Characters a line, so that columns that cannot be broken are whole and the others hold a word; 0: any."""
+        """Smallest width (characters) that leaves a word for each column that wraps; 0 for any width."""
         breaking = sum(not column.no_wrap for column in self.columns)
         wholes = (_max_cell_width([column.header, *column.cells]) for column in self.columns if column.no_wrap)
         return sum(wholes) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
 
 
 MIN_COLUMN_WIDTH = 10
-"""Characters that a column that can be broken has at least."""
+"""Smallest width of a column that wraps (characters)."""
 COLUMN_GAP = 2
-"""Between columns."""
+"""Gap between columns (characters)."""
 notes = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Console for progress and remarks."""
 results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
-"""Console for results, wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
+"""Console for results, wide enough for every table: a narrow terminal may wrap lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
@@ -131,14 +131,14 @@ def _one_line(cell: str) -> str:
 
 
 def make_printable(text: str) -> str:
-    """Replace control characters but newline and tab, and name options instead of fields of the library."""
+    """Replace control characters except newline and tab, and name options instead of library fields."""
     return CONTROL_CHARACTERS.sub(
         lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
     )
 
 
 def _escape_control(match: re.Match[str]) -> str:
-    """A control character as JSON writes it inside of text; a newline stands between its lines only."""
+    """Escape a control character as in JSON; newlines occur only between lines."""
     return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
 
 
@@ -157,7 +157,7 @@ def _to_list(array: Any) -> Any:
 
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
-    """A line each; those that say the same of several things once."""
+    """Return a line for each remark, the same remark on several things as one."""
     return [f"note: {remark}" for remark in merge_remarks(remarks)]
 
 
@@ -168,11 +168,11 @@ def print_remarks(remarks: Iterable[Remark]) -> None:
 
 
 FORMULA_START = re.compile(r"(?![+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z)[=+\-@\t\r]")
-"""Beginning of a text that a spreadsheet takes for a formula; of a number never. As in report.js."""
+"""Beginning of a text that a spreadsheet reads as a formula, never of a number; as in report.js."""
 
 
 def format_csv(lines: Iterable[Sequence[Any]]) -> str:
-    """A table, its headings first; None is an empty cell."""
+    """Return a CSV table, its headings first."""
     return "".join(",".join(map(format_csv_cell, line)) + "\n" for line in lines)
 
 
@@ -194,22 +194,22 @@ WatchToken = Annotated[
 
 
 class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
-    """Answers while its context lasts."""
+    """Server of a screen that answers within its context."""
 
     @property
     def url(self) -> str:
-        """For those who may alter something."""
+        """Address with full access."""
         ...
 
     @property
     def watch_url(self) -> str:
-        """For those who may only watch."""
+        """Address with read-only access."""
         ...
 
 
 @contextlib.contextmanager
 def serve_screen(server: ScreenServer) -> Iterator[None]:
-    """Let a screen answer, and print its address."""
+    """Run a screen server, and print its address."""
     with server:
         show_address(server.url, server.watch_url)
         yield

@@ -11,19 +11,19 @@ from rich.markup import escape
 from lobewatch.tap.state import ListedHit, TapState, TapStep
 
 PRINT_INTERVAL = 0.05
-"""Between two looks at the test (s)."""
+"""Time between two looks at the test (s)."""
 
 
 class RunningTest(Protocol):
-    """A live tap test; all of it may be used from any thread."""
+    """Live tap test, usable from any thread."""
 
     @property
     def state(self) -> TapState:
-        """The newest picture of it."""
+        """Newest state of the test."""
         ...
 
     def undo(self) -> None:
-        """Take the last good hit back."""
+        """Undo the last good hit."""
         ...
 
     def stop(self) -> None:
@@ -31,15 +31,14 @@ class RunningTest(Protocol):
         ...
 
     def choose(self, key: str, tool: str = "") -> None:
-        """Say what comes after a test, by the key of a choice of its state."""
+        """Choose what follows a test, by the key of one of the choices in its state."""
         ...
 
 
 class TapPrinter:
-    """Prints from a thread of its own between __enter__ and __exit__; the test never waits for it."""
+    """Thread that prints a tap test within its context; the test never waits for it."""
 
     def __init__(self, session: RunningTest, console: Console) -> None:
-        """Nothing is printed yet."""
         self._session, self._console = session, console
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="tap printer", daemon=True)
@@ -47,7 +46,6 @@ class TapPrinter:
         self._n_printed = 0
 
     def __enter__(self) -> Self:
-        """Begin to print."""
         self._thread.start()
         return self
 
@@ -90,7 +88,7 @@ class TapPrinter:
 
 
 def hit_markup(hit: ListedHit) -> str:
-    """Symbol, words and cure, with colours."""
+    """Return symbol, words and remedy of a hit, with colors."""
     if hit.undone:
         return "[bold]↶ UNDONE[/]"
     if not hit.flags:

@@ -23,20 +23,19 @@ from lobewatch.show.terminal.tap_printer import RunningTest, hit_markup
 from lobewatch.tap.state import Outcome, TapState, TapStep
 
 PAGE_UP_CODES = ("\x1b[5~", "\xe0I", "\0I")
-"""Page Up as terminals and as Windows send it: presenters and foot switches do."""
+"""Page Up as terminals and Windows send it, by presenters and foot switches."""
 SPECIAL_KEY_CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
-"""Arrows and the like."""
+"""Codes of arrows and other special keys."""
 
 
 class KeyReader:
-    """Keys pressed between __enter__ and __exit__; none where standard input is no terminal."""
+    """Reader of single keys within its context; reads nothing where standard input is no terminal."""
 
     def __init__(self) -> None:
-        """Nothing is changed yet."""
         self._before: list[Any] | None = None
 
     def __enter__(self) -> Self:
-        """Let single keys through; Ctrl-C stays what it is."""
+        """Switch the terminal to single keys; Ctrl-C keeps its meaning."""
         if sys.platform != "win32" and sys.stdin.isatty():
             import termios
             import tty
@@ -46,7 +45,7 @@ class KeyReader:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """The terminal as it was."""
+        """Restore the terminal."""
         if sys.platform != "win32" and self._before is not None:
             import termios
 
@@ -54,7 +53,7 @@ class KeyReader:
             self._before = None
 
     def read(self) -> str:
-        """The keys that wait, in lower case; empty where there are none."""
+        """Read the waiting keys in lower case; empty where there are none."""
         if sys.platform == "win32":
             import msvcrt
 
@@ -72,20 +71,20 @@ class KeyReader:
 
 
 def normalize_keys(typed: str) -> str:
-    """What was typed in lower case, Page Up as "u"; other keys that send more than one character count for nothing."""
+    """Return typed keys in lower case, Page Up as "u", without other special keys."""
     for page_up in PAGE_UP_CODES:
         typed = typed.replace(page_up, "u")
     return SPECIAL_KEY_CODES.sub("", typed).lower()
 
 
 KEY_POLL_INTERVAL = 0.05
-"""Between two looks at keys and state (s)."""
+"""Time between two looks at keys and state (s)."""
 MAX_SHOWN_HITS = 6
-"""Newest hits that are listed."""
+"""Largest number of newest hits that are listed."""
 BELL_PAUSE = 0.2
-"""Between two bells (s)."""
+"""Time between two bells (s)."""
 KEY_REPEAT_TIME = 0.7
-"""Undo keys that follow each other faster (s) are one that is held down: it counts once."""
+"""Longest time between undo keys (s) that is one key held down, which counts once."""
 STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.CHECKING: ("…", "black on #56b4e9"),
     TapStep.TAP: ("▼", "black on #56b4e9"),
@@ -97,9 +96,9 @@ STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.DONE: ("■", "black on #2bb48d"),
     TapStep.FAILED: ("✗", "black on #ee8238"),
 }
-"""Symbol and colours of each word, told apart by colour-blind people too."""
+"""Symbol and style of each step, distinct for color-blind people."""
 BELL_COUNTS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
-"""Number of bells."""
+"""Number of bells of each step."""
 STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
     "warn": ("!", "black on #f0e442"),
@@ -107,14 +106,14 @@ STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "unknown": ("?", "black on #dddddd"),
 }
 CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
-"""Key that stands for each choice."""
+"""Key of each choice."""
 
 
 class TerminalScreen:
-    """Shows a test between __enter__ and __exit__ and hands its keys on; the test never waits for it."""
+    """Thread that shows a tap test and reads keys within its context; the test never waits for it."""
 
     def __init__(self, session: RunningTest, console: Console | None = None) -> None:
-        """Nothing is shown yet; console None: standard error."""
+        """Set the console, by default standard error."""
         self._session = session
         self._console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
@@ -132,14 +131,13 @@ class TerminalScreen:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the last picture; the terminal as it was."""
+        """Leave the last state on the screen, and restore the terminal."""
         self._ended.set()
         self._thread.join()
         self._live.stop()
         self._keys.__exit__()
 
     def _watch(self) -> None:
-        """Keys and bells."""
         before = self._session.state
         while not self._ended.wait(KEY_POLL_INTERVAL):
             for key in self._keys.read():
@@ -149,7 +147,7 @@ class TerminalScreen:
             before = state
 
     def handle_key(self, key: str) -> None:
-        """Do what a key stands for; while the sensor is moved, Enter and undo stand for the first choice."""
+        """Handle a key; while the sensor is moved, Enter and undo select the first choice."""
         state = self._session.state
         if state.choices and key != "m":
             if state.word is TapStep.MOVE and key in "\nu":
@@ -168,13 +166,13 @@ class TerminalScreen:
             self._muted = not self._muted
 
     def _choose(self, key: str) -> None:
-        """Hand a choice on, with the name of the next tool."""
+        """Pass a choice on, with the name of the next tool."""
         tool = self._ask_tool() if key == "tool" else ""
         with contextlib.suppress(ValueError):  # no name, or a page was quicker
             self._session.choose(key, tool)
 
     def _ask_tool(self) -> str:
-        """A line that is typed, the screen standing still meanwhile."""
+        """Read a line while the screen stands still."""
         self._live.stop()
         self._keys.__exit__()
         self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")
@@ -185,7 +183,7 @@ class TerminalScreen:
             self._live.start()
 
     def ring_bells(self, before: TapState, state: TapState) -> None:
-        """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
+        """Ring the bells of a new step or hit once, even if the step of a hit arrives before the hit itself."""
         word, hit = state.word != before.word, len(state.hits) > len(before.hits)
         is_due = word or (hit and not self._ahead_of_hit)
         if word or hit:
@@ -199,7 +197,7 @@ class TerminalScreen:
 
 
 def render_state(state: TapState, muted: bool) -> RenderableType:
-    """One state of a test, as it stands on the terminal."""
+    """Return one state of a test as it is shown."""
     keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
     return Group(*_state_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
 
@@ -221,7 +219,7 @@ def _state_lines(state: TapState) -> Iterator[RenderableType]:
 
 
 def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
-    """What was measured, the programs, and last the light with the next step."""
+    """Return what was measured, the programs, and the status with the next step."""
     yield Text(" ".join(outcome.texts))
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
@@ -231,7 +229,6 @@ def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
 
 
 def _banner(state: TapState) -> RenderableType:
-    """The full-width word."""
     symbol, style = STEP_STYLES[state.word]
     trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
     text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")

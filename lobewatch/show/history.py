@@ -19,7 +19,7 @@ from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import Acknowledgement, MaintenanceEvent
 from lobewatch.show.programs.materials import power_text
 from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import align_columns, format_csv
+from lobewatch.show.terminal.output import align_columns, blank_nonfinite, format_csv
 
 
 def cut_text(cut: CutEntry) -> str:
@@ -150,7 +150,7 @@ def history_csv(logbook: Logbook) -> str:
         cells = {key: value for key, value in entry.items() if key in headings} | entry.get("conditions", {})
         cells |= {verdicts[name]: word for name, word in entry.get("verdicts", {}).items()}
         cells["questions"] = " ".join(entry.get("questions", ()))
-        rows.append([cells.get(heading) for heading in headings])
+        rows.append([blank_nonfinite(cells.get(heading)) for heading in headings])
     return format_csv(rows)
 
 
@@ -195,8 +195,10 @@ def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
     entries = [{**tap, "kind": kind} for kind in ("taps", "kept", "excluded") for tap in history[kind]]
     for entry in entries:
         entry["kind"] = entry["kind"].removesuffix("s")
-    for event in history["events"]:
-        entries.append({**event, "kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]})
+    entries += [
+        {**event, "kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]}
+        for event in history["events"]
+    ]
     for cut in history["cuts"]:
         shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
         kind = "excluded" if cut["excluded"] else "cut"

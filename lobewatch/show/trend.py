@@ -17,7 +17,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
 from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import format_csv, new_table
+from lobewatch.show.terminal.output import blank_nonfinite, format_csv, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
@@ -56,8 +56,8 @@ def trend_csv(series: SeriesStatus) -> str:
     rows: list[list[Any]] = [["time", "percent", "error_percent", "temperature_c", "taps", "score"]]
     if series.trend is not None:
         for point, score in zip(series.trend.points, series.trend.detection.scores.tolist(), strict=True):
-            numbers = (point.percent, point.error, point.temperature)
-            rows.append([point.time.isoformat(), *numbers, len(point.taps), score])
+            numbers = (point.percent, point.error, point.temperature, len(point.taps), score)
+            rows.append([point.time.isoformat(), *map(blank_nonfinite, numbers)])
     return format_csv(rows)
 
 

@@ -74,8 +74,8 @@ def upsert_table(tables: Iterable[TapTable], address: str) -> ExportOutcome:
     """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
     Rows that no longer count stay and are marked. Each transaction reads its machines while no other export writes.
-    With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and where the
-    server fails; rows written before that stay.
+    With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and where
+    the server fails; rows written before that stay.
     """
     place, remaining = server_name(address), iter(tables)
     total = _ExportCounts(0, 0, 0)

@@ -15,6 +15,7 @@ from markupsafe import Markup, escape
 
 from acquisition import DataError, atomic_write
 from acquisition.errors import PERMISSION_ERRNOS
+from lobewatch.show.terminal.option_names import with_option_names
 
 UPLOT_NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
 """First line of the plot script, instead of its own, which has an address: a page contains none."""
@@ -24,7 +25,9 @@ def render_page(template: str, **content: Any) -> str:
     """Return the HTML of a template in this folder; it gets styles, scripts and plots."""
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
-    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, finalize=_name_options
+    )
     environment.filters |= {
         "in_css": _escape_css,
         "named": _label_svg,
@@ -33,6 +36,11 @@ def render_page(template: str, **content: Any) -> str:
         "unbroken": _join_units,
     }
     return environment.get_template(template).render(_static_files() | content)
+
+
+def _name_options(value: object) -> object:
+    """Name options in what an expression of a template shows, except in finished HTML."""
+    return with_option_names(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def script_sources() -> str:

@@ -17,6 +17,7 @@ from lobewatch.measurement.estimate import Estimate
 from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.trend_figures import TrendCurve
+from lobewatch.show.terminal.option_names import with_option_names
 
 MAX_RESPONSE_LINES = 1500
 """Largest number of lines of a response or a diagram."""
@@ -84,9 +85,9 @@ def _day_text(time: datetime) -> str:
 
 
 def _json_value(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    return float(f"{value:.5g}") if math.isfinite(value) else None
+    if isinstance(value, float):
+        return float(f"{value:.5g}") if math.isfinite(value) else None
+    return with_option_names(value) if isinstance(value, str) else value
 
 
 class Paragraph(NamedTuple):

@@ -177,11 +177,16 @@ def format_csv(lines: Iterable[Sequence[Any]]) -> str:
 
 
 def format_csv_cell(value: Any) -> str:
-    """Return one cell, empty for None and NaN; an apostrophe keeps a text that would be a formula a text."""
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return ""
-    text = f"'{value}" if isinstance(value, str) and FORMULA_START.match(value) else str(value)
+    """Return one cell, empty for None; an apostrophe keeps a text that would be a formula a text."""
+    text = "" if value is None else with_option_names(str(value))
+    if isinstance(value, str) and FORMULA_START.match(text):
+        text = f"'{text}"
     return '"{}"'.format(text.replace('"', '""')) if re.search('[",\r\n]', text) else text
+
+
+def blank_nonfinite(value: Any) -> Any:
+    """Return an empty text for NaN and infinity, other values as they are."""
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
 Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]

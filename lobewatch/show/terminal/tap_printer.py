@@ -8,6 +8,7 @@ from typing import Protocol, Self
 from rich.console import Console
 from rich.markup import escape
 
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.state import ListedHit, TapState, TapStep
 
 PRINT_INTERVAL = 0.05
@@ -93,4 +94,4 @@ def hit_markup(hit: ListedHit) -> str:
         return "[bold]↶ UNDONE[/]"
     if not hit.flags:
         return "[bold green]✓ GOOD[/]"
-    return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(hit.reason)}"
+    return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(with_option_names(hit.reason))}"

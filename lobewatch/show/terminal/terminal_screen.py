@@ -18,6 +18,7 @@ from rich.panel import Panel
 from rich.text import Text
 
 from dsm import format_rounded
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import SafeConsole
 from lobewatch.show.terminal.tap_printer import RunningTest, hit_markup
 from lobewatch.tap.state import Outcome, TapState, TapStep
@@ -205,27 +206,28 @@ def render_state(state: TapState, muted: bool) -> RenderableType:
 def _state_lines(state: TapState) -> Iterator[RenderableType]:
     yield Text(" - ".join(filter(None, (state.title, state.device))), "bold")
     if state.resumed:
-        yield Text(state.resumed)
+        yield Text(with_option_names(state.resumed))
     yield _banner(state)
-    yield Text(state.reason or " ", "bold")
+    yield Text(with_option_names(state.reason) or " ", "bold")
     if state.outcome is not None:
         yield from _outcome_lines(state.outcome)
         return
     yield Text(_level_line(state))
     for check in (check for check in state.checks if not (state.hits and check.passed)):
-        yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
+        yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {with_option_names(check.text)}")
     for hit in state.hits[-MAX_SHOWN_HITS:]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak:>8}  {hit_markup(hit)}")
 
 
 def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
     """Return what was measured, the programs, and the status with the next step."""
-    yield Text(" ".join(outcome.texts))
+    yield Text(with_option_names(" ".join(outcome.texts)))
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
     symbol, style = STATUS_STYLES[outcome.status]
     early = "EARLY " if outcome.is_early else ""
-    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), f"  next: {outcome.next_step}")
+    next_step = f"  next: {with_option_names(outcome.next_step)}"
+    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), next_step)
 
 
 def _banner(state: TapState) -> RenderableType:

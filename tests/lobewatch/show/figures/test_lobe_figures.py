@@ -1,4 +1,4 @@
-"""Bands, boxes, marks and words in the pictures of lobes."""
+"""Test bands, boxes, marks and labels of lobe figures."""
 
 from __future__ import annotations
 

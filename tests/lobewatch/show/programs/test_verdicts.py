@@ -1,4 +1,4 @@
-"""Tables of verdicts: the four words, and no number that is cut, however narrow the terminal."""
+"""Test tables of verdicts: the four words, and no number cut off in a narrow terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report: its first screen, the numbers that go with it, the page of all machines, one light everywhere."""
+"""Test the report: its summary, its numbers, the page of a fleet, and one status everywhere."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(*arguments: object) -> Result:
 
 
 def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
-    """Of the figure with this button."""
+    """Return the numbers of the figure with this button."""
     button = re.search(rf'data-numbers="([^"]+)" data-name="{name}"', html)
     assert button is not None, name
     block = re.search(rf'id="{button[1]}">(.*?)</script>', html, re.DOTALL)
@@ -42,7 +42,7 @@ def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
 
 @pytest.fixture
 def worn(shop: Shop) -> Shop:
-    """One program, two directions that fall by 0.3 % every 15 days, ten times, and stand at -3.0 %."""
+    """Return a machine whose frequency drops in both directions by 0.3 % every 15 days, ten times."""
     shop.run(("A <1>", 12900, 1.5))
     for i in range(11):
         shop.tap_both(15 * i, 1 - 0.003 * i + 0.0003 * (-1) ** i)
@@ -54,8 +54,8 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     now = logbook.history.rows[-1].time + timedelta(days=1)
     html = render_report(logbook, "reference", "x", now)
     first = first_screen(html)
-    standing = logbook.standing(now)
-    light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.light]
+    standing = logbook.status(now)
+    light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.status]
     for words in (
         light,
         "falling since 2026-01-",
@@ -86,12 +86,12 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
 
 
 def first_screen(html: str) -> str:
-    """What stands above the first heading of a section; any space is a plain one."""
+    """Return the part above the first section, with plain spaces."""
     return html[html.index('<div class="first">') : html.index("<h2")].replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
-    """Of x and y, alike in all: one reason, a line each with its change; what is in the tables is no reason again."""
+    """Test that x and y share one reason, and that reasons do not repeat the tables."""
     shop.run(("A", 12900, 1.5), ("B", 8700, 0.4))
     for i in range(12):
         shop.tap_both(15 * i, math.exp(-0.01 * i + 0.0003 * (-1) ** i))
@@ -99,7 +99,7 @@ def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
     now = shop.logbook.history.rows[-1].time + timedelta(days=40)
     html = render_report(shop.logbook, "reference", "x", now)
     words = unescape(re.sub(r"<svg.*?</svg>|<[^>]+>", " ", first_screen(html), flags=re.DOTALL))
-    reasons = [remark.finding for remark in shop.logbook.standing(now).remarks]
+    reasons = [remark.finding for remark in shop.logbook.status(now).remarks]
     assert sum("falling since" in reason or "fallen by" in reason for reason in reasons) == 4
     assert sum(reason in words for reason in reasons) == 1
     assert words.count("falling since") == 2  # the courses of x and y
@@ -125,7 +125,7 @@ def test_a_gauge_tells_a_small_fall_from_a_large_one() -> None:
 
 
 def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
-    """No picture without a line in it, no change from nothing, no date that nobody can tell."""
+    """Test that a single test has no trend, no change and no date."""
     shop.tap(0, 1713.0)
     html = render_report(shop.logbook, "reference", "x")
     for words in ("history too short", "Until when", "-0 %", "0.00 %", "until when", "<h2>Natural frequency", "gauge("):
@@ -140,10 +140,10 @@ def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
 
 
 def test_a_response_is_shown_from_below_its_lowest_mode_on(shop: Shop) -> None:
-    """Lower down what an accelerometer says is divided by next to nothing, and a picture of it has no modes."""
+    """Test the lower end: below it, division by omega^2 hides the modes."""
     shop.edit("band_hz = [1200, 2200]", "")
     shop.tap(0, 1713.0)
-    material = shop.logbook.ask(collect_report_data, "reference", "x", None)
+    material = shop.logbook.query(collect_report_data, "reference", "x", None)
     low, high = material.response_band(Frf(np.arange(1.0, 6001.0), np.zeros(6000, complex)))
     lowest = min(frequency for frequency, *_ in material.last.modes)
     assert (low, high) == (pytest.approx(0.3 * lowest), 6000.0)
@@ -185,7 +185,7 @@ def test_a_name_cannot_end_the_style_sheet() -> None:
 
 
 def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
-    """Of dashboard, report and page of all machines, for a machine tapped at random."""
+    """Return the status in dashboard, report and fleet report for a machine tapped at random."""
     random = np.random.default_rng(seed)
     machine = type(shop)(path / "m")
     machine.put("")
@@ -195,7 +195,7 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
         frequency *= 1 - float(random.choice([0.0, 0.002, 0.06]) * random.random())
         machine.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
     plant = Fleet({"m": machine.path}).assess_machines()
-    newest = machine.logbook.newest()
+    newest = machine.logbook.newest_tap()
     html = render_report(machine.logbook, newest.tool, newest.direction)
     assert run("report", path).exit_code == 0
     fleet = (path / "report.html").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""Test cuts in the diagram of a cut: which belong there, where they stand, and that the report has them."""
+"""Test which test cuts a lobe diagram shows, where, and that the report lists them."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     assert learnt is not None
     assert learnt.n_cuts == 3
     assert taught.assembly is not None
-    softer = float(np.min(compute_lobes(taught.at_speed.moved(taught.assembly), logbook.machine)["A"].depth))
+    softer = float(np.min(compute_lobes(taught.at_speed.scale_modes(taught.assembly), logbook.machine)["A"].depth))
     push = (taught.program.tangential_n_per_mm2 or 0) / (at_rest.program.tangential_n_per_mm2 or 1)
     assert float(np.min(learnt.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
     assert np.all(learnt.band.low <= learnt.lobes.depth)

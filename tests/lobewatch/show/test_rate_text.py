@@ -1,4 +1,4 @@
-"""The rate as people read it: within its interval, and no zero with a sign of a fall."""
+"""Test the rate in words: within its interval, and no negative zero."""
 
 from __future__ import annotations
 

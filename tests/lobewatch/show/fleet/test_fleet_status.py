@@ -1,4 +1,4 @@
-"""All machines as text: when each is due, and how far it has fallen."""
+"""Test the fleet as text: due dates and frequency drops."""
 
 from __future__ import annotations
 

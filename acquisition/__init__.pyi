@@ -19,21 +19,15 @@ from .devices import (
 )
 from .emulation import EmulationSetup, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
 from .errors import DataError, DeviceError, Remark, check_name, merge_remarks
-from .estimation import (
-    RunningMean,
+from .estimation.estimate_frf import RunningMean, compute_cross_spectra, estimate_frf, propagate_force_noise
+from .estimation.frf_corrections import (
     apply_exponential_window,
-    compute_cross_spectra,
     correct_windowed_receptance,
-    estimate_frf,
     find_hit_time,
-    infer_averages,
-    infer_recorded_share,
-    infer_window,
-    is_smoothed,
     measure_time_after_hit,
-    propagate_force_noise,
     remove_sensor_mass,
 )
+from .estimation.infer_processing import infer_averages, infer_recorded_share, infer_window, is_smoothed
 from .file_io import atomic_write
 from .files.contents.contents import Contents, Format, Signal
 from .files.contents.description import Description, Fact
@@ -44,9 +38,11 @@ from .files.file_source import FileSource
 from .files.read_recording import inspect_file, list_formats, read_frf, read_hits, read_recording
 from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
-from .hit import Hit, HitFlags
-from .hit_quality import HitVerdict, average_good_hits, check_hit, evaluate_hit
-from .hits import HitSearch, Trigger, capture_hits, estimate_decay_time, extract_free_decay
+from .hit import Hit
+from .hit_fault import HitFlags
+from .hit_quality.evaluate_hit import HitVerdict, average_good_hits, check_hit, evaluate_hit
+from .hits.capture_hits import HitSearch, Trigger, capture_hits
+from .hits.free_decay import estimate_decay_time, extract_free_decay
 from .ports import PortInfo, explain_no_ports, find_usb_identity, find_usb_port, list_serial_ports
 from .sensors import (
     MassCalibration,

@@ -1,4 +1,4 @@
-"""What is known of one input of the data acquisition device (DAQ), and a run of its samples."""
+"""One input of the data acquisition device (DAQ), and a block of its samples."""
 
 from __future__ import annotations
 
@@ -8,18 +8,37 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
+
 ChannelQuantity = Literal["force", "acceleration"]
 MIN_ADC_BITS = 8
-"""No converter for sensors has fewer."""
+"""Smallest resolution of a converter for sensors (bits)."""
 TapDirection = Literal["x", "y", "xy"]
-"""Direction at the tool tip in which is tapped: "xy" hits in x with the sensor in y."""
+"""Direction of a tap test at the tool tip: "xy" hits in x with the sensor in y."""
 CROSS_TAP: TapDirection = "xy"
-"""Direction of a cross tap: no driving point."""
+"""Direction of a cross tap, which has no driving point."""
 
 
 def parse_direction(text: str) -> TapDirection:
-    """A direction from its text; ValueError for what is none.
+    """Return the direction that a text names.
 
+    Parameters
+    ----------
+    text
+        Name of the direction.
+
+    Returns
+    -------
+    TapDirection
+        The same text, typed.
+
+    Raises
+    ------
+    ValueError
+        Where the text names no direction.
+
+    Examples
+    --------
     >>> parse_direction("x"), parse_direction("xy") == CROSS_TAP
     ('x', True)
     """
@@ -32,8 +51,10 @@ def parse_direction(text: str) -> TapDirection:
 
 @dataclass(frozen=True)
 class Channel:
-    """One sensor on one input: all that turns a voltage into a force or an acceleration.
+    """One sensor on one input, with all that turns a voltage into a force or an acceleration.
 
+    Examples
+    --------
     >>> hammer = Channel("force", sensitivity=2.25e-3, full_scale=5.0)
     >>> round(hammer.scale, 4)  # N a code: 5 V / 2^15 / 2.25 mV/N
     0.0678
@@ -44,22 +65,21 @@ class Channel:
     quantity: ChannelQuantity
     """Quantity that the sensor measures."""
     sensitivity: float
-    """V per N (force) or V per m/s^2 (acceleration); signed."""
+    """Sensitivity (V per N or V per m/s^2), signed."""
     full_scale: float
     """Voltage of the positive rail (V)."""
     adc_bits: int = 16
-    """Resolution; codes run from -2^(bits-1) to 2^(bits-1) - 1."""
+    """Resolution (bits); codes run from -2^(bits-1) to 2^(bits-1) - 1."""
     direction: TapDirection | Literal[""] = ""
     """Direction at the tool tip; empty where it is not fixed."""
     serial_number: str = ""
     """Serial number of the sensor."""
     calibration_date: str = ""
-    """ISO date of the sensor's calibration; empty where not known."""
+    """Calibration date of the sensor (ISO); empty where unknown."""
     skew: float = 0.0
     """Delay of sampling against channel 0 (s): value k of this channel is taken at t_k + skew."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a channel."""
         if self.quantity not in get_args(ChannelQuantity):
             raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
         if self.direction and parse_direction(self.direction) == CROSS_TAP:
@@ -87,44 +107,61 @@ class Channel:
         return -(2 ** (self.adc_bits - 1)), 2 ** (self.adc_bits - 1) - 1
 
     def effective_code_step(self, codes: NDArray[np.integer[Any]]) -> int:
-        """Smallest step between codes: a power of 2 above 1 where a converter of fewer bits fills the upper ones only.
+        """Return the smallest step between codes: a power of 2 above 1 where the converter fills only the upper bits.
 
-        Some devices have fewer bits at higher rates; their highest code is then a step below 2^(bits-1).
+        Some devices have fewer bits at higher rates. Their highest code is then a step below 2^(bits-1).
+
+        Parameters
+        ----------
+        codes
+            ADC codes of this channel, of any shape.
         """
         used = int(np.bitwise_or.reduce(codes, axis=None))
         return min(used & -used, 2 ** max(self.adc_bits - MIN_ADC_BITS, 0)) or 1
 
     def effective_rails(self, codes: NDArray[np.integer[Any]]) -> tuple[int, int]:
-        """Lowest and highest code that a converter can give whose codes are these."""
+        """Return the lowest and the highest code that the converter of these codes can give.
+
+        Parameters
+        ----------
+        codes
+            ADC codes of this channel, of any shape.
+        """
         low, high = self.rails
         return low, high + 1 - self.effective_code_step(codes)
 
-    def encode(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
-        """ADC codes of values (N or m/s^2), rounded and clipped at the rails as the converter does."""
+    def encode(self, values: Floats) -> Codes:
+        """Return the ADC codes of values, rounded and clipped at the rails as the converter does.
+
+        Parameters
+        ----------
+        values
+            Values (N or m/s^2), of any shape.
+        """
         return np.clip(np.rint(values / self.scale), *self.rails).astype(np.int32)
 
 
 @dataclass(frozen=True)
 class SensorInput:
-    """A sensor on a numbered input of a device that does not know what is plugged in there."""
+    """Sensor on a numbered input of a device that does not know its sensors."""
 
     number: int
-    """Number of the input, as printed beside the terminals."""
+    """Number of the input, as printed next to the terminals."""
     channel: Channel
-    """The sensor; its full scale is the range to set."""
+    """Sensor; its full scale is the range to set."""
     iepe: bool = True
     """Whether the device feeds the sensor (IEPE, ICP), where it can."""
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Consecutive scans as they came from a source."""
+    """Consecutive scans of a source."""
 
     first_scan: int
     """Index of the first scan since the start of the stream."""
-    codes: NDArray[np.int32]
+    codes: Codes
     """ADC codes, shape (n_channels, n_scans)."""
     overload: int = 0
-    """Bit i set: the device reports channel i overloaded."""
+    """Bit i is set where the device reports channel i as overloaded."""
     lost_before: int = 0
-    """Scans lost between the block before and this one."""
+    """Number of scans lost between the previous block and this one."""

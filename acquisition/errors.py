@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
-"""Errors of a place that can only be read, or not even that."""
+"""Error numbers of a place without write permission or without any."""
 DISK_FULL_REMEDY = "make room on that disk"
 TOO_MANY_FILES_REMEDY = "close other programs, too many files are open"
 REMEDY_BY_ERRNO = {
@@ -25,14 +25,22 @@ REMEDY_BY_ERRNO = {
     errno.ESTALE: "the network drive has lost it: mount it anew, then give the same command again",
     errno.EIO: "the disk fails: copy the folder to another one",
 }
-"""What to do where the system cannot do what it is asked for, by error number."""
+"""Remedy for errors of the operating system, by error number."""
 
 
 class DeviceError(OSError):
-    """The DAQ cannot be reached or has stopped."""
+    """Raised where the DAQ cannot be reached or has stopped."""
 
     def __init__(self, text: str, cure: str = "") -> None:
-        """What is wrong, and what to do about it; str() is both."""
+        """Make an error of a device; str() gives text and cure.
+
+        Parameters
+        ----------
+        text
+            Finding without a full stop.
+        cure
+            Remedy; empty where unknown.
+        """
         super().__init__(f"{text}; {cure}" if cure else text)
         self.text = text
         """What is wrong, without a full stop."""
@@ -41,11 +49,11 @@ class DeviceError(OSError):
 
 
 class DataError(ValueError):
-    """A file cannot be used for a tap test."""
+    """Raised where a file cannot be used for a tap test."""
 
 
 def format_error(error: Exception) -> str:
-    """Any error in a sentence; the kind of one that nobody has foreseen, too."""
+    """Return any error as a sentence, with its type where it is an unforeseen one."""
     if isinstance(error, OSError) and error.filename and error.strerror:
         return format_os_error(error)
     if isinstance(error, (ValueError, OSError, ArithmeticError)):
@@ -54,7 +62,7 @@ def format_error(error: Exception) -> str:
 
 
 def format_os_error(error: OSError) -> str:
-    """An error of the operating system in a sentence: where, what, and what to do where that is known."""
+    """Return an error of the operating system as a sentence: place, reason and remedy."""
     failure = f"{error.filename or 'the disk'}: {error.strerror or error}"
     cure = REMEDY_BY_ERRNO.get(error.errno or 0, "")
     return f"{failure}; {cure}" if cure else failure
@@ -65,7 +73,20 @@ CONTROL_CHARACTERS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 def check_name(name: str, what: str) -> None:
-    """ValueError for a name with a control character in it; `what` says in the message what is called so."""
+    """Check a name that a user gives: control characters steer a terminal or end a line.
+
+    Parameters
+    ----------
+    name
+        Name to check.
+    what
+        Kind of the name, for the message.
+
+    Raises
+    ------
+    ValueError
+        Where the name holds a control character.
+    """
     found = CONTROL_CHARACTERS.search(name)
     if found is not None:
         raise ValueError(
@@ -76,8 +97,10 @@ def check_name(name: str, what: str) -> None:
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded.
+    """One thing to know about a result. Programs read `code` and `about`; `text` and `cure` are for people.
 
+    Examples
+    --------
     >>> remark = Remark("swept", "A", "the spindle sweeps 40 Hz", "tap it warm")
     >>> remark.finding, remark.code
     ('A: the spindle sweeps 40 Hz', 'swept')
@@ -86,25 +109,36 @@ class Remark:
     code: str
     """Kind of remark: words in lower case joined by hyphens, listed in docs/remarks.md, never changed."""
     about: str
-    """Thing it concerns: a program, a tap test, a mode ("1713 Hz"), a channel, a file; empty for the whole."""
+    """Subject of the remark: a program, a tap test, a mode ("1713 Hz"), a channel, a file; empty for the whole."""
     text: str
     """Finding, with figures and units, without a full stop."""
     cure: str = ""
-    """Advice what to do about it; empty where nothing can be done or need be."""
+    """Remedy; empty where none is needed or possible."""
 
     def __str__(self) -> str:
-        """One sentence."""
         return self.finding + (f"; {self.cure}" if self.cure else "")
 
     @property
     def finding(self) -> str:
-        """The same without the cure."""
+        """Subject and text without the cure."""
         return ": ".join(filter(None, (self.about, self.text)))
 
 
 def merge_remarks(remarks: Iterable[Remark]) -> list[Remark]:
-    """Remarks that differ in nothing but what they are about as one, in the order of the first of each.
+    """Merge remarks that differ only in their subject.
 
+    Parameters
+    ----------
+    remarks
+        Remarks to merge.
+
+    Returns
+    -------
+    list of Remark
+        Merged remarks, in the order of the first of each.
+
+    Examples
+    --------
     >>> remarks = [Remark("small", program, "it is small") for program in ("A", "B")]
     >>> [(remark.code, remark.about) for remark in joined(remarks)]
     [('small', 'A, B')]

@@ -10,15 +10,31 @@ from io import FileIO
 from pathlib import Path
 
 SYNC_UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
-"""Errors of file systems, network drives mostly, that have nothing to sync in a folder."""
+"""Error numbers of file systems, mostly network drives, that cannot sync a folder."""
 
 
 def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
-    """Write by temporary name, fsync, rename and fsync of the folder; on failure the old file stays as it was.
+    """Write a file completely or not at all: temporary name, fsync, rename, and fsync of the folder.
 
-    lasting: False where it may be torn or gone after a power cut, for its reader tells that and can make it anew;
-    nothing is waited for then. Raises OSError with the name of the file to be.
+    On failure an old file stays as it was.
 
+    Parameters
+    ----------
+    path
+        File to write.
+    content
+        Bytes of the file.
+    lasting
+        False where the file may be torn or gone after a power cut because its reader notices that. Nothing is synced
+        then.
+
+    Raises
+    ------
+    OSError
+        With the name of the file.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -43,7 +59,7 @@ def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it that are missing; they outlast a power cut when this returns."""
+    """Make a folder and its missing parents so that they outlast a power cut."""
     missing = [parent for parent in (folder, *folder.parents) if not parent.is_dir()]
     for parent in reversed(missing):
         parent.mkdir(exist_ok=True)
@@ -51,7 +67,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder outlast a power cut (a no-op where folders cannot be opened or synced).
+    """Sync a folder so that a rename in it outlasts a power cut; do nothing where folders cannot be synced.
 
     Raises OSError with the name of the folder.
     """
@@ -68,21 +84,20 @@ def sync_folder(folder: Path) -> None:
 
 
 MAX_FILE_SIZE = 1_000_000_000
-"""Bytes of a file that is read as a whole; chosen, some hundred times a tap test."""
+"""Largest file that is read as a whole (bytes), some hundred times a tap test."""
 MAX_SETTINGS_FILE_SIZE = 10_000_000
-"""Bytes of a file that holds settings or a summary; chosen, some hundred times one of a busy machine."""
+"""Largest file of settings or of a summary (bytes), some hundred times one of a busy machine."""
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 class IrregularFileError(OSError):
-    """What lies there is no file, or none that anything here has written."""
+    """Raised where a path is not a regular file or is too large."""
 
 
 def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileIO:
-    """A file opened for reading, at its start.
+    """Open a regular file for reading without waiting, with at most `largest` bytes.
 
-    largest: bytes that it may have. IrregularFileError with the name of the file where it is a pipe, a device or a
-    folder, or larger; OSError where it cannot be opened.
+    Raises IrregularFileError with the name of the file for a pipe, a device, a folder or a larger file.
     """
     handle = os.open(path, _OPEN_FLAGS)
     try:
@@ -100,6 +115,6 @@ def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileI
 
 
 def read_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> bytes:
-    """The bytes of a file; what `open_regular_file` raises."""
+    """Read a regular file of at most `largest` bytes; see `open_regular_file` for errors."""
     with open_regular_file(path, largest) as file:
         return file.read()

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 
 FrfQuantity = Literal["receptance", "mobility", "accelerance"]
@@ -17,9 +18,14 @@ FrfQuantity = Literal["receptance", "mobility", "accelerance"]
 class Frf:
     """One averaged frequency response function, displacement over force.
 
-    Raises ValueError where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
+    Raises
+    ------
+    ValueError
+        Where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
 
-    Of a rigid mass of 2 kg, 1 / (m w^2) with the opposite sign:
+    Examples
+    --------
+    FRF of a rigid mass of 2 kg, 1 / (m w^2) with the opposite sign:
 
     >>> line = np.array([100.0, 200.0])  # Hz
     >>> frf = Frf(line, -1 / (2.0 * (2 * np.pi * line) ** 2) + 0j, coherence=np.array([0.9, 0.99]), n_averages=10)
@@ -29,23 +35,22 @@ class Frf:
     [0.0745, 0.0225]
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Frequency lines, rising, >= 0 (Hz), shape (n,)."""
-    receptance: NDArray[np.complex128]
+    receptance: Complexes
     """Displacement over force (m/N), shape (n,)."""
-    coherence: NDArray[np.float64] | None = None
-    """Ordinary coherence, 0 to 1, shape (n,); None where it is not known."""
+    coherence: Floats | None = None
+    """Ordinary coherence, 0 to 1, shape (n,); None where unknown."""
     n_averages: int = 1
     """Number of hits averaged."""
     measured_as: FrfQuantity = "receptance"
-    """The quantity that the sensors gave: it says in which form the noise is flat."""
+    """Quantity that the sensors measured, in which the noise is flat."""
     usable_band: tuple[float, float] | None = None
     """Contiguous band where the force spectrum is within 20 dB of its largest value (Hz)."""
     mass_removed: float = 0.0
-    """Mass of the sensor that was taken off its values (kg)."""
+    """Mass of the sensor that was removed from the FRF (kg)."""
 
     def __post_init__(self) -> None:
-        """Convert to arrays and check shapes and values."""
         object.__setattr__(self, "frequency", np.asarray(self.frequency, dtype=np.float64))
         object.__setattr__(self, "receptance", np.asarray(self.receptance, dtype=np.complex128))
         if self.coherence is not None:
@@ -81,25 +86,25 @@ class Frf:
             raise ValueError("coherence must lie between 0 and 1")
 
     @property
-    def mobility(self) -> NDArray[np.complex128]:
+    def mobility(self) -> Complexes:
         """Velocity over force (m/s/N), shape (n,)."""
         return 2j * np.pi * self.frequency * self.receptance
 
     @property
-    def accelerance(self) -> NDArray[np.complex128]:
+    def accelerance(self) -> Complexes:
         """Acceleration over force (m/s^2/N), shape (n,)."""
         return -((2 * np.pi * self.frequency) ** 2) * self.receptance
 
     @property
     def has_random_error(self) -> bool:
-        """Whether its coherence tells it: of three averages or more."""
+        """Whether there are a coherence and at least three averages."""
         return self.coherence is not None and self.n_averages >= 3
 
     @property
-    def random_error(self) -> NDArray[np.float64] | None:
+    def random_error(self) -> Floats | None:
         """Normalised random error of |H|, sqrt((1 - g2)/(2 n g2)), shape (n,); None below three averages.
 
-        Source: Bendat & Piersol, Random Data, H1 estimate. One or two hits give a coherence of no meaning.
+        Source: Bendat & Piersol, Random Data, H1 estimate. The coherence of one or two hits has no meaning.
         """
         if self.coherence is None or not self.has_random_error:
             return None
@@ -107,7 +112,18 @@ class Frf:
         return np.sqrt((1 - g2) / (2 * self.n_averages * g2))
 
     def in_band(self, band: tuple[float, float] | None) -> Frf:
-        """The lines between band[0] and band[1] (Hz), ends included; all of it for None."""
+        """Return the lines inside a band.
+
+        Parameters
+        ----------
+        band
+            Lowest and highest frequency (Hz), included; None for all lines.
+
+        Raises
+        ------
+        ValueError
+            Where the band holds fewer than 2 lines.
+        """
         if band is None:
             return self
         low, high = band
@@ -136,10 +152,33 @@ def from_accelerance(
     n_averages: int = 1,
     usable_band: tuple[float, float] | None = None,
 ) -> Frf:
-    """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out.
+    """Return the FRF of an acceleration over force, divided by -(2 pi f)^2; a line at 0 Hz is left out.
 
-    frequency (Hz), accelerance and coherence have shape (n,). Raises ValueError as `Frf`.
+    Parameters
+    ----------
+    frequency : array_like, shape (n,)
+        Frequency lines (Hz).
+    accelerance : array_like, shape (n,)
+        Acceleration over force (m/s^2/N).
+    coherence : array_like, shape (n,)
+        Ordinary coherence; None where unknown.
+    n_averages
+        Number of averaged hits.
+    usable_band
+        Band with enough force (Hz).
 
+    Returns
+    -------
+    Frf
+        Receptance, with `measured_as` "accelerance".
+
+    Raises
+    ------
+    ValueError
+        As for `Frf`.
+
+    Examples
+    --------
     >>> frf = from_accelerance([0.0, 100.0, 200.0], [0.5, 0.5, 0.5])  # 1/kg: a mass of 2 kg
     >>> frf.frequency.tolist(), round(float(frf.receptance[0].real) * 1e6, 3)  # Hz, um/N
     ([100.0, 200.0], -1.267)

@@ -1,121 +1,36 @@
-"""One hammer hit, its faults, and the input channels it is recorded with."""
+"""One hammer hit and the input channels that it is recorded with."""
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Channel, ChannelQuantity
 from acquisition.errors import DataError
 
 MAX_SI_VALUE = 1e50
-"""Largest size of a value in SI units: no measurement is larger, and powers of larger ones may be infinite."""
-
-
-class HitFlags(enum.Flag):
-    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure.
-
-    >>> flags = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
-    >>> flags.words
-    'double hit, overload (force)'
-    >>> HitFlags.from_words("double hit") in flags, bool(HitFlags.OK)
-    (True, False)
-    """
-
-    OK = 0
-    """Nothing is wrong."""
-    DOUBLE_HIT = enum.auto()
-    """The hammer has touched twice."""
-    OVERLOAD_FORCE = enum.auto()
-    """The force stands at a rail of its converter."""
-    OVERLOAD_RESPONSE = enum.auto()
-    """The response stands at a rail of its converter."""
-    TOO_SOFT = enum.auto()
-    """The peak of the force is near the noise, or below 2 % of its range."""
-    NOT_DECAYED = enum.auto()
-    """The response still rings when the record ends."""
-    LOST_SCANS = enum.auto()
-    """Scans are missing inside the record."""
-    NO_HIT = enum.auto()
-    """No pulse stands out of the noise."""
-    SWAPPED_CHANNELS = enum.auto()
-    """The pulse is on the channel of the response."""
-    TOO_HARD = enum.auto()
-    """The peak of the force is above 90 % of its range, not clipped."""
-    NARROW_BAND = enum.auto()
-    """The force does not reach to the end of the band that is followed."""
-    INCONSISTENT = enum.auto()
-    """The FRF of this hit is not that of the good ones."""
-    UNDONE = enum.auto()
-    """The operator has taken it back."""
-    NOT_EVALUATED = enum.auto()
-    """It could not be judged."""
-
-    @property
-    def words(self) -> str:
-        """The verdict alone, e.g. "double hit, overload (force)"."""
-        return ", ".join(_FLAG_TEXTS[flag][0] for flag in self) or "good"
-
-    @property
-    def cure(self) -> str:
-        """What to do about it, a sentence a fault; empty when all is well."""
-        return " ".join(_FLAG_TEXTS[flag][1] for flag in self)
-
-    @classmethod
-    def from_words(cls, words: str) -> HitFlags:
-        """The flags whose `words` these are; ValueError for unknown ones."""
-        by_words = {verdict: flag for flag, (verdict, _) in _FLAG_TEXTS.items()}
-        flags = cls.OK
-        for word in filter(None, words.removeprefix("good").split(", ")):
-            if word not in by_words:
-                raise ValueError(f"{word!r} is no hit verdict; known are {', '.join(by_words)}")
-            flags |= by_words[word]
-        return flags
-
-    def __str__(self) -> str:
-        """Verdict and cure in words."""
-        return " ".join(f"{word}: {cure}" for word, cure in (_FLAG_TEXTS[flag] for flag in self)) or "good"
-
-
-_FLAG_TEXTS: Mapping[HitFlags, tuple[str, str]] = {
-    HitFlags.DOUBLE_HIT: ("double hit", "Let the hammer bounce back after the first touch."),
-    HitFlags.OVERLOAD_FORCE: ("overload (force)", "Hit softer or choose a larger force range."),
-    HitFlags.OVERLOAD_RESPONSE: ("overload (response)", "Hit softer or choose a larger acceleration range."),
-    HitFlags.TOO_SOFT: ("too soft", "Hit harder."),
-    HitFlags.NOT_DECAYED: (
-        "not decayed",
-        "Use a longer record; wait until the tool is still before the next hit.",
-    ),
-    HitFlags.LOST_SCANS: (
-        "lost scans",
-        "Hit again; if it stays, lower the sample rate or use another cable.",
-    ),
-    HitFlags.NO_HIT: ("no hit", "Check the hammer cable and the trigger level."),
-    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "Swap the two cables."),
-    HitFlags.TOO_HARD: ("too hard", "Hit softer or choose a larger force range."),
-    HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
-    HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
-    HitFlags.UNDONE: ("undone", "Taken back by the operator."),
-    HitFlags.NOT_EVALUATED: ("not judged", "Hit again; if it stays, check both sensors and their cables."),
-}
+"""Largest absolute value in SI units. No measurement is larger, and powers of larger values may be infinite."""
 
 
 def describe_invalid_value(value: complex) -> str:
-    """What is wrong with a value that is not within LARGEST."""
     return f"larger than {MAX_SI_VALUE:g}" if np.isfinite(value) else "not finite"
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """Force and response of one hammer hit on one time axis; the response alone where no force was measured.
+    """Force and response of one hammer hit on one time axis; only the response where no force was measured.
 
-    Raises ValueError where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
+    Raises
+    ------
+    ValueError
+        Where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
 
+    Examples
+    --------
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
@@ -124,24 +39,24 @@ class Hit:
     (0.0, True)
     """
 
-    force: NDArray[np.float64]
+    force: Floats
     """Hammer force (N), shape (n,); empty where no sensor measured it."""
-    acceleration: NDArray[np.float64]
+    acceleration: Floats
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
-    """Samples a second (Hz)."""
+    """Sample rate (Hz)."""
     pre_trigger: int = 0
-    """Number of samples before the trigger."""
+    """Number of samples before the trigger; 0 where unknown."""
     lost_scans: int = 0
-    """Scans missing inside the record."""
+    """Number of scans missing inside the record."""
     channels: tuple[Channel, ...] | None = None
-    """Force and response channel, or the response channel alone, where the hit came from a DAQ."""
-    codes: NDArray[np.int32] | None = None
-    """Raw ADC codes, a row a channel, force first; None where the recording has none."""
+    """Force and response channel, or only the response channel, where the hit came from a DAQ."""
+    codes: Codes | None = None
+    """Raw ADC codes, shape (channels, n), force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
     cross_hit: Hit | None = None
-    """The same blow as a second sensor felt it, across to the first; None where there is none."""
+    """Same impact as a second sensor across to the first measured it; None without one."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""
@@ -150,9 +65,8 @@ class Hit:
             object.__setattr__(self, name, values)
             bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
             if bad.size:
-                raise ValueError(
-                    f"{name} is {describe_invalid_value(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}"
-                )
+                flaw = describe_invalid_value(values[bad[0]])
+                raise ValueError(f"{name} is {flaw} at {bad.size} samples, first at sample {bad[0]}")
         same = self.force.shape in (self.acceleration.shape, (0,))
         if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
             raise ValueError(
@@ -171,13 +85,31 @@ class Hit:
         pre_trigger: int = 0,
         lost_scans: int = 0,
         overload: int = 0,
-        beside: Hit | None = None,
+        cross_hit: Hit | None = None,
     ) -> Hit:
-        """A hit from ADC codes, a row a channel, force first, scaled by the sensitivities of its channels."""
+        """Return a hit from ADC codes, scaled by the sensitivities of its channels.
+
+        Parameters
+        ----------
+        codes : array_like, shape (channels, n)
+            ADC codes, force first.
+        channels
+            Channel of each row.
+        sample_rate
+            Sample rate (Hz).
+        pre_trigger
+            Number of samples before the trigger.
+        lost_scans
+            Number of scans missing inside the record.
+        overload
+            Overloads that the device reports, a bit per row.
+        cross_hit
+            Same impact as a second sensor measured it.
+        """
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
-        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, beside)
+        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, cross_hit)
 
     @property
     def has_force(self) -> bool:
@@ -186,40 +118,54 @@ class Hit:
 
     @property
     def sensors(self) -> tuple[Channel, ...]:
-        """Channels of all that felt the blow, that of the response last; empty where it came from no DAQ."""
+        """Channels of all sensors of the impact, the response last; empty where it came from no DAQ."""
         channels = self.channels or ()
         return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
     @property
-    def signals(self) -> NDArray[np.float64]:
-        """All that was measured, a row a channel: force (N) first, acceleration (m/s^2) last."""
+    def signals(self) -> Floats:
+        """Measured signals, shape (channels, n): force (N) first, acceleration (m/s^2) last."""
         return np.stack([self.force, self.acceleration] if self.has_force else [self.acceleration])
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Floats:
         """Time from the trigger (s), shape (n,)."""
         return (np.arange(self.acceleration.size) - self.pre_trigger) / self.sample_rate
 
 
 @dataclass(frozen=True)
 class TapInputs:
-    """Inputs of a device that a tap test reads: the force first, the response of the driving point last."""
+    """Inputs of a device that a tap test reads: force first, response of the driving point last."""
 
     rows: tuple[int, ...]
-    """Index of each among the channels of the device."""
+    """Index of each input among the channels of the device."""
     channels: tuple[Channel, ...]
-    """Sensor on each."""
+    """Sensor on each input."""
 
     @classmethod
     def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
-        """Those of a tap in a direction, as `select_input_channels` has it; DataError where they are not there.
+        """Select the inputs of a tap test in one direction.
 
-        A hammer in x is felt by a second sensor along y too, where there is one: it stands before the last.
+        A hit in x is also recorded by a second sensor along y, if there is one. It comes before the last input.
+
+        Parameters
+        ----------
+        channels
+            Channels of the device.
+        quantity
+            Quantity that triggers; "acceleration" without a force sensor.
+        direction
+            Direction of the hit at the tool tip.
+
+        Raises
+        ------
+        DataError
+            Where the needed inputs do not exist.
         """
         first, *last = select_input_channels(channels, quantity, direction)
-        along_y = (i for i, channel in enumerate(channels) if (channel.quantity, channel.direction) == _Y_RESPONSE)
-        across = [i for i in along_y if direction == "x" and last and i not in last]
-        rows = (first, *across[:1], *last)
+        kinds = [(channel.quantity, channel.direction) for channel in channels]
+        cross = [i for i, kind in enumerate(kinds) if kind == ("acceleration", "y") and i not in last]
+        rows = (first, *(cross[:1] if direction == "x" and last else ()), *last)
         return cls(rows, tuple(channels[row] for row in rows))
 
     def make_hit(
@@ -230,39 +176,51 @@ class TapInputs:
         lost_scans: int = 0,
         overload: int = 0,
     ) -> Hit:
-        """The hit that codes are, a row each; bit i of overload is that of row i."""
+        """Return the hit of some ADC codes.
 
-        def felt_by(response: int, beside: Hit | None = None) -> Hit:
+        Parameters
+        ----------
+        codes : ndarray, shape (inputs, n)
+            ADC codes.
+        sample_rate
+            Sample rate (Hz).
+        pre_trigger
+            Number of samples before the trigger.
+        lost_scans
+            Number of scans missing inside the record.
+        overload
+            Overloads that the device reports, a bit per row.
+        """
+
+        def make_of(response: int, cross_hit: Hit | None = None) -> Hit:
             rows = [0, response] if len(self.rows) > 1 else [response]
             mask = (overload >> response & 1) << 1 | (overload & 1 if len(rows) > 1 else 0)
             sensors = tuple(self.channels[row] for row in rows)
-            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, beside)
+            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, cross_hit)
 
         last = len(self.rows) - 1
-        return felt_by(last, felt_by(1) if last > 1 else None)
-
-
-_Y_RESPONSE = ("acceleration", "y")
+        return make_of(last, make_of(1) if last > 1 else None)
 
 
 def select_input_channels(
     channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
 ) -> tuple[int, ...]:
-    """Index of the force and of the acceleration channel; of the latter alone where that triggers.
+    """Return the index of the force channel and of the acceleration channel; only the latter where it triggers.
 
-    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction
-    (of a tap across, "xy", that of y). DataError unless there is one of each that is needed.
+    direction: of the hit. With several accelerations, that of this direction is used (of "xy", that of y). Raises
+    DataError
+    unless there is exactly one of each that is needed.
     """
     forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
     responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
-    several, seen = len(responses) > 1, direction[-1:] or "x"
+    several, axis = len(responses) > 1, direction[-1:] or "x"
     if several:
-        responses = [i for i in responses if direction and channels[i].direction == seen]
+        responses = [i for i in responses if direction and channels[i].direction == axis]
     if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
         return (*forces, *responses) if quantity == "force" else (*responses,)
     listed = ", ".join(channel.name for channel in channels) or "nothing"
     needed = "one force and one acceleration channel are needed"
     if quantity == "acceleration":
         needed = "one acceleration channel is needed to tap without a force sensor"
-    which = f', of several that with direction = "{seen}"' if several else ""
+    which = f', of several that with direction = "{axis}"' if several else ""
     raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")

@@ -1,4 +1,4 @@
-"""Records that other packages bring, drivers and file formats, found as entry points."""
+"""Load records of other packages (drivers, file formats) from entry points."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from acquisition.errors import Remark
 
 
 class NamedRecord(Protocol):
-    """What a package may bring."""
+    """Record that a package may provide."""
 
     @property
     def name(self) -> str:
-        """That of its entry point."""
+        """Name of its entry point."""
         ...
 
 
 Plugin = TypeVar("Plugin", bound=NamedRecord)
 PLUGIN_ERRORS = (Exception, SystemExit)
-"""All that a foreign package may raise while ours go on; Ctrl-C ends ours."""
+"""Errors of a foreign package that do not end this program; Ctrl-C does."""
 
 
 def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
-    """The record that an entry point names; a remark with the package where it cannot be used. Nothing else fails."""
+    """Return the record that an entry point names, or a remark with the package where it cannot be used."""
     package = get_package_name(point)
     try:
         loaded = point.load()
@@ -41,15 +41,13 @@ def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
 
 
 def make_unusable_remark(kind: type, name: str, text: str, cure: str = "update or remove that package") -> Remark:
-    """The remark on one that cannot be used."""
     return Remark("package-not-loaded", f"{kind.__name__.lower()} {name!r}", text, cure)
 
 
 def format_exception_line(error: BaseException) -> str:
-    """Kind and text of an error of a foreign package on one line, whatever its text is or does."""
+    """Return type and text of an error of a foreign package on one line."""
     return " ".join("".join(format_exception_only(error)).split())
 
 
 def get_package_name(point: EntryPoint) -> str:
-    """Name of the package that an entry point belongs to."""
     return point.dist.name if point.dist else point.module

@@ -14,28 +14,43 @@ if TYPE_CHECKING:
 
 
 class EventKind(enum.IntEnum):
-    """What has happened."""
+    """Kind of an event at a device."""
 
     BUTTON = 1
-    """A button at the device was pressed: it undoes the last hit."""
+    """Button at the device was pressed: it undoes the last hit."""
     CABLE = 2
-    """The cable of a channel is not plugged in."""
+    """Cable of a channel is not plugged in."""
     SENSOR_BIAS = 3
-    """A sensor has no supply, or does not take it: its bias voltage is out of range."""
+    """Sensor has no supply or draws none: its bias voltage is out of range."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """One thing that a device has told."""
+    """One event that a device reports."""
 
     kind: int
-    """An EventKind; unknown ones are passed on."""
+    """Kind of the event, an EventKind; unknown kinds are passed on."""
     begins: bool = True
-    """Pressed, or a fault has come; False: released, or the fault has gone."""
+    """Whether a button is pressed or a fault begins; False where it ends."""
     channel: int | None = None
-    """Channel of the cable or sensor; None for none."""
+    """Index of the channel of the cable or sensor; None without one."""
     scan: int = 0
-    """Time of the event, in scans taken since the start of the stream."""
+    """Time of the event, in scans since the start of the stream."""
+
+
+class ClosedOnExit:
+    """Context manager that closes itself at the end."""
+
+    def close(self) -> None:
+        """Close it."""
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
 
 
 class Source(Protocol):
@@ -43,16 +58,16 @@ class Source(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What is on each input."""
+        """Sensor on each input."""
         ...
 
     @property
     def sample_rate(self) -> float:
-        """Scans a second (Hz)."""
+        """Sample rate (Hz)."""
         ...
 
     def start(self) -> None:
-        """Begin to sample; scan 0 is the first one after this."""
+        """Start sampling; scan 0 is the next one."""
         ...
 
     def stop(self) -> None:
@@ -60,13 +75,13 @@ class Source(Protocol):
         ...
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks as they arrive; DeviceError where the device goes away or falls silent."""
+        """Yield blocks as they arrive; raise DeviceError where the device goes away or falls silent."""
         ...
 
 
 @dataclass(frozen=True)
 class DeviceIdentity:
-    """Who a device is, in its own words."""
+    """Identity that a device reports."""
 
     model: str
     """Model."""
@@ -78,57 +93,53 @@ class DeviceIdentity:
 
 @dataclass(frozen=True)
 class DeviceAddress:
-    """Where a device is that is no serial port, and who it is."""
+    """Address and identity of a device that is not a serial port."""
 
     address: str
-    """Address as `[daq] port` and --port take it: the name of the driver, a colon, and what the driver knows it by."""
+    """Address as `[daq] port` takes it: name of the driver, a colon, and the driver's own address."""
     identity: DeviceIdentity
-    """Model, serial number and firmware, as far as they are known before it is opened."""
+    """Model, serial number and firmware, as far as known before the device is opened."""
     description: str = ""
-    """Description in the words of the system."""
+    """Description by the operating system."""
 
 
 class Device(Source, Protocol):
-    """A connected source that says who it is and how it fares, and can be given back. A context manager."""
+    """Connected source that reports its identity and state. A context manager."""
 
     sample_rate: float
-    """Scans a second (Hz); set to the measured rate where that is accepted."""
+    """Sample rate (Hz); set to the measured rate where that is accepted."""
 
     @property
     def identity(self) -> DeviceIdentity:
-        """Who it is."""
+        """Model, serial number and firmware."""
         ...
 
     @property
     def follows_clock(self) -> bool:
-        """Whether its scans follow the clock, so that their rate can be measured."""
+        """Whether scans follow the clock, so that their rate can be measured."""
         ...
 
     @property
     def loss_detection(self) -> str:
-        """How lost scans are found, in two words; empty where none can be lost."""
+        """How lost scans are detected, in two words; empty where none can be lost."""
         ...
 
     @property
     def events(self) -> deque[Event]:
-        """What has happened at it, oldest first: take with popleft(), in any thread (IndexError: empty)."""
+        """Events, oldest first: take with popleft(), in any thread (IndexError: empty)."""
         ...
 
     @property
     def fault(self) -> str:
-        """One sentence on what is wrong with it while that lasts; empty where all is well."""
+        """Present fault, one sentence; empty without one."""
         ...
 
     def close(self) -> None:
-        """Stop, and give the port back."""
+        """Stop, and release the port."""
         ...
 
-    def __enter__(self) -> Self:
-        """The device itself."""
-        ...
+    def __enter__(self) -> Self: ...
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        ...
+    ) -> None: ...

@@ -13,13 +13,13 @@ if os.name != "nt":
     import resource
 
 SUBPROCESS_TIMEOUT = 60.0
-"""Time that such a program may take (s)."""
+"""Longest time of a subprocess (s)."""
 
 
 def run_in_subprocess(module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT) -> bytes:
-    """What a module writes to its standard output as a program of its own, which imports from where this one does.
+    """Run a module in a subprocess with the same import path, and return its standard output.
 
-    Raises subprocess.SubprocessError where that fails, crashes or takes longer than `patience` (s).
+    Raises subprocess.SubprocessError where it fails, crashes or takes longer than `patience` (s).
     """
     command = [sys.executable, "-P", "-Wignore", "-m", module, *arguments]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
@@ -27,9 +27,10 @@ def run_in_subprocess(module: str, *arguments: str, patience: float = SUBPROCESS
 
 
 def limit_resources(seconds: float, memory: float) -> None:
-    """From now on so much time of the processor (s), after which it is ended, and so much more memory (bytes), beyond
-    which MemoryError is raised; a crash leaves no image of the memory behind. Windows knows none of these limits, macOS
-    not that of memory."""
+    """Limit processor time (s) and additional memory (bytes) of this process from now on, and write no core dumps.
+
+    Beyond the memory MemoryError is raised. Windows has none of these limits, macOS has none of memory.
+    """
     if os.name == "nt":
         return
     _lower_limit(resource.RLIMIT_CORE, 0)

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Complexes, Floats
 from dsm.matrix.assemble import assemble
 from dsm.matrix.condense import condense_damped
 from dsm.matrix.dynamic_stiffness import check_frequencies
@@ -21,7 +22,7 @@ def receptance(
     position: float = 0.0,
     loss_factor: float = 0.0,
     force_position: float | None = None,
-) -> NDArray[np.complex128]:
+) -> Complexes:
     """Driving-point or transfer receptance, deflection over force (m/N), shape (n,), of the shaft at rest: all modes.
 
     frequency: (n,) Hz. position: where the deflection is, distance from the tool tip (m). loss_factor eta: all
@@ -52,7 +53,7 @@ def receptance(
     return np.asarray((k.share_u * k.tt - k.share_t * k.ut) / (k.uu * k.tt - k.ut * k.ut))
 
 
-def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, Floats]:
     """K_stat and M of the straight line K_stat - w^2 M that touches K(w) at w = wbar, over w^2.
 
     coefficients: those of K in powers of w^2, on the last axis, e.g. (n, n, n_terms); wbar: angular frequency
@@ -120,20 +121,17 @@ def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: flo
     return float(1 / np.linalg.solve(stiffness, force)[2 * node])
 
 
-_Complex = NDArray[np.complex128]
-
-
 @dataclass(frozen=True, eq=False)
 class SpindleSide:
     """Dynamic stiffness of a spindle where its tool was cut off, for deflection and slope there; see couple_tool."""
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Frequencies (Hz), shape (n,)."""
-    force_over_deflection: _Complex
+    force_over_deflection: Complexes
     """Force over deflection (N/m), shape (n,)."""
-    force_over_slope: _Complex
+    force_over_slope: Complexes
     """Force over slope (N), shape (n,); the same as moment over deflection."""
-    moment_over_slope: _Complex
+    moment_over_slope: Complexes
     """Moment over slope (N m), shape (n,)."""
     loss_factor: float
     """Loss factor of all stiffness (-); the tool gets the same."""
@@ -168,8 +166,8 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
 
 
 def _add_joint(
-    joint: Joint, loss_factor: float, uu: _Complex, ut: _Complex, tt: _Complex
-) -> tuple[_Complex, _Complex, _Complex]:
+    joint: Joint, loss_factor: float, uu: Complexes, ut: Complexes, tt: Complexes
+) -> tuple[Complexes, Complexes, Complexes]:
     """The stiffness K with the joint in series: J (K + J)^-1 K with J = diag(k, tilt)."""
     k, tilt = (1 + 1j * loss_factor) * np.array([joint.stiffness, joint.rotational_stiffness])
     both = uu * tt - ut * ut
@@ -177,7 +175,7 @@ def _add_joint(
     return k * (uu * tilt + both) / determinant, k * tilt * ut / determinant, tilt * (k * tt + both) / determinant
 
 
-def couple_tool(side: SpindleSide, tool: Spindle) -> _Complex:
+def couple_tool(side: SpindleSide, tool: Spindle) -> Complexes:
     """Deflection over force at the tool tip (m/N), at the frequencies of the spindle side, shape (n,).
 
     tool: a free shaft, its first segment the tip, its last one fast to the spindle. Equal to receptance of the whole

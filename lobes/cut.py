@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lobes.arrays import Floats
 from modal import Mode
 
 Direction = Literal["up", "down"]
@@ -124,7 +125,7 @@ class Cut:
         return self.teeth // len(self.pitch_pattern)
 
     @property
-    def lead_angles(self) -> NDArray[np.float64]:
+    def lead_angles(self) -> Floats:
         """Angle by which each tooth is ahead of the first (rad), shape (teeth,): not above 0 of uneven teeth."""
         if not self.pitch:
             return np.asarray(np.arange(self.teeth) * 2 * np.pi / self.teeth)
@@ -196,9 +197,7 @@ class Program:
             raise ValueError(f"depth={self.depth} m is not a finite depth > 0; 1 mm is 1e-3")
 
 
-def mean_torque(
-    cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0
-) -> NDArray[np.float64]:
+def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0) -> Floats:
     """Torque averaged over a turn (N m) at axial depths b (m), shape of depth.
 
     M = N D / (4 pi) b (Kt f (cos phi_st - cos phi_ex) + Kte (phi_ex - phi_st)): diameter D (m), feed per tooth f (m),
@@ -232,7 +231,7 @@ def max_depth_for_drive(
     edge: float = 0.0,
     power: float = float("inf"),
     torque: float = float("inf"),
-) -> NDArray[np.float64]:
+) -> Floats:
     """Deepest axial depth (m) that a power (W) and a torque (N m) of the spindle allow at each speed (rpm), shape (n,).
 
     diameter, feed_per_tooth (m) and edge (N/m) as for `mean_torque`; power = 2 pi n M. Raises ValueError as that, and

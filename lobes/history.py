@@ -10,10 +10,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.arrays import Floats
 from lobes.stability_lobes import check_speeds
 
-Column = NDArray[np.float64] | NDArray[np.str_]
-ColumnT = TypeVar("ColumnT", NDArray[np.float64], Column)
+Column = Floats | NDArray[np.str_]
+ColumnT = TypeVar("ColumnT", Floats, Column)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +36,11 @@ class SldHistory:
     """Hash of the settings that the depths were computed with."""
     software: str
     """Name and version of the program that computed them."""
-    speed_rpm: NDArray[np.float64]
+    speed_rpm: Floats
     """Common speed grid (rpm), rising, shape (m,)."""
     columns: Mapping[str, Column]
     """Values by name (letters, digits, underscore), one row a measurement: numbers (n,) or (n, k), or text (n,)."""
-    depth: Mapping[str, NDArray[np.float64]]
+    depth: Mapping[str, Floats]
     """Limiting depth by name of the cut (m), shape (n, m); inf where stable at any depth, nan where not computed."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Unit by name of column; a column without one is a plain number or text."""
@@ -63,7 +64,7 @@ class SldHistory:
         if len(set(rows.values())) > 1:
             raise ValueError(f"columns and depths differ in their number of measurements: {rows}; give one row of each")
 
-    def _check_depth(self, name: str, depth: NDArray[np.float64]) -> None:
+    def _check_depth(self, name: str, depth: Floats) -> None:
         if not name:
             raise ValueError("a cut has an empty name; give each cut a name")
         if depth.ndim != 2 or depth.shape[1] != self.speed_rpm.size:

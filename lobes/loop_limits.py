@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Remark
+from lobes.arrays import Complexes, Floats, Indices, Integers
 from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
@@ -22,9 +22,6 @@ UNEVEN_REFINEMENT_STEPS = 6
 """Of the false position that refines a crossing."""
 MAX_UNEVEN_GRID_VALUES = 2_000_000
 """Speeds times frequencies that are worked on at once."""
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tuple[Floats, Floats]:
@@ -48,9 +45,7 @@ def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tup
     return depth, chatter
 
 
-def _frequency_blocks(
-    branch: TipResponse, cut: Cut, tooth_frequency: Floats
-) -> Iterator[tuple[NDArray[np.intp], Floats]]:
+def _frequency_blocks(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> Iterator[tuple[Indices, Floats]]:
     """Speeds and the frequencies to look at for them (Hz)."""
     size = np.abs(branch.on_grid)
     loud = branch.grid[size > MIN_UNEVEN_RESPONSE * np.max(size)]
@@ -99,8 +94,6 @@ MIN_FAST_TOOTH_RATIO = 0.5
 """Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
 MEAN_FORCE_REMEDY = "use semi-discretisation"
 """What to do where a mean force is no picture of a cut."""
-
-Rows = NDArray[np.intp]
 
 
 def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, method: MethodName) -> StabilityLobes:
@@ -216,8 +209,8 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
 
 
 def _lowest_step(
-    grid: Floats, turn: Floats, real: Floats, block: Rows, tooth_frequency: Floats
-) -> tuple[Floats, Rows, Floats]:
+    grid: Floats, turn: Floats, real: Floats, block: Indices, tooth_frequency: Floats
+) -> tuple[Floats, Indices, Floats]:
     """For each tooth frequency the real part, the grid step and the whole number of the lowest crossing in a block.
 
     Where several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
@@ -243,7 +236,7 @@ def _lowest_step(
     return best, step, whole
 
 
-def _refine_crossing(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: Floats) -> Floats:
+def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_frequency: Floats) -> Floats:
     """Frequency (Hz) inside each grid step at which `missing` turns, counted from its lower end, have been made.
 
     By the false position, with the weight of an end that stays put twice halved (Illinois).
@@ -270,17 +263,13 @@ def _refine_crossing(branch: TipResponse, step: Rows, missing: Floats, tooth_fre
     return middle
 
 
-def _lobes_of_loops(
-    loops: Sequence[tuple[Floats, Complexes, NDArray[np.int64]]], cut: Cut, speed_rpm: Floats
-) -> Iterator[Lobe]:
+def _lobes_of_loops(loops: Sequence[tuple[Floats, Complexes, Integers]], cut: Cut, speed_rpm: Floats) -> Iterator[Lobe]:
     """Lobes of loops, each known by its frequencies (Hz), its response there, and waves between teeth at the limits."""
     for grid, response, waves in loops:
         yield from _lobes_of_loop(grid, response, cut, np.unique(waves), speed_rpm)
 
 
-def _lobes_of_loop(
-    grid: Floats, response: Complexes, cut: Cut, numbers: NDArray[np.int64], speed_rpm: Floats
-) -> Iterator[Lobe]:
+def _lobes_of_loop(grid: Floats, response: Complexes, cut: Cut, numbers: Integers, speed_rpm: Floats) -> Iterator[Lobe]:
     index = np.flatnonzero(response.real < 0)
     frequency, response = grid[index], response[index]
     depth = -1 / (2 * response.real)

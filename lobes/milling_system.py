@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from acquisition import Frf
+from lobes.arrays import Complexes, Floats, Integers
 from lobes.tip_response import check_modes
 from modal import Mode
 
@@ -24,22 +25,22 @@ class MillingSystem:
     The tip shows d = sum shape vector (place q + velocity q' / w): see `tip_participation`. Real modes show shape vector q.
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Natural frequencies w (rad/s), shape (n,)."""
-    damping_ratio: NDArray[np.float64]
+    damping_ratio: Floats
     """Damping ratios zeta, shape (n,)."""
-    shape: NDArray[np.float64]
+    shape: Floats
     """Mass-normalised mode shapes at the tool tip, w / sqrt(K) (kg^-1/2), shape (n,)."""
-    phase: NDArray[np.float64]
+    phase: Floats
     """Phases of the modal constants (rad), shape (n,); 0 for real modes."""
-    direction: NDArray[np.int64]
+    direction: Integers
     """Row of `axes` in which each mode was tapped, shape (n,)."""
-    vector: NDArray[np.float64]
+    vector: Floats
     """Directions of the modes in `axes`, shape (n, p): what each takes of a force, and shows. 1 and 0 along an axis."""
-    axes: NDArray[np.int64]
+    axes: Integers
     """Directions that give way, 0 for x (feed) and 1 for y (normal), shape (p,)."""
 
-    def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(self, frequency: Floats) -> Complexes:
         """Receptance (m/N) at frequencies (Hz) of any shape, shape (..., p, p)."""
         omega = 2 * np.pi * frequency
         total = np.zeros((*omega.shape, self.axes.size, self.axes.size), dtype=np.complex128)
@@ -52,9 +53,7 @@ class MillingSystem:
         return total
 
 
-def tip_participation(
-    damping_ratio: NDArray[np.float64], phase: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tip_participation(damping_ratio: Floats, phase: Floats) -> tuple[Floats, Floats]:
     """What the tip shows of a mode's coordinate q and of its velocity q' / w, for phases (rad); 1 and 0 for phase 0.
 
     y = (cos + sin zeta / sqrt(1 - zeta^2)) q + sin / sqrt(1 - zeta^2) q' / w has the receptance of `modal.Mode`.
@@ -101,7 +100,7 @@ def build_milling_system(
     )
 
 
-def check_directions(vectors: ArrayLike, number: int) -> NDArray[np.float64]:
+def check_directions(vectors: ArrayLike, number: int) -> Floats:
     """Directions of so many modes, shape (n, 2); ValueError where they are none."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):

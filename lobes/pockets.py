@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lobes.arrays import Floats, Indices
 from lobes.stability_lobes import StabilityLobes
 
 
-def find_curve_peaks(values: NDArray[np.float64], prominence: float) -> NDArray[np.intp]:
+def find_curve_peaks(values: Floats, prominence: float) -> Indices:
     """Places of the peaks of a curve (n,), n > 0, of at least this prominence; of a flat top the middle, rounded down.
 
     The prominence of a peak is its height above the higher of the two lowest points between it and whatever is higher
@@ -27,7 +28,7 @@ def find_curve_peaks(values: NDArray[np.float64], prominence: float) -> NDArray[
     return np.asarray((starts[kept] + ends[kept]) // 2)
 
 
-def _peak_base(height: NDArray[np.float64], top: int, step: int) -> float:
+def _peak_base(height: Floats, top: int, step: int) -> float:
     """The lowest point on one side of a peak before something higher, or the end."""
     side = height[top::step]
     higher = np.flatnonzero(side > height[top])
@@ -97,7 +98,7 @@ def find_pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
     return [Pocket(float(speed[i]), float(depth[i]), *_pocket_ends(speed, depth, i)) for i in tops]
 
 
-def _pocket_ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:
+def _pocket_ends(speed: Floats, depth: Floats, peak: int) -> tuple[float, float]:
     """The speeds on each side of a peak where the depth falls to SHARE of it, linear between the speeds given."""
     level = POCKET_DEPTH_SHARE * depth[peak]
     low = np.flatnonzero(depth < level)
@@ -146,7 +147,7 @@ def match_pockets(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
     if not before or not after:
         return []
     ratio = _median_chatter_frequency(now) / _median_chatter_frequency(then)
-    speeds: NDArray[np.float64] = np.log([pocket.speed_rpm for pocket in after])
+    speeds: Floats = np.log([pocket.speed_rpm for pocket in after])
     shifts = []
     for pocket in before:
         expected = np.log(pocket.speed_rpm * ratio)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition import Remark
+from lobes.arrays import Flags, Floats
 from lobes.cut import Cut
 
 
-def check_speeds(speed_rpm: ArrayLike) -> NDArray[np.float64]:
+def check_speeds(speed_rpm: ArrayLike) -> Floats:
     """Spindle speeds (rpm) as a 1-D array; ValueError unless there is one at least and all are finite and > 0."""
     speed = np.atleast_1d(np.asarray(speed_rpm, dtype=np.float64))
     if speed.ndim != 1 or speed.size == 0:
@@ -35,11 +36,11 @@ class Lobe:
 
     number: int
     """Whole waves left on the surface between two teeth, j = 0, 1, 2 ..."""
-    speed_rpm: NDArray[np.float64]
+    speed_rpm: Floats
     """Spindle speed (rpm), shape (p,); it need not rise."""
-    depth: NDArray[np.float64]
+    depth: Floats
     """Limiting depth (m), shape (p,)."""
-    chatter_frequency: NDArray[np.float64]
+    chatter_frequency: Floats
     """Chatter frequency (Hz), shape (p,)."""
 
 
@@ -69,15 +70,15 @@ class StabilityLobes:
     [True, True]
     """
 
-    speed_rpm: NDArray[np.float64]
+    speed_rpm: Floats
     """Spindle speeds (rpm), as they were asked for, shape (n,)."""
-    depth: NDArray[np.float64]
+    depth: Floats
     """Limiting depth at each speed, the lowest crossing (m), shape (n,); inf where stable at any depth."""
-    chatter_frequency: NDArray[np.float64]
+    chatter_frequency: Floats
     """Chatter frequency at the limit (Hz), shape (n,); nan where the depth is inf."""
     kind: NDArray[np.str_]
     """"hopf" (quasi-periodic chatter), "flip" (period two) or "" (no limit), shape (n,)."""
-    crossings: NDArray[np.float64]
+    crossings: Floats
     """Depths where stability changes, rising in each row and filled up with inf (m), shape (n, k)."""
     method: MethodName
     """Method that the limits were found by."""
@@ -123,7 +124,7 @@ class StabilityLobes:
         i = int(np.argmin(self.depth))
         return LobeMinimum(float(self.depth[i]), float(self.speed_rpm[i]), float(self.chatter_frequency[i]))
 
-    def depth_at(self, speed_rpm: ArrayLike) -> NDArray[np.float64]:
+    def depth_at(self, speed_rpm: ArrayLike) -> Floats:
         """Limiting depth at one or several speeds inside the range (m), shape of speed_rpm.
 
         Linear between the speeds of the chart; beside a speed without limit the finite neighbour counts.
@@ -146,7 +147,7 @@ class StabilityLobes:
             between = below + share * (above - below)
         return np.where(np.isfinite(between), between, np.minimum(below, above))
 
-    def is_stable(self, speed_rpm: ArrayLike, depth: ArrayLike) -> NDArray[np.bool_]:
+    def is_stable(self, speed_rpm: ArrayLike, depth: ArrayLike) -> Flags:
         """Whether cuts of this depth (m) at this speed (rpm) lie below the limit; shapes broadcast."""
         wanted = np.asarray(depth, dtype=np.float64)
         if not np.all(wanted >= 0):
@@ -192,11 +193,11 @@ def _envelope_lobes(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
 class RadialLobes:
     """Limiting axial depth over spindle speed and radial depth."""
 
-    speed_rpm: NDArray[np.float64]
+    speed_rpm: Floats
     """Spindle speeds (rpm), shape (n,)."""
-    immersion: NDArray[np.float64]
+    immersion: Floats
     """Radial depths over cutter diameter, shape (r,)."""
-    depth: NDArray[np.float64]
+    depth: Floats
     """Limiting depths (m), shape (r, n); inf where there is no limit."""
     method: MethodName
     """Method that the limits were found by."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobes.arrays import Complexes, Floats
 from modal import Mode
 
 TipData = Frf | Sequence[Mode]
@@ -29,15 +29,15 @@ GRID_STEPS_PER_LINE = 4
 class TipResponse:
     """Receptance of one direction, or a weighted sum of two."""
 
-    grid: NDArray[np.float64]
+    grid: Floats
     """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
-    receptance: Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+    receptance: Callable[[Floats], Complexes]
     """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
-    measured: NDArray[np.complex128] | None = None
+    measured: Complexes | None = None
     """Receptance on the grid (m/N), shape (p,), where it has been computed already."""
 
     @property
-    def on_grid(self) -> NDArray[np.complex128]:
+    def on_grid(self) -> Complexes:
         """Receptance on the grid (m/N), shape (p,)."""
         return self.receptance(self.grid) if self.measured is None else self.measured
 
@@ -87,7 +87,7 @@ def cross_response(cross: TipData, highest: float) -> TipResponse:
     return _from_modes(cross, highest)
 
 
-def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
+def common_grid(tips: Sequence[TipResponse]) -> Floats:
     """Frequencies (Hz) that show every turn of all, where all are known; ValueError where bands do not overlap."""
     low = max(tip.grid[0] for tip in tips)
     high = min(tip.grid[-1] for tip in tips)
@@ -105,7 +105,7 @@ def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
 def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
     """Sum of weight times receptance, known where all parts are; ValueError where their bands do not overlap."""
 
-    def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(frequency: Floats) -> Complexes:
         total = np.zeros(np.shape(frequency), dtype=np.complex128)
         for weight, part in parts:
             total += weight * part.receptance(frequency)
@@ -135,7 +135,7 @@ def _highest_frequency(tip: TipData) -> float:
 def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
     grid = np.unique(np.concatenate([[0.0, highest], *(_grid_near_mode(mode, highest) for mode in modes)]))
 
-    def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(frequency: Floats) -> Complexes:
         total = np.zeros(np.shape(frequency), dtype=np.complex128)
         for mode in modes:
             total += mode.receptance(frequency)
@@ -144,7 +144,7 @@ def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
     return TipResponse(grid, receptance)
 
 
-def _grid_near_mode(mode: Mode, highest: float) -> NDArray[np.float64]:
+def _grid_near_mode(mode: Mode, highest: float) -> Floats:
     """Frequencies up to `highest` (Hz), dense at the mode."""
     width = mode.damping_ratio * mode.frequency
     distance = width * np.sinh(np.arange(0.0, np.arcsinh(highest / width), GRID_STEP_HALF_WIDTHS))

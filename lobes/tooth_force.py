@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobes.arrays import Complexes, Floats
 from lobes.cut import Cut
-
-Floats = NDArray[np.float64]
 
 
 def mean_force(cut: Cut) -> Floats:
@@ -34,7 +32,7 @@ def interval_forces(cut: Cut, intervals: int) -> Floats:
     return np.asarray(forces)
 
 
-def mean_regeneration(cut: Cut, waves: Floats) -> NDArray[np.complex128]:
+def mean_regeneration(cut: Cut, waves: Floats) -> Complexes:
     """1 - exp(-i w tau) in the mean of all teeth, for waves in the mean tooth period (...)."""
     delays = np.array(cut.pitch_pattern) / (2 * np.pi / cut.teeth)
     return np.asarray(np.mean([1 - np.exp(-2j * np.pi * waves * delay) for delay in delays], axis=0))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from acquisition import Remark
+from lobes.arrays import Complexes, Floats
 from lobes.cut import Cut
 from lobes.loop_limits import MEAN_FORCE_REMEDY, loop_limits
 from lobes.stability_lobes import StabilityLobes, check_speeds
@@ -82,12 +83,12 @@ def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
 
 
 def _loop_eigenvalues(
-    force: NDArray[np.float64], x: TipResponse, y: TipResponse, cross: TipResponse | None = None
+    force: Floats, x: TipResponse, y: TipResponse, cross: TipResponse | None = None
 ) -> list[TipResponse]:
     """Both eigenvalues L = t +- sqrt(t^2 - det) of H0 G, t = trace / 2, each followed continuously over frequency."""
     grid = common_grid([tip for tip in (x, y, cross) if tip is not None])
 
-    def half_trace_and_root(frequency: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    def half_trace_and_root(frequency: Floats) -> tuple[Complexes, Complexes]:
         gx, gy = x.receptance(frequency), y.receptance(frequency)
         half = (force[0, 0] * gx + force[1, 1] * gy) / 2
         determinant = force[0, 0] * force[1, 1] - force[0, 1] * force[1, 0]
@@ -103,7 +104,7 @@ def _loop_eigenvalues(
     root *= np.concatenate(([1.0], np.cumprod(np.where(jumps, -1.0, 1.0))))
 
     def branch(side: float) -> TipResponse:
-        def value(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        def value(frequency: Floats) -> Complexes:
             half, root_here = half_trace_and_root(frequency)
             near = root[np.clip(np.searchsorted(grid, frequency), 0, grid.size - 1)]
             return np.asarray(half + side * np.where(np.real(root_here * np.conj(near)) < 0, -root_here, root_here))

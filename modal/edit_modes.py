@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from modal.arrays import Floats
 from modal.bands.extract_modes import limit_to_one_thread
-from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand, Floats
+from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.find_resonances import Resonance
 from modal.bands.fit_peaks import (
     MAX_PEAK_FIT_ERROR,

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from acquisition import Frf, Hit, from_accelerance
+from modal.arrays import Complexes, Floats
 from modal.bands.extract_modes import extract_modes
-from modal.bands.extraction import Extraction, FittedBand, Floats
+from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting import BandFit
 from modal.hit_scatter import (
@@ -133,7 +134,7 @@ def _method_text(state: Extraction, band: FittedBand) -> str:
     return f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
 
 
-def _mode_shape(constants: NDArray[np.complex128]) -> Floats | None:
+def _mode_shape(constants: Complexes) -> Floats | None:
     """Part of each in phase with the driving point or against it, the largest 1 or -1; None of one FRF."""
     if constants.size == 1:
         return None
@@ -273,7 +274,7 @@ def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
     )
 
 
-def _pole_covariance(covariance: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def _pole_covariance(covariance: Floats | None) -> Floats | None:
     """That of frequency and damping ratio; NaN for the stiffness."""
     if covariance is None:
         return None

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from modal.arrays import Complexes, Floats
 from modal.bands.find_resonances import MIN_FRF_LINES, MIN_PEAK_TO_NOISE, Resonance, find_resonances, mobility_noise
 from modal.bands.frf_lines import usable_lines
 from modal.modes.mode import Mode
@@ -54,7 +54,7 @@ def _pick_mode(frf: Frf, resonance: Resonance) -> Mode | None:
     return Mode(peak[0], damping, sign / (2 * damping * peak[1]), method="peak picking")
 
 
-def _parabola_peak(f: NDArray[np.float64], values: NDArray[np.float64], near: slice) -> tuple[float, float] | None:
+def _parabola_peak(f: Floats, values: Floats, near: slice) -> tuple[float, float] | None:
     """Top of a parabola through the largest value and its neighbours, place and height; None where it has none."""
     i = int(np.argmax(values[near])) + near.start
     if i in (near.start, min(near.stop, f.size) - 1):
@@ -66,7 +66,7 @@ def _parabola_peak(f: NDArray[np.float64], values: NDArray[np.float64], near: sl
     return float(f[i] - x[2] * slope / (2 * curvature)), float(height - slope**2 / (4 * curvature))
 
 
-def mode_indicator(frfs: Sequence[Frf]) -> NDArray[np.float64]:
+def mode_indicator(frfs: Sequence[Frf]) -> Floats:
     """Mode indicator 1 - sum |Re G| |G| / sum |G|^2 over the receptances G, on every line, shape (n,).
 
     It comes near 1 where all points move a quarter period behind the force, at the natural frequency of a real mode
@@ -122,7 +122,7 @@ def find_truncated_peaks(frf: Frf, modes: Sequence[Mode], band: tuple[float, flo
     ]
 
 
-def _falls_like_peak(mobility: NDArray[np.complex128], least: float) -> bool:
+def _falls_like_peak(mobility: Complexes, least: float) -> bool:
     """Whether it falls from its first line like a peak, and is higher there than the least."""
     size = np.abs(mobility)
     low = np.flatnonzero(size < size[0] / np.sqrt(2))

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Frf, Hit, Remark, remove_sensor_mass
-from acquisition.estimation import compute_cross_spectra, propagate_force_noise_through
+from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
+from modal.arrays import Complexes, Floats
 from modal.bands.extraction import Extraction, FittedBand
 from modal.modes.mode import Mode
 from modal.quality.trust import Trust, assess_trust
 
 
-def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> NDArray[np.float64]:
+def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> Floats:
     """Covariance of the values of one band by the noise of the hammer inside the force windows of the hits of FRF i.
 
     Each sample of that noise shifts all lines of the FRF together (`propagate_force_noise`), and the modes by one Gauss-Newton
@@ -65,7 +65,7 @@ def _matching_lines(hit: Hit, frf: Frf) -> slice:
     return part
 
 
-def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf]) -> NDArray[np.float64]:
+def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf]) -> Floats:
     """Covariance of the values of one band, (n - 1)/n times the sum of squares over FRF i without one hit each.
 
     Each is refitted by one Gauss-Newton step from the fit to all hits, which is exact to first order in the change;
@@ -77,9 +77,7 @@ def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: S
     return np.asarray((n - 1) / n * steps.T @ steps)
 
 
-def band_changes(
-    state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: NDArray[np.complex128]
-) -> NDArray[np.float64]:
+def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:
     """What the values of a band change by when FRF i is one of these instead of the reference (m/N, on its lines).
 
     A row each, to first order; columns as `BandFit.covariance`.
@@ -115,12 +113,12 @@ def add_linearity_remarks(
     return [_add_linearity_remark(mode, peaks, _change_per_hit(alone[:, i], peaks**2)) for i, mode in enumerate(modes)]
 
 
-def _change_per_hit(change: NDArray[np.float64], power: NDArray[np.float64]) -> NDArray[np.float64]:
+def _change_per_hit(change: Floats, power: Floats) -> Floats:
     """Change of the frequency (Hz) of single hits against all, from that without each."""
     return np.asarray(-change * (np.sum(power) - power) / power)
 
 
-def _add_linearity_remark(mode: Mode, peaks: NDArray[np.float64], change: NDArray[np.float64]) -> Mode:
+def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     slope, error = _fit_line(peaks, change)
     sure = float(scipy.special.stdtrit(peaks.size - 2, LINEARITY_CONFIDENCE))
     is_felt = abs(slope) * np.ptp(peaks) > MIN_LINEARITY_CHANGE * mode.frequency
@@ -134,7 +132,7 @@ def _add_linearity_remark(mode: Mode, peaks: NDArray[np.float64], change: NDArra
     return replace(mode, remarks=(*mode.remarks, Remark("force-dependent", f"{mode.frequency:.0f} Hz", text, cure)))
 
 
-def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:
     """Slope and its standard error, weighted by x^2."""
     columns = np.column_stack([x, x**2])
     value, *_ = np.linalg.lstsq(columns, x * y, rcond=None)

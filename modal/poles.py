@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complexes = NDArray[np.complex128]
+from modal.arrays import Complexes, Flags, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class OrthogonalBasis:
         return np.asarray(np.linalg.eigvals(comrade))
 
 
-def orthogonal_basis(x: NDArray[np.float64], weight: Complexes, order: int) -> OrthogonalBasis:
+def orthogonal_basis(x: Floats, weight: Complexes, order: int) -> OrthogonalBasis:
     """Basis up to this order at x, shape (lines,), with these weights, shape (lines,)."""
     rows = np.empty((order + 1, x.size), dtype=np.complex128)
     recurrence = np.zeros((order + 1, order), dtype=np.complex128)
@@ -49,7 +48,6 @@ def orthogonal_basis(x: NDArray[np.float64], weight: Complexes, order: int) -> O
     return OrthogonalBasis(rows.T, recurrence)
 
 
-Floats = NDArray[np.float64]
 _OrderPoles = tuple[Complexes, Complexes]
 
 EXTRA_POLYNOMIAL_DEGREE = 2
@@ -68,7 +66,7 @@ FLEXIBILITY_TOLERANCE = 0.35
 class StabilisationChart:
     """Poles of all orders, shape (k,), lower orders first; those that decay and lie inside the band."""
 
-    order: NDArray[np.int64]
+    order: Integers
     """Order of the model: the number of poles it has, shape (k,)."""
     frequency: Floats
     """Undamped natural frequency (Hz), shape (k,)."""
@@ -76,11 +74,11 @@ class StabilisationChart:
     """Damping ratio (-), shape (k,)."""
     flexibility: Complexes
     """Modal flexibility 1/K, complex (m/N), in each of p FRFs, shape (k, p)."""
-    previous: NDArray[np.int64]
+    previous: Integers
     """Place of the same pole at the order below, -1 where there is none (the pole is not stable), shape (k,)."""
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Flags:
         """Whether the order below has the same pole, shape (k,)."""
         return self.previous >= 0
 
@@ -147,7 +145,7 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
         yield poles, _flexibilities(model, above, poles)
 
 
-def _is_inside_band(model: _LscfModel, poles: Complexes) -> NDArray[np.bool_]:
+def _is_inside_band(model: _LscfModel, poles: Complexes) -> Flags:
     """Which of the poles decay and lie in the band."""
     size = np.abs(poles)
     return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
@@ -166,7 +164,7 @@ def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Compl
     return np.asarray(residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None])
 
 
-def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> NDArray[np.int64]:
+def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> Integers:
     """For each pole its place among the poles of the order below, -1 where it is not there."""
     if not below[0].size:
         return np.full(here[0].size, -1)
@@ -204,17 +202,17 @@ MIN_STABLE_ORDERS = 4
 class PhysicalPoles:
     """Poles that stay where they are as the order grows, m of them, by rising frequency."""
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Undamped natural frequencies (Hz), shape (m,)."""
-    damping_ratio: NDArray[np.float64]
+    damping_ratio: Floats
     """Damping ratios (-), shape (m,)."""
-    flexibility: NDArray[np.complex128]
+    flexibility: Complexes
     """Modal flexibilities 1/K, complex (m/N), in each of p FRFs, shape (m, p)."""
-    n_orders: NDArray[np.int64]
+    n_orders: Integers
     """Orders that each is stable in, shape (m,)."""
 
     @property
-    def largest(self) -> NDArray[np.float64]:
+    def largest(self) -> Floats:
         """Size of each flexibility in the FRF where it is largest (m/N), shape (m,)."""
         return np.asarray(np.abs(self.flexibility).max(axis=1))
 
@@ -248,7 +246,7 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     return PhysicalPoles(table[:, 0].real, table[:, 1].real, table[:, 3:], table[:, 2].real.astype(np.int64))
 
 
-def _chain_lengths(chart: StabilisationChart) -> NDArray[np.int64]:
+def _chain_lengths(chart: StabilisationChart) -> Integers:
     """Stable poles in the chain that ends at each pole."""
     lengths = np.zeros(chart.order.size, dtype=np.int64)
     for i in np.flatnonzero(chart.stable):
@@ -256,7 +254,7 @@ def _chain_lengths(chart: StabilisationChart) -> NDArray[np.int64]:
     return lengths
 
 
-def _trace_chain(chart: StabilisationChart, end: int) -> NDArray[np.int64]:
+def _trace_chain(chart: StabilisationChart, end: int) -> Integers:
     """Places of the poles of the chain that ends here, the last one first."""
     chain = [end]
     while chart.previous[chain[-1]] >= 0:
@@ -264,7 +262,7 @@ def _trace_chain(chart: StabilisationChart, end: int) -> NDArray[np.int64]:
     return np.array(chain)
 
 
-def _median_flexibility(chart: StabilisationChart, chain: NDArray[np.int64]) -> NDArray[np.complex128]:
+def _median_flexibility(chart: StabilisationChart, chain: Integers) -> Complexes:
     upper = chain[: (chain.size + 1) // 2]
     a = chart.flexibility[upper]
     poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), chain.size - 1]

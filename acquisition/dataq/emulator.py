@@ -1,4 +1,4 @@
-"""A DATAQ device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+"""Emulate a DATAQ device on a pseudo-terminal or a TCP port, byte for byte."""
 
 from __future__ import annotations
 
@@ -26,60 +26,78 @@ from acquisition.dataq.stream import CLOCK_BIT
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
 
 DATAQ_BUFFER_SECONDS = 1.0
-"""What the device keeps for a slow host before it stops (s)."""
+"""Samples kept for a slow host before the device stops (s)."""
 MAX_SCANS_PER_STEP = 512
-"""Most scans that are made at a time."""
+"""Scans generated at a time, at most."""
 UNKNOWN_COMMAND_REPLY, INVALID_PARAMETER_REPLY = REFUSAL_REPLIES[:2]
 
 
 @dataclass(frozen=True)
 class DataqTraits:
-    """What the device is; the defaults of the lower ones are assumptions that no real device has confirmed yet."""
+    """Properties of the device. Defaults from `trailing_nul` on are assumptions that no real device has confirmed."""
 
     model: str = "4108"
     """Answer to `info 1`."""
     firmware: str = "1.35"
-    """Answer to `info 2`; some say it in hexadecimal hundredths, "87"."""
+    """Answer to `info 2`. Some devices answer in hexadecimal hundredths, "87"."""
     trailing_nul: bool = False
-    """Lines end with CR NUL, not with CR alone."""
+    """Whether lines end with CR NUL instead of CR."""
     digital_word: int = 0x7F00
-    """Word of the digital inputs: pulled up where nothing is connected."""
+    """Word of the digital inputs, pulled up if nothing is connected."""
     clock_hz: float | None = None
     """Frequency of a square wave on digital input 0 (Hz)."""
     bits: int = 16
-    """Resolution; the lower bits of each word are 0. The devices have fewer than 16 at high rates."""
+    """Resolution (bits). The lower bits of each word are 0. The devices have fewer than 16 at high rates."""
     is_multiplexed: bool = False
-    """Inputs are converted one after the other within a scan, not at once."""
+    """Whether inputs are converted one after the other within a scan."""
     echoes_stop: bool = False
-    """A `stop` that ends scanning is echoed."""
+    """Whether a `stop` that ends scanning is echoed."""
     stop_delay: float = 0.0
-    """Time that it sends nothing before that echo and what it still had to send (s)."""
+    """Silence before that echo and before the remaining data (s)."""
 
 
 @dataclass(frozen=True)
 class DataqFaults:
-    """What goes wrong on purpose; all off."""
+    """Faults of an emulated DATAQ device. All are off by default."""
 
     halved_rate: bool = False
-    """Scans come at half the rate of the formula."""
+    """Whether scans come at half the rate of the formula."""
     drop_at: int | None = None
     """Byte of the stream at which bytes are lost."""
     drop_bytes: int = 64
-    """Number of bytes that are lost there."""
+    """Number of bytes lost there."""
     stall_after: int | None = None
-    """Send nothing more after so many scans."""
+    """Number of scans after which it sends nothing more."""
     unplug_after: int | None = None
-    """Hang up after so many scans."""
+    """Number of scans after which it hangs up."""
     overflow_after: int | None = None
-    """The buffer runs over after so many scans, once."""
+    """Number of scans after which its buffer overflows, once."""
     streaming_at_connect: bool = False
-    """A program before this one has left it scanning."""
+    """Whether an earlier program has left it scanning."""
     ignores_commands: bool = False
-    """No command is heeded."""
+    """Whether it ignores all commands."""
 
 
 class DataqEmulator(EmulatorThread):
-    """Serves a signal as a DAQ; a context manager whose `port` can be opened like a real one."""
+    """Emulated DATAQ device. A context manager whose `port` opens like a real one.
+
+    Parameters
+    ----------
+    signal_at
+        Function that returns, for the rate the host has chosen (Hz), the signal function of the sensors.
+    inputs
+        Sensors, in the order of the signal's rows.
+    realtime
+        Whether it sends by the clock. False sends as fast as the host reads.
+    tcp
+        Whether it listens on loopback instead of a pseudo-terminal.
+    traits
+        Properties of the device, None for the defaults.
+    faults
+        Faults to inject, None for none.
+    clock
+        Clock that scans follow (s).
+    """
 
     def __init__(
         self,
@@ -92,10 +110,6 @@ class DataqEmulator(EmulatorThread):
         faults: DataqFaults | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """signal_at gives, for the rate the host has chosen (Hz), what the sensors on `inputs` feel.
-
-        realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
-        """
         super().__init__(tcp)
         self._signal_at, self._inputs = signal_at, {sensor.number: (i, sensor) for i, sensor in enumerate(inputs)}
         self._realtime, self._clock = realtime, clock
@@ -112,7 +126,6 @@ class DataqEmulator(EmulatorThread):
             self._start()
 
     def serve_once(self) -> bool:
-        """See EmulatorThread."""
         lines, self._received = split_lines(self._received + self.wire.exchange(self._patience()))
         for line in [] if self._faults.ignores_commands else lines:
             self._obey(line)
@@ -122,7 +135,7 @@ class DataqEmulator(EmulatorThread):
         return limit is None or not self.streaming or self._scan < limit
 
     def _patience(self) -> float:
-        """How long to wait for the host (s)."""
+        """Return how long to wait for the host (s)."""
         if not self.streaming:
             return 0.05
         return 0.002 if self._realtime or not self._has_room() else 0.0
@@ -145,7 +158,7 @@ class DataqEmulator(EmulatorThread):
             self._say(INVALID_PARAMETER_REPLY)
 
     def _answer(self, name: str, arguments: list[str], line: str) -> str:
-        """Echo with what is added to it; ValueError or LookupError for arguments that do not fit."""
+        """Return the echo with its additions. ValueError or LookupError for invalid arguments."""
         limits = {"srate": SRATE_LIMITS, "dec": DEC_LIMITS, "deca": DECA_LIMITS, "ps": (0, 7), "encode": (0, 1)}
         if name == "info":
             return f"{line} {self._info[int(arguments[0])]}"
@@ -183,7 +196,7 @@ class DataqEmulator(EmulatorThread):
         self.streaming = True
 
     def _stream(self) -> None:
-        """Make the scans that are due and send them in whole packets; stop where the host has fallen behind."""
+        """Generate the scans that are due and send them in whole packets. Stop if the host is late."""
         if self._faults.stall_after is not None and self._scan >= self._faults.stall_after:
             return
         if self._realtime and not self._has_room():
@@ -204,7 +217,7 @@ class DataqEmulator(EmulatorThread):
             self._overflow()
 
     def _has_room(self) -> bool:
-        """Whether the device's buffer takes more; when not in real time, little is sent ahead of the host."""
+        """Return whether the buffer takes more. Not in real time, little is sent ahead of the host."""
         size = int(DATAQ_BUFFER_SECONDS * self._rate) * 2 * len(self._scan_list) if self._realtime else 1 << 16
         return len(self.wire.pending) <= size
 
@@ -222,7 +235,7 @@ class DataqEmulator(EmulatorThread):
         self._sent += len(packet)
 
     def _scans(self, count: int) -> NDArray[np.int16]:
-        """The next words, shape (count, length of the scan list)."""
+        """Return the next words, shape (count, length of the scan list)."""
         step = len(self._scan_list) if self._traits.is_multiplexed else 1
         values = self._signal(self._scan * step, count * step)
         words = np.zeros((count, len(self._scan_list)), "<i2")

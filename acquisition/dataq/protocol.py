@@ -1,8 +1,8 @@
-"""DATAQ command protocol: commands, replies, rates, ranges, and identification of a device.
+"""Command protocol of the DATAQ DI-1120, 2108, 2108-P, 4108, 4208 and 4718B on their virtual serial port.
 
-Commands are lower-case ASCII, ended by CR, and come back as an echo while the device is not scanning; what it scans is
-a bare stream of little-endian 16-bit words, one an entry of the scan list, without header, counter or checksum.
-Source: Data Acquisition Instrument Command Protocol, DATAQ Instruments; docs/devices.md says what is proven.
+Commands are lower-case ASCII ending with CR. The device echoes them while it is not scanning. Scans are a bare stream
+of little-endian 16-bit words, one per entry of the scan list, without header, counter or checksum.
+Source: Data Acquisition Instrument Command Protocol, DATAQ Instruments. docs/devices.md says what is proven.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from acquisition.ports.serial_ports import SerialLink
 from acquisition.source import DeviceIdentity
 
 MIN_FIRMWARE_VERSION = 1.35
-"""Binary streams of older firmware are not reliable."""
+"""Oldest firmware with reliable binary streams."""
 DIGITAL_INPUTS_CODE = 8
-"""Code of the digital inputs in the scan list: a word whose low byte is always 0."""
+"""Scan list code of the digital inputs, a word whose low byte is always 0."""
 USB_PACKET_BYTES = 64
-"""Some drivers lose whole packets of so many bytes."""
+"""Size of a USB packet (bytes). Some drivers lose whole packets."""
 OVERFLOW_REPLY = b"stop 0"
-"""What the device writes into the stream when its buffer has run over."""
+"""Text that the device writes into the stream when its buffer overflows."""
 SRATE_LIMITS, DEC_LIMITS, DECA_LIMITS = (375, 65535), (1, 512), (1, 40_000)
-"""Least and largest argument of `srate`, `dec` and `deca`."""
+"""Smallest and largest argument of `srate`, `dec` and `deca`."""
 REFUSAL_REPLIES = ("Command not found", "Invalid Parameter", "Command not available")
-"""Answers of a device that does not take a command."""
+"""Answers of a device that rejects a command."""
 
 DATAQ_RANGES: Mapping[str, tuple[float, ...]] = {
     "1120": (100.0, 50.0, 20.0, 10.0, 5.0, 2.0),
@@ -38,27 +38,38 @@ DATAQ_RANGES: Mapping[str, tuple[float, ...]] = {
     "4208": (100.0, 50.0, 20.0, 10.0, 5.0, 2.0),
     "4718B": (5.0,),
 }
-"""By model: positive end (V) of the bipolar ranges, in the order of their codes."""
+"""Positive end (V) of the bipolar ranges by model, in the order of their codes."""
 
 
 @dataclass(frozen=True)
 class RateSetting:
-    """Arguments of `srate`, `dec` and `deca`; the rate is dividend / (srate dec deca)."""
+    """Arguments of `srate`, `dec` and `deca`. The rate is dividend / (srate dec deca)."""
 
     srate: int
-    """375 to 65535."""
+    """Sample rate divisor, 375 to 65535."""
     dec: int
-    """1 to 512."""
+    """First decimation factor, 1 to 512."""
     deca: int
-    """1 to 40 000."""
+    """Second decimation factor, 1 to 40 000."""
 
     def rate(self, dividend: int) -> float:
-        """Scans a second (Hz) for the dividend that `info 9` names."""
+        """Return the sample rate (Hz) for the dividend that `info 9` reports."""
         return dividend / (self.srate * self.dec * self.deca)
 
 
 def check_inputs(inputs: Sequence[SensorInput]) -> None:
-    """ValueError for inputs that the device does not have, the same one twice, or none."""
+    """Check the inputs of a DATAQ device.
+
+    Parameters
+    ----------
+    inputs
+        Sensors with the numbers of their inputs.
+
+    Raises
+    ------
+    ValueError
+        An input does not exist or is used twice, or there is none.
+    """
     numbers = [sensor.number for sensor in inputs]
     for number in numbers:
         if not 0 <= number < DIGITAL_INPUTS_CODE:
@@ -68,7 +79,7 @@ def check_inputs(inputs: Sequence[SensorInput]) -> None:
 
 
 def choose_rate(wanted: float, dividend: int) -> RateSetting:
-    """The setting that comes nearest to a rate (Hz), with as little decimation as can be; ValueError out of reach."""
+    """Return the setting nearest to a rate (Hz) with the least decimation. ValueError if it is out of reach."""
     fastest, slowest = dividend / SRATE_LIMITS[0], dividend / (SRATE_LIMITS[1] * DEC_LIMITS[1] * DECA_LIMITS[1])
     if not slowest <= wanted <= fastest:
         raise ValueError(
@@ -81,34 +92,36 @@ def choose_rate(wanted: float, dividend: int) -> RateSetting:
 
 
 def choose_packet_code(bytes_per_second: float) -> int:
-    """Smallest argument of `ps` (packets of 16 x 2^ps bytes) with at most 100 packets a second, else the largest, 7."""
+    """Return the smallest `ps` argument (packets of 16 x 2^ps bytes) for at most 100 packets a second, else 7."""
     return next((n for n in range(8) if bytes_per_second <= 100 * packet_bytes(n)), 7)
 
 
 def packet_bytes(ps: int) -> int:
-    """Bytes of one packet for an argument of `ps`."""
+    """Return the packet size for a `ps` argument (bytes)."""
     return 16 << ps
 
 
 def encode_command(command: str) -> bytes:
-    """The bytes of a command."""
     return command.encode("ascii") + b"\r"
 
 
 def split_lines(received: bytes) -> tuple[list[str], bytes]:
-    """Whole lines in what was received, and what is left of the last; NUL and LF count for nothing."""
+    """Split received bytes into whole lines and the unfinished rest. NUL and LF are ignored."""
     *lines, unfinished = received.replace(b"\0", b"").replace(b"\n", b"").split(b"\r")
     return [line.decode("ascii", "replace").strip() for line in lines], unfinished
 
 
 def parse_answer(command: str, line: str) -> str | None:
-    """What a device adds to the echo of a command ("" where nothing); None where the line is no echo of it."""
+    """Return what a device adds to the echo of a command. None if the line is not its echo."""
     sent, words = command.split(), line.split()
     return " ".join(words[len(sent) :]) if words[: len(sent)] == sent else None
 
 
 def parse_model(answer: str) -> str:
-    """Key of RANGES for an answer to `info 1`, e.g. "2108P" for "DI-2108-P"; ValueError for other devices."""
+    """Return the key of DATAQ_RANGES for an answer to `info 1`, e.g. "2108P" for "DI-2108-P".
+
+    ValueError for other devices.
+    """
     model = answer.upper().removeprefix("DI").replace("-", "").replace(" ", "")
     if model not in DATAQ_RANGES:
         raise ValueError(f"model {answer!r} is none of {', '.join(f'DI-{number}' for number in DATAQ_RANGES)}")
@@ -116,7 +129,7 @@ def parse_model(answer: str) -> str:
 
 
 def parse_firmware(answer: str) -> float | None:
-    """Version in an answer to `info 2`: "1.35", or hundredths in hexadecimal, "87"; None where it is neither."""
+    """Return the version in an answer to `info 2`: "1.35", or hundredths in hexadecimal, "87". None if invalid."""
     try:
         return float(answer) if "." in answer else int(answer, 16) / 100
     except ValueError:
@@ -124,7 +137,7 @@ def parse_firmware(answer: str) -> float | None:
 
 
 def encode_range(model: str, full_scale: float) -> int:
-    """Code of a range (V) of a model; ValueError with all it has."""
+    """Return the code of a range (V) of a model. ValueError lists the ranges it has."""
     if full_scale not in DATAQ_RANGES[model]:
         has = ", ".join(f"{volts:g}" for volts in DATAQ_RANGES[model])
         raise ValueError(f"range_v={full_scale:g} is no range of the DI-{model}; it has +-{has} V")
@@ -132,18 +145,18 @@ def encode_range(model: str, full_scale: float) -> int:
 
 
 def encode_scan_entry(number: int, code: int) -> int:
-    """Entry of the scan list for an analog input at a range."""
+    """Return the scan list entry of an analog input at a range code."""
     return number | code << 8
 
 
 DATAQ_ECHO_TIMEOUT = 0.5
-"""How long a command may stay without its echo before it is sent again (s)."""
+"""Time after which a command without an echo is sent again (s)."""
 DATAQ_COMMAND_TRIES = 3
-"""How often a command is sent."""
+"""Number of times a command is sent."""
 DATAQ_STOP_SILENCE = 0.2
-"""A device that sends nothing for so long has stopped (s)."""
+"""Silence that shows that a device has stopped (s)."""
 MAX_DRAIN_TIME = 1.0
-"""How long a device may go on sending after a `stop` before it is sent again (s)."""
+"""Time that a device may go on sending before `stop` is sent again (s)."""
 CDC_HINT = (
     "its LED must blink yellow (CDC mode): "
     "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
@@ -152,32 +165,39 @@ CDC_HINT = (
 
 @dataclass(frozen=True)
 class DataqInfo:
-    """What `info` says."""
+    """Answers to `info`."""
 
     model: str
-    """Model, a key of RANGES, e.g. "4108"."""
+    """Model, a key of DATAQ_RANGES, e.g. "4108"."""
     serial: str
     """Serial number."""
     firmware: str
-    """Firmware, as the device writes it."""
+    """Firmware version, as the device writes it."""
     dividend: int
     """Dividend of the rate formula (Hz)."""
 
     @property
     def identity(self) -> DeviceIdentity:
-        """The same as of any device."""
+        """Identity in the form common to all devices."""
         return DeviceIdentity(f"DI-{self.model}", self.serial, self.firmware)
 
 
 class DataqCommandLink:
-    """Asks and tells over an open link."""
+    """Commands to a DATAQ device that is not scanning, each with its echo.
+
+    Parameters
+    ----------
+    link
+        Open serial link.
+    tries
+        Number of times each command is sent before the device is given up.
+    """
 
     def __init__(self, link: SerialLink, tries: int = DATAQ_COMMAND_TRIES) -> None:
-        """tries: how often each command is sent before the device is given up."""
         self._link, self._tries = link, tries
 
     def halt(self) -> None:
-        """Stop scanning and read until nothing more comes; a scanning device does not echo."""
+        """Stop scanning and read until nothing more arrives. A scanning device does not echo."""
         for _ in range(self._tries):
             self._link.write(encode_command("stop"))
             if self.drain():
@@ -188,7 +208,7 @@ class DataqCommandLink:
         )
 
     def drain(self) -> bool:
-        """Read until nothing more comes; whether that was so in time."""
+        """Read until nothing more arrives. Return whether that happened in time."""
         deadline = time.monotonic() + MAX_DRAIN_TIME
         while time.monotonic() < deadline:
             if not self._link.read(DATAQ_STOP_SILENCE):
@@ -196,12 +216,12 @@ class DataqCommandLink:
         return False
 
     def synchronize(self) -> None:
-        """Wait for an echo and for what follows it: nothing that the device sent before is on its way any more."""
+        """Wait for an echo and what follows it, so that nothing sent earlier is still on its way."""
         self.send_command("info 0")
         self.drain()
 
     def identify(self) -> DataqInfo:
-        """Who the device is; DeviceError for one that is not of this family."""
+        """Identify the device. DeviceError if it is not of this family."""
         maker, model, firmware, serial, dividend = (self.send_command(f"info {i}") for i in (0, 1, 2, 6, 9))
         try:
             if maker.upper() != "DATAQ":
@@ -213,7 +233,13 @@ class DataqCommandLink:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
 
     def send_command(self, command: str) -> str:
-        """Send, and wait for the echo; what the device adds to it."""
+        """Send a command, wait for its echo, and return what the device adds to it.
+
+        Parameters
+        ----------
+        command
+            Command without its CR.
+        """
         last_line = ""
         for _ in range(self._tries):
             self._link.write(encode_command(command))
@@ -235,7 +261,18 @@ class DataqCommandLink:
 
 
 def probe_dataq(link: SerialLink) -> DeviceIdentity | None:
-    """Who answers, asked once; None where nobody of this family does."""
+    """Ask once which DATAQ device answers.
+
+    Parameters
+    ----------
+    link
+        Open serial link.
+
+    Returns
+    -------
+    DeviceIdentity or None
+        Identity of the device, None if no DATAQ device answers.
+    """
     dialogue = DataqCommandLink(link, tries=1)
     try:
         dialogue.halt()

@@ -1,4 +1,4 @@
-"""A DATAQ device on its virtual serial port as a source of scans."""
+"""Read scans from a DATAQ device on its virtual serial port."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import enum
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from types import TracebackType
-from typing import Self
 
 from acquisition.channel import Block, SensorInput
 from acquisition.dataq.protocol import (
@@ -26,30 +24,51 @@ from acquisition.dataq.protocol import (
 from acquisition.dataq.stream import CodeBlock, ScanDecoder
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
-from acquisition.source import Event
+from acquisition.source import ClosedOnExit, Event
 
 DATAQ_SILENCE_TIMEOUT = 3.0
-"""A scanning device that gives no scans for so long has failed (s)."""
+"""Time without scans after which a scanning device has failed (s)."""
 DATAQ_DEFAULT_RATE = 50_000.0
-"""Hz, where none is asked for: force and acceleration with the digital word are 150 000 words a second."""
+"""Default sample rate (Hz). Force, acceleration and digital word are 150 000 words a second."""
 
 
 class DataqStatus(enum.StrEnum):
-    """What the device is doing."""
+    """State of the device."""
 
     STOPPED = "stopped"
     SCANNING = "scanning"
     OVERFLOW = "overflow"
-    """Its buffer ran over and it stopped by itself; scanning has been started again and no scan has come yet."""
+    """Its buffer overflowed and it stopped by itself. Scanning was restarted, no scan has arrived yet."""
 
 
-class DataqSource:
-    """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
+class DataqSource(ClosedOnExit):
+    """Connection to a DATAQ device as a source of scans. A context manager.
+
+    Parameters
+    ----------
+    port
+        Serial device name or socket://host:port.
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz). The nearest one of the device is used.
+    digital_word
+        Whether to scan the digital inputs too. Their word shows when bytes are lost.
+    digital_clock
+        Whether a square wave on digital input 0 shows the loss of whole scans, too.
+
+    Raises
+    ------
+    DeviceError
+        There is no port or no such device.
+    ValueError
+        The device does not have an input, range or rate.
+    """
 
     follows_clock = True
-    """Its scans come at the rate that it names."""
+    """Whether its scans follow the clock."""
     fault = ""
-    """It tells of no faults."""
+    """Empty: the device reports no faults."""
 
     def __init__(
         self,
@@ -60,23 +79,17 @@ class DataqSource:
         *,
         digital_clock: bool = False,
     ) -> None:
-        """Open a port: a device name or socket://host:port. The rate is the nearest the device has (Hz).
-
-        digital_word scans the digital inputs too, whose word shows when bytes are lost; digital_clock: a square wave
-        on digital input 0 shows the loss of whole scans, too. Raises DeviceError where there is no port or no such
-        device, ValueError for inputs, ranges and rates it does not have.
-        """
         check_inputs(inputs)
         self.channels = tuple(sensor.channel for sensor in inputs)
-        """What is on each input."""
+        """Channel of each input."""
         self.loss_detection = "digital word" + " and clock" * digital_clock if digital_word else "none"
-        """How lost scans are found."""
+        """Method by which lost scans are detected."""
         self.events: deque[Event] = deque()
-        """It tells of no events."""
+        """Empty: the device reports no events."""
         self.status = DataqStatus.STOPPED
-        """What it is doing."""
+        """State of the device."""
         self.overflows = 0
-        """How often its buffer ran over."""
+        """Number of overflows of its buffer."""
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
         self._has_sent = False
@@ -94,18 +107,8 @@ class DataqSource:
             self._link.close()
             raise
 
-    def __enter__(self) -> Self:
-        """The connected source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop the device and close the port."""
-        self.close()
-
     def start(self) -> None:
-        """Begin an endless stream."""
+        """Start an endless stream."""
         if self._has_sent:
             self._dialogue.synchronize()
         self._has_sent, self._next_scan = True, 0
@@ -115,12 +118,11 @@ class DataqSource:
         self.status = DataqStatus.SCANNING
 
     def stop(self) -> None:
-        """End the stream."""
         self.status = DataqStatus.STOPPED
         self._dialogue.halt()
 
     def close(self) -> None:
-        """Stop where the device still answers, then give the port back."""
+        """Stop the device if it still answers, and close the port."""
         self.status = DataqStatus.STOPPED
         try:
             self._link.write(encode_command("stop"))
@@ -130,10 +132,10 @@ class DataqSource:
             self._link.close()
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged.
+        """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged.
 
-        Where the device's buffer ran over, or ours because nobody asked for blocks for too long, it is started again;
-        the gap is told by the clock.
+        After an overflow of the device's buffer, or of ours because nobody read the blocks in time, scanning is
+        restarted. The clock gives the length of the gap.
         """
         since = time.monotonic()
         while self.status != DataqStatus.STOPPED:
@@ -157,7 +159,6 @@ class DataqSource:
         return Block(first, codes, lost_before=lost)
 
     def _start_again(self) -> None:
-        """After an overflow, there or here."""
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
         self._dialogue.halt()
@@ -188,7 +189,7 @@ class DataqSource:
         return identity
 
     def _configure(self, device: DataqInfo, inputs: Sequence[SensorInput], wanted: float) -> float:
-        """Send the set-up; the rate that results (Hz)."""
+        """Configure the device and return the resulting sample rate (Hz)."""
         codes = [
             encode_scan_entry(sensor.number, encode_range(device.model, sensor.channel.full_scale)) for sensor in inputs
         ]

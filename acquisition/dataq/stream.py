@@ -1,8 +1,8 @@
 """Decode the byte stream of a DATAQ device into scans and detect lost ones.
 
-That word stands last in each scan and holds still; its low byte is always 0. Bytes that are lost move everything that
-follows, and another word appears in its place: the stream is then read on from where the word is found again. A loss of
-whole scans moves nothing; a square wave on a digital input shows it by a period that is too short.
+Each scan ends with the constant word of the digital inputs, whose low byte is always 0. Lost bytes move everything
+that follows, so that another word appears in its place. The decoder then resumes where it finds the word again. A loss
+of whole scans moves nothing. A square wave on a digital input shows it by a period that is too short.
 """
 
 from __future__ import annotations
@@ -10,39 +10,44 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Flags
 from acquisition.dataq.protocol import OVERFLOW_REPLY, USB_PACKET_BYTES
 from acquisition.errors import DeviceError
 
 CLOCK_BIT = 0x0100
-"""Of the word of the digital inputs: input 0."""
+"""Bit of digital input 0 in the word of the digital inputs."""
 CLOCK_PERIOD_LIMITS = (6.0, 100.0)
-"""Shortest and longest that are followed (scans): an edge is known to one scan, a rate to one percent."""
+"""Shortest and longest clock period (scans). An edge is known to one scan, a rate to one percent."""
 CLOCK_TRAINING_PERIODS = 16
-"""Periods from which their length is taken: what is lost within these is not seen."""
+"""Periods from which the period length is measured. Losses within them are not detected."""
 CLOCK_PERIOD_TOLERANCE = 1.5
-"""Scans by which a period may differ from the length learnt; a packet holds more."""
+"""Allowed deviation of a period from its measured length (scans). A packet holds more."""
 
 
 class DigitalClock:
-    """Follows the rising edges."""
+    """Square wave on digital input 0 whose periods show the loss of whole scans."""
 
     def __init__(self) -> None:
-        """Nothing is known of the period."""
         self._learning: list[int] = []
         self._period = 0.0
         self.restart()
 
     def restart(self) -> None:
-        """The scans that follow do not join on to those before."""
+        """Start anew: the following scans do not join the earlier ones."""
         self._high = True
         self._edge: int | None = None
         self._waited = 0
 
-    def find_gap(self, high: NDArray[np.bool_]) -> tuple[int, int]:
-        """How many of these scans come before the next that is missing, and how many are missing there (0: none).
+    def find_gap(self, high: Flags) -> tuple[int, int]:
+        """Return how many scans precede the next gap, and how many are missing there (0: none).
 
-        high: the input in consecutive scans, shape (n,), n >= 1. The place is that of the next edge, at most a period
-        late; the number is the smallest that fits, right but for whole periods. DeviceError where there is no wave.
+        The place is that of the next edge, at most a period late. The number is the smallest that fits, right except
+        for whole periods. DeviceError if there is no wave.
+
+        Parameters
+        ----------
+        high
+            State of the input in consecutive scans, shape (n,), n >= 1.
         """
         before = np.concatenate(([self._high], high[:-1]))
         for at in map(int, np.flatnonzero(high & ~before)):
@@ -56,7 +61,7 @@ class DigitalClock:
         return high.size, 0
 
     def _missing(self, scans: int) -> int:
-        """How many are missing between two edges so far apart."""
+        """Return the number of scans missing between two edges this far apart."""
         if not self._period:
             self._learn(scans)
             return 0
@@ -79,7 +84,7 @@ class DigitalClock:
         ):
             raise _make_clock_error()
 
-    def _go_on(self, high: NDArray[np.bool_]) -> None:
+    def _go_on(self, high: Flags) -> None:
         self._high = bool(high[-1])
         self._waited += high.size
         if self._edge is not None:
@@ -89,7 +94,6 @@ class DigitalClock:
 
 
 def _make_clock_error() -> DeviceError:
-    """Digital input 0 has no wave that can be followed."""
     low, high = CLOCK_PERIOD_LIMITS
     return DeviceError(
         f"digital input 0 of the DAQ has no even square wave with a period of {low:g} to {high:g} scans",
@@ -98,19 +102,28 @@ def _make_clock_error() -> DeviceError:
 
 
 HELD_BACK_BYTES = 32
-"""Bytes that stay in hand: the end of a stream that has run over is text, not samples."""
+"""Bytes held back: the end of an overflowed stream is text, not samples."""
 SYNC_WINDOW_SCANS = 32
-"""Scans that must agree before a place in the stream is taken for that of the digital word."""
+"""Scans that must agree before a position is accepted as that of the digital word."""
 
-CodeBlock = tuple[NDArray[np.int32], int]
-"""Codes, shape (n_channels, n), and the scans lost before them."""
+CodeBlock = tuple[Codes, int]
+"""Codes, shape (n_channels, n), and the number of scans lost before them."""
 
 
 class ScanDecoder:
-    """Cuts a byte stream into scans."""
+    """Decoder of a byte stream into scans.
+
+    Parameters
+    ----------
+    n_channels
+        Number of analog channels.
+    digital_word
+        Whether each scan ends with the word of the digital inputs.
+    clock
+        Whether digital input 0 carries a square wave.
+    """
 
     def __init__(self, n_channels: int, digital_word: bool, clock: bool = False) -> None:
-        """digital_word: each scan ends with the word of the digital inputs; clock: its input 0 has a square wave."""
         self._n_channels, self._checked = n_channels, digital_word
         self._clock = DigitalClock() if clock else None
         self._steady = ~CLOCK_BIT if clock else -1
@@ -118,7 +131,7 @@ class ScanDecoder:
         self.begin()
 
     def begin(self, lost: int = 0) -> None:
-        """A new stream, whose first byte begins a scan; scans lost before it are told with its first piece."""
+        """Begin a stream whose first byte begins a scan. Its first block reports the scans lost before it."""
         self._bytes = b""
         self._word: int | None = None
         self._in_place = False
@@ -126,7 +139,7 @@ class ScanDecoder:
         self._begin_clock()
 
     def feed(self, data: bytes) -> list[CodeBlock]:
-        """The scans that these bytes complete."""
+        """Return the scans that these bytes complete."""
         self._bytes += data
         pieces = []
         while (piece := self._next_piece()) is not None:
@@ -134,11 +147,11 @@ class ScanDecoder:
         return pieces
 
     def has_overflowed(self) -> bool:
-        """Whether the stream ends with the device's word that its buffer ran over."""
+        """Return whether the stream ends with the overflow reply of the device."""
         return OVERFLOW_REPLY in self._bytes[-HELD_BACK_BYTES:]
 
     def _next_piece(self) -> CodeBlock | None:
-        """Scans up to the next gap; None until more bytes have come."""
+        """Return the scans up to the next gap, None until more bytes arrive."""
         while (count := (len(self._bytes) - HELD_BACK_BYTES) // self._scan_bytes) > 0:
             intact = self._intact(count)
             if intact:
@@ -149,7 +162,7 @@ class ScanDecoder:
         return None
 
     def _intact(self, count: int) -> int:
-        """How many of the next scans have the digital word in its place."""
+        """Count the next scans that have the digital word in its place."""
         if not self._checked:
             return count
         if not self._in_place:
@@ -167,7 +180,7 @@ class ScanDecoder:
         return words[:, : self._n_channels].T.astype(np.int32), lost
 
     def _until_gap(self, count: int) -> tuple[int, int]:
-        """How many of the next scans come before a gap that the clock shows, and how many are missing there."""
+        """Return how many scans precede a gap that the clock shows, and how many are missing there."""
         if self._clock is None:
             return count, 0
         high = self._digital_words(0, count) & CLOCK_BIT != 0
@@ -178,7 +191,7 @@ class ScanDecoder:
         return self._clock.find_gap(high)
 
     def _find_word(self) -> None:
-        """Put the next scan at the head of the bytes in hand; where it cannot be told, give one up."""
+        """Move the next scan to the head of the buffer. If it cannot be located, drop one scan."""
         shift = self._shift()
         if shift is None:
             self._bytes = self._bytes[self._scan_bytes :]
@@ -196,7 +209,7 @@ class ScanDecoder:
             self._clock.restart()
 
     def _shift(self) -> int | None:
-        """Bytes to the next scan: the known word counts first, then a new one in the old place, then anywhere."""
+        """Return the bytes to the next scan: by the known word, else a new one in the old place, else anywhere."""
         words = {shift: self._steady_word(shift) for shift in range(self._scan_bytes)}
         steady = [shift for shift, word in words.items() if word is not None]
         same = [shift for shift in steady if words[shift] == self._word]
@@ -214,7 +227,7 @@ class ScanDecoder:
         return np.frombuffer(self._bytes[shift : shift + count * size], "<i2").reshape(count, -1)[:, -1]
 
     def _missing_bytes(self, shift: int) -> int:
-        """The fewest bytes whose loss moves the stream so far: whole USB packets, where these can."""
+        """Return the smallest loss that moves the stream this far, in whole USB packets if possible."""
         if not shift:
             return 0
         packets = (USB_PACKET_BYTES * k for k in range(1, self._scan_bytes))

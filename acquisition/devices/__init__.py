@@ -1,4 +1,4 @@
-"""The drivers there are, and which device answers on a port."""
+"""Device drivers, and the scan for devices that answer."""
 
 from acquisition.devices.drivers import DeviceSettings, Driver, SensorDataLocation, skip_serial_probe
 from acquisition.devices.port_scan import DeviceAnswer, PortScan, ScannedPort, probe_port, scan_ports, search_devices

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from acquisition.channel import SensorInput
@@ -16,26 +17,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DeviceSettings:
-    """What is asked of a device: [daq] of machine.toml, in SI units."""
+    """Settings of a device: [daq] of machine.toml in SI units."""
 
     sample_rate: float | None = None
-    """Scans a second (Hz); None leaves it to the driver."""
+    """Sample rate (Hz), None for the default of the driver."""
     inputs: tuple[SensorInput, ...] = ()
-    """The sensors of a device that does not describe them itself."""
+    """Sensors of a device that does not describe them itself."""
     loss_detection: bool = True
-    """Whether lost scans are to be found."""
+    """Whether to detect lost scans."""
     digital_clock: bool = False
     """Whether a square wave on digital input 0 shows the loss of whole scans."""
     printing: OutputFormat | None = None
-    """What a board prints; None for volts in lines."""
+    """Output format of a board, None for volts in lines."""
 
 
 @dataclass(frozen=True)
 class SensorDataLocation:
-    """Where a device keeps the data of its sensors, in the words by which a person finds them there."""
+    """Location of the sensor data in a device, in the words by which a person finds them there."""
 
     place: str
-    """The place, e.g. "the device's own channel data (INFO)"."""
+    """Location, e.g. "the device's own channel data (INFO)"."""
     sensitivity: str
     """Name of a sensitivity there."""
     skew: str
@@ -43,65 +44,75 @@ class SensorDataLocation:
 
 
 def accept_any_settings(settings: DeviceSettings) -> None:
-    """Take all settings."""
+    """Accept all settings."""
 
 
 def skip_serial_probe(_link: SerialLink) -> DeviceIdentity | None:
-    """Answer of a device that is on no serial port: nobody."""
+    """Probe no serial port: for a driver whose devices are on none.
+
+    Parameters
+    ----------
+    _link
+        Open serial link, not used.
+
+    Returns
+    -------
+    None
+        No device of this kind is on a serial port.
+    """
     return None
 
 
 @dataclass(frozen=True)
 class Driver:
-    """One kind of device. Its functions import what they need when they are called: a list of drivers costs nothing."""
+    """One kind of device. Its functions import what they need when called, so that a list of drivers costs nothing."""
 
     name: str
-    """Name, as in [daq] driver of machine.toml and in `lobewatch emulate MODAL_SHOP_NAME_PATTERN`."""
+    """Name, as in [daq] driver of machine.toml."""
     title: str
-    """Words for a device of this kind, e.g. "a TAPS/1 device"."""
+    """Noun phrase for a device of this kind, e.g. "a TAPS/1 device"."""
     open: Callable[[str, DeviceSettings], Device]
-    """Function that connects to a device on a port; DeviceError where none is there, ValueError for settings that it
-    does not have."""
+    """Function that connects to a device on a port. DeviceError if there is none, ValueError for settings it does
+    not support.
+    """
     probe: Callable[[SerialLink], DeviceIdentity | None]
-    """Function that asks once who answers on an open link; None where no device of this kind does. `skip_serial_probe`
-    for devices that are on none."""
+    """Function that asks once who answers on an open link, None if no device of this kind does.
+    `skip_serial_probe` for devices on no serial port.
+    """
     check: Callable[[DeviceSettings], None] = accept_any_settings
-    """Function that raises ValueError for settings that no device of this kind has; its sensors are checked already."""
+    """Function that raises ValueError for settings that no device of this kind supports. Its sensors are checked
+    already.
+    """
     sensor_data: SensorDataLocation | None = None
-    """Place of the data of its sensors in the device; None: it has none, [[daq.channel]] must name them."""
+    """Location of the sensor data in the device, None if [[daq.channel]] must name the sensors."""
     usb_vendors: frozenset[int] = frozenset()
-    """USB vendors of such devices, to which no other question is put; none where they may be of any vendor, or of one
-    whose boards others build on too."""
+    """USB vendor ids that only such devices have. Only this driver probes them. Empty if any vendor is
+    possible, or the vendor also makes boards for others.
+    """
     emulate: Callable[[EmulationSetup], EmulatorThread] | None = None
-    """Function that makes a device of this kind of software."""
+    """Function that emulates a device of this kind."""
     emulates_fast: bool = False
     """Whether the emulated device can tell the host that its scans do not follow the clock."""
     search: Callable[[], Sequence[DeviceAddress]] | None = None
-    """Function that lists devices of this kind that are on no serial port; none where its library is not installed."""
+    """Function that lists devices of this kind that are on no serial port, none if its library is not installed."""
     prints_samples: bool = False
     """Whether such a device prints its samples, as [daq.printing] says."""
     is_hardware_tested: bool = True
-    """Whether somebody has reported that it works on hardware."""
+    """Whether a user has reported that it works on hardware."""
     extra: str = ""
-    """Name of the extra of lobewatch that brings the library it needs; empty where it needs none."""
+    """Name of the lobewatch extra that installs its library, empty if it needs none."""
 
 
 EMULATED_BOARD_RATE = 10_000.0
-"""Of an emulated board that prints lines (Hz)."""
+"""Sample rate of an emulated board that prints lines (Hz)."""
 EMULATED_CLOCK_FREQUENCY = 1000.0
-"""Of an emulated generator (Hz)."""
+"""Frequency of an emulated clock generator (Hz)."""
 
 
 def _open_taps(port: str, settings: DeviceSettings) -> Device:
     from acquisition.taps import TapsSource
 
     return TapsSource(port, settings.sample_rate)
-
-
-def _probe_taps(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.taps import probe_taps
-
-    return probe_taps(link)
 
 
 def _check_taps(settings: DeviceSettings) -> None:
@@ -111,12 +122,12 @@ def _check_taps(settings: DeviceSettings) -> None:
         raise ValueError("digital_clock=true: a TAPS/1 device numbers its scans and needs no clock; leave the key out")
 
 
-def _emulate_taps(bench: EmulationSetup) -> EmulatorThread:
+def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.taps import TapsEmulator
 
-    channels = tuple(sensor.channel for sensor in bench.inputs)
-    signal = bench.signal_at(bench.sample_rate)
-    return TapsEmulator(signal, channels, bench.sample_rate, realtime=bench.realtime, tcp=bench.tcp)
+    channels = tuple(sensor.channel for sensor in setup.inputs)
+    signal = setup.signal_at(setup.sample_rate)
+    return TapsEmulator(signal, channels, setup.sample_rate, realtime=setup.realtime, tcp=setup.tcp)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
@@ -127,12 +138,6 @@ def _open_dataq(port: str, settings: DeviceSettings) -> Device:
     )
 
 
-def _probe_dataq(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.dataq import probe_dataq
-
-    return probe_dataq(link)
-
-
 def _check_dataq(settings: DeviceSettings) -> None:
     from acquisition.dataq import check_inputs
 
@@ -141,13 +146,13 @@ def _check_dataq(settings: DeviceSettings) -> None:
         raise ValueError("digital_clock=true: the clock stands in the digital word; leave out loss_detection=false")
 
 
-def _emulate_dataq(bench: EmulationSetup) -> EmulatorThread:
-    """Where a skew is given for an input, the device converts its inputs one after the other."""
+def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
+    """Emulate a DATAQ device. If an input has a skew, the device converts its inputs one after the other."""
     from acquisition.dataq import DataqEmulator, DataqTraits
 
-    skewed = any(sensor.channel.skew for sensor in bench.inputs)
-    traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if bench.digital_clock else None)
-    return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
+    skewed = any(sensor.channel.skew for sensor in setup.inputs)
+    traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if setup.digital_clock else None)
+    return DataqEmulator(setup.signal_at, setup.inputs, realtime=setup.realtime, tcp=setup.tcp, traits=traits)
 
 
 def _open_text_board(port: str, settings: DeviceSettings) -> Device:
@@ -156,45 +161,38 @@ def _open_text_board(port: str, settings: DeviceSettings) -> Device:
     return TextBoardSource(port, settings.inputs, settings.sample_rate, settings.printing)
 
 
-def _probe_text_board(link: SerialLink) -> DeviceIdentity | None:
-    from acquisition.text_boards import probe_text_board
-
-    return probe_text_board(link)
-
-
 def _check_text_board(settings: DeviceSettings) -> None:
     from acquisition.text_boards import check_text_board
 
     check_text_board(settings.inputs, settings.sample_rate)
 
 
-def _emulate_text_board(bench: EmulationSetup) -> EmulatorThread:
+def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.text_boards import TextBoardEmulator
 
-    channels = [sensor.channel for sensor in bench.inputs]
+    channels = [sensor.channel for sensor in setup.inputs]
     sensitivities = tuple(channel.sensitivity for channel in channels)
-    rate, full_scale = min(bench.sample_rate, EMULATED_BOARD_RATE), channels[0].full_scale
+    rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), channels[0].full_scale
     return TextBoardEmulator(
-        bench.signal_at(rate), sensitivities, full_scale, rate, realtime=bench.realtime, tcp=bench.tcp
+        setup.signal_at(rate), sensitivities, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp
     )
 
 
-def _make_library_driver(name: str, title: str, extra: str) -> Driver:
-    """A kind of device that a library of its maker reads."""
+def _import_when_called(module: str, function: str) -> Callable[..., Any]:
+    """Return a function that imports the named function when it is called."""
+    return lambda *arguments: getattr(import_module(module), function)(*arguments)
+
+
+def _make_library_driver(name: str, title: str) -> Driver:
+    """Make the driver of a device that a vendor library reads. The extra that installs it has the driver's name."""
 
     def open_device(port: str, settings: DeviceSettings) -> Device:
-        from acquisition import vendor_drivers as makers
-
-        opened: Device = getattr(makers, f"open_{name}")(port, settings.inputs, settings.sample_rate)
+        opened: Device = open_with_library(port, settings.inputs, settings.sample_rate)
         return opened
 
-    def search() -> Sequence[DeviceAddress]:
-        from acquisition import vendor_drivers as makers
-
-        listed: Sequence[DeviceAddress] = getattr(makers, f"search_{name}")()
-        return listed
-
-    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=extra)
+    open_with_library = _import_when_called("acquisition.vendor_drivers", f"open_{name}")
+    search = _import_when_called("acquisition.vendor_drivers", f"search_{name}")
+    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=name)
 
 
 BUILT_IN_DRIVERS = (
@@ -202,7 +200,7 @@ BUILT_IN_DRIVERS = (
         "taps",
         "a TAPS/1 device",
         _open_taps,
-        _probe_taps,
+        _import_when_called("acquisition.taps", "probe_taps"),
         _check_taps,
         SensorDataLocation("the device's own channel data (INFO)", "sens_V_per_EU", "skew_s"),
         emulate=_emulate_taps,
@@ -212,7 +210,7 @@ BUILT_IN_DRIVERS = (
         "dataq",
         "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B",
         _open_dataq,
-        _probe_dataq,
+        _import_when_called("acquisition.dataq", "probe_dataq"),
         _check_dataq,
         usb_vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
@@ -221,16 +219,16 @@ BUILT_IN_DRIVERS = (
         "lines",
         "a board that prints lines of numbers",
         _open_text_board,
-        _probe_text_board,
+        _import_when_called("acquisition.text_boards", "probe_text_board"),
         _check_text_board,
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,
     ),
-    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39", "audio"),
-    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230", "nidaqmx"),
-    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi", "mcc172"),
-    _make_library_driver("uldaq", "a Measurement Computing USB device", "uldaq"),
-    _make_library_driver("ljm", "a LabJack T7 or T8", "ljm"),
+    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39"),
+    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230"),
+    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi"),
+    _make_library_driver("uldaq", "a Measurement Computing USB device"),
+    _make_library_driver("ljm", "a LabJack T7 or T8"),
 )
-"""In the order in which they are asked for."""
+"""Built-in drivers, in the order in which they probe."""

@@ -15,24 +15,44 @@ from acquisition.source import DeviceAddress, DeviceIdentity
 
 @dataclass(frozen=True)
 class DeviceAnswer:
-    """Who answers."""
+    """Device that answers on a port."""
 
     driver: str
     """Name of the driver, as in [daq] of machine.toml."""
     identity: DeviceIdentity
     """Model, serial number and firmware."""
     is_hardware_tested: bool = True
-    """Whether somebody has reported that the driver works on hardware."""
+    """Whether a user has reported that the driver works on hardware."""
 
 
 def probe_port(
     port: str, drivers: Sequence[Driver], vendor: int | None = None, remarks: list[Remark] | None = None
 ) -> DeviceAnswer | None:
-    """Who answers on a port; None where nobody known does. DeviceError where it cannot be opened.
+    """Find the device that answers on a port.
 
-    Strange devices are spared: each question is put once, and only that which the USB vendor suggests; a port without
-    one (vendor None: a pseudo-terminal, socket://) gets all. A driver that fails or does not come back is passed over,
-    with a remark that is added to `remarks`.
+    Unknown devices are spared: each driver that fits the USB vendor asks once. A port without a vendor (a
+    pseudo-terminal, socket://) is probed by all drivers.
+
+    Parameters
+    ----------
+    port
+        Port to open.
+    drivers
+        Drivers that may probe, in order.
+    vendor
+        USB vendor id of the port, None if it has none.
+    remarks
+        List to which a remark is added for each driver that fails or hangs.
+
+    Returns
+    -------
+    DeviceAnswer or None
+        Device that answers, None if no known one does.
+
+    Raises
+    ------
+    DeviceError
+        The port cannot be opened.
     """
     link = SerialLink(port)
     try:
@@ -51,7 +71,7 @@ def probe_port(
 
 
 def _query_port(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | None:
-    """What a driver says of a port: who answers, nobody, or why it cannot be believed."""
+    """Return who answers a driver on a port, None for nobody, or a remark on a driver that fails."""
     about = f"who is on {link.port}"
     answer = query_driver(driver.name, lambda: driver.probe(link), about)
     if answer is None or isinstance(answer, Remark) or is_device_identity(answer):
@@ -61,7 +81,7 @@ def _query_port(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | N
 
 
 def is_device_identity(answer: object) -> bool:
-    """Whether an answer is a DeviceIdentity of texts."""
+    """Return whether an answer is a DeviceIdentity of texts."""
     return isinstance(answer, DeviceIdentity) and all(isinstance(word, str) for word in vars(answer).values())
 
 
@@ -76,7 +96,20 @@ SEARCH_QUESTION = "which devices there are"
 
 
 def search_devices(driver: Driver, remarks: list[Remark]) -> list[DeviceAddress]:
-    """What a driver lists; nothing where it has no search, or fails at it, with a remark that is added to `remarks`."""
+    """List the devices of a driver that are on no serial port.
+
+    Parameters
+    ----------
+    driver
+        Driver to query.
+    remarks
+        List to which a remark is added if the driver fails.
+
+    Returns
+    -------
+    list of DeviceAddress
+        Devices, empty if the driver has no search or fails.
+    """
     if driver.search is None:
         return []
     search = driver.search
@@ -93,7 +126,7 @@ def search_devices(driver: Driver, remarks: list[Remark]) -> list[DeviceAddress]
 
 
 def _is_valid_address(driver: Driver, device: object) -> bool:
-    """Whether it is an address by which the driver would be found again."""
+    """Return whether this is an address by which the driver finds its device again."""
     return (
         isinstance(device, DeviceAddress)
         and isinstance(device.address, str)
@@ -104,30 +137,41 @@ def _is_valid_address(driver: Driver, device: object) -> bool:
 
 @dataclass(frozen=True)
 class ScannedPort:
-    """A port, or the address of a device on none, and what came of asking there."""
+    """Result of probing one port, or one address of a device on no port."""
 
     port: PortInfo
-    """Port, as the system knows it."""
+    """Port, as the system describes it."""
     answer: DeviceAnswer | None = None
-    """Answer of the device there; None for nobody."""
+    """Device that answers, None for none."""
     text: str = ""
-    """Reason why nobody answers, in a few words."""
+    """Reason why none answers, in a few words."""
     problem: str = ""
-    """Reason why it could not be asked, a sentence with the cure."""
+    """Reason why the port could not be probed, a sentence with the remedy."""
 
 
 @dataclass(frozen=True)
 class PortScan:
-    """All ports that were looked at."""
+    """Result of a scan of all ports."""
 
     ports: tuple[ScannedPort, ...]
-    """Ports, and what came of asking at each."""
+    """Scanned ports and their results."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on drivers that cannot be loaded, or fail when they are asked."""
+    """Remarks on drivers that cannot be loaded or that fail."""
 
 
 def scan_ports(only: str = "") -> PortScan:
-    """Ask on every USB port and look for devices on no port, or ask only at this address, whatever it is."""
+    """Probe every USB port and search for devices on no port.
+
+    Parameters
+    ----------
+    only
+        Address to probe instead, whatever it is.
+
+    Returns
+    -------
+    PortScan
+        Results, and remarks on drivers that fail.
+    """
     drivers, not_loaded = load_drivers()
     remarks = [*not_loaded]
     searching = [driver for driver in drivers if driver.search and (not only or only.startswith(f"{driver.name}:"))]

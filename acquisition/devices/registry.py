@@ -13,18 +13,41 @@ from acquisition.errors import DataError, DeviceError, Remark
 from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
 
 DRIVER_ENTRY_POINTS = "lobewatch.drivers"
-"""Entry points of this group name a Driver each; the name is that of the driver."""
+"""Entry point group. Each entry point names a Driver by the driver's name."""
 
 
 def list_driver_names() -> tuple[str, ...]:
-    """Names of all drivers that are installed, ours first; nothing is loaded."""
+    """List the names of all installed drivers, built-in ones first. Nothing is loaded.
+
+    Returns
+    -------
+    tuple of str
+        Driver names.
+    """
     ours = [driver.name for driver in BUILT_IN_DRIVERS]
     return (*ours, *sorted({point.name for point in entry_points(group=DRIVER_ENTRY_POINTS)}.difference(ours)))
 
 
 def find_driver(name: str) -> Driver:
-    """The driver of this name; DataError where there is none, or where its package cannot be loaded.
+    """Find a driver by name.
 
+    Parameters
+    ----------
+    name
+        Name, as in [daq] driver of machine.toml.
+
+    Returns
+    -------
+    Driver
+        Built-in driver, or that of another package.
+
+    Raises
+    ------
+    DataError
+        There is no such driver, or its package cannot be loaded.
+
+    Examples
+    --------
     >>> find_driver("taps").title
     'a TAPS/1 device'
     >>> find_driver("tap")
@@ -39,20 +62,43 @@ def find_driver(name: str) -> Driver:
 
 
 def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
-    """All drivers, and a remark on each that cannot be loaded."""
+    """Load all drivers.
+
+    Returns
+    -------
+    drivers : tuple of Driver
+        Drivers that can be used.
+    remarks : tuple of Remark
+        One remark for each driver that cannot be loaded.
+    """
     loaded = [_load_driver(name) for name in list_driver_names()]
     drivers = tuple(entry for entry in loaded if isinstance(entry, Driver))
     return drivers, tuple(entry for entry in loaded if isinstance(entry, Remark))
 
 
 def driver_failure_remark(name: str, text: str) -> Remark:
-    """The remark on a driver whose package fails when it is asked."""
+    """Return the remark on a driver whose package fails."""
     return make_unusable_remark(Driver, name, f"the package {_find_package(name)} {text}")
 
 
 @contextmanager
 def convert_driver_errors(name: str, doing: str, kind: type[DeviceError | DataError] = DeviceError) -> Iterator[None]:
-    """Where a driver of another package is called: what it may not raise becomes such an error, with its name."""
+    """Convert unexpected exceptions of a driver of another package to an error that names it.
+
+    Parameters
+    ----------
+    name
+        Name of the driver.
+    doing
+        What the driver is called for, e.g. "opening COM3".
+    kind
+        Exception to raise.
+
+    Returns
+    -------
+    context manager
+        Context in which the driver is called. OSError and ValueError pass unchanged.
+    """
     try:
         yield
     except (OSError, ValueError):
@@ -62,7 +108,7 @@ def convert_driver_errors(name: str, doing: str, kind: type[DeviceError | DataEr
 
 
 def _find_package(name: str) -> str:
-    """The package that brings a driver."""
+    """Return the package that brings a driver."""
     return " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
 
 
@@ -81,13 +127,14 @@ def _load_driver(name: str) -> Driver | Remark:
 
 
 DRIVER_ANSWER_TIMEOUT = 10.0
-"""Time within which a driver has said who is there (s), three times what ours take; chosen."""
+"""Time limit for the answer of a driver (s), three times what the built-in ones take, chosen."""
 
 
 def query_driver(name: str, question: Callable[[], object], about: str) -> object:
-    """What a driver answers; None for a DeviceError (unplugged while it was asked), a Remark where it fails or hangs.
+    """Query a driver in a thread, so that a failing or hanging driver stops nothing else.
 
-    about: what it is asked, e.g. "who is on COM3".
+    Returns the answer, None for a DeviceError (unplugged meanwhile), or a Remark if the driver fails or hangs. about:
+    what it is asked, e.g. "who is on COM3".
     """
     answers = queue.SimpleQueue[object]()
 
@@ -110,7 +157,22 @@ def query_driver(name: str, question: Callable[[], object], about: str) -> objec
 
 
 def check_settings(driver: Driver, settings: DeviceSettings) -> None:
-    """ValueError for sensors that are not asked for or make no tap test, and for what the driver itself refuses."""
+    """Check whether settings fit a driver.
+
+    Parameters
+    ----------
+    driver
+        Driver of the device.
+    settings
+        Settings to check.
+
+    Raises
+    ------
+    ValueError
+        Sensors are missing, not expected or unfit for a tap test, or the driver rejects the settings.
+    DataError
+        The package of the driver fails.
+    """
     if driver.sensor_data is None:
         _check_sensors(driver, settings)
     elif settings.inputs:

@@ -16,24 +16,52 @@ from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DataError
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
-SignalFunction = Callable[[int, int], NDArray[np.float64]]
-"""(first_scan, n_scans) -> values in N and m/s^2, shape (n_channels, n_scans)."""
+SignalFunction = Callable[[int, int], Floats]
+"""Function (first_scan, n_scans) that returns values in N and m/s^2, shape (n_channels, n_scans)."""
 
 
-def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDArray[np.int32]:
-    """ADC codes (n_channels, n) of values in N and m/s^2."""
+def quantise(signal: Floats, channels: tuple[Channel, ...]) -> Codes:
+    """Convert values to ADC codes.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n_channels, n)
+        Values in N and m/s^2.
+    channels
+        Channel of each row.
+
+    Returns
+    -------
+    ndarray, shape (n_channels, n)
+        ADC codes.
+    """
     return np.stack([channel.encode(values) for channel, values in zip(channels, signal, strict=True)])
 
 
-class SimulatedSource:
-    """Scans of a signal function, as fast as they are asked for.
+class SimulatedSource(ClosedOnExit):
+    """Source of the scans of a signal function, as fast as they are read. For unit tests.
 
+    Parameters
+    ----------
+    signal
+        Function (first_scan, n_scans) that returns values in N and m/s^2, shape (n_channels, n_scans).
+    channels
+        Channels of the source.
+    sample_rate
+        Sample rate (Hz).
+    n_scans
+        Length of the stream (scans).
+    block
+        Length of a block (scans).
+
+    Examples
+    --------
     >>> sensors = (Channel("force", 2.25e-3, 5.0),)
     >>> quiet = SimulatedSource(lambda first, n: np.zeros((1, n)), sensors, 10240.0, n_scans=1000)
     >>> [block.codes.shape for block in quiet.blocks()]  # channels, scans
@@ -41,57 +69,39 @@ class SimulatedSource:
     """
 
     identity = DeviceIdentity("simulation")
-    """What it says it is."""
+    """Identity that it reports."""
     follows_clock = False
-    """Its scans come as fast as they are asked for."""
+    """Whether its scans follow the clock. They come as fast as they are read."""
     loss_detection = ""
-    """No scans can be lost."""
+    """Empty: no scans can be lost."""
 
     def __init__(
-        self,
-        signal: SignalFunction,
-        channels: tuple[Channel, ...],
-        sample_rate: float,
-        n_scans: int,
-        block: int = 512,
+        self, signal: SignalFunction, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
     ) -> None:
-        """A stream of n_scans scans of (first_scan, n) -> N and m/s^2, shape (n_channels, n), cut into blocks."""
         self.channels = channels
-        """What is on each input."""
+        """Channel of each input."""
         self.sample_rate = sample_rate
-        """Scans a second (Hz)."""
+        """Sample rate (Hz)."""
         self.events: deque[Event] = deque()
-        """Put in what shall happen."""
+        """Events, to be added by the test."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
-
-    def __enter__(self) -> Self:
-        """The source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End it."""
-        self.close()
 
     @property
     def fault(self) -> str:
-        """Nothing is ever wrong."""
+        """Empty: the source has no faults."""
         return ""
 
     def start(self) -> None:
-        """Nothing to prepare."""
+        """Start: nothing to prepare."""
 
     def stop(self) -> None:
         """End at the next block."""
         self._n_scans = 0
 
     def close(self) -> None:
-        """End at the next block."""
         self.stop()
 
     def blocks(self) -> Iterator[Block]:
-        """The blocks."""
         first = 0
         while first < self._n_scans:
             yield Block(first, quantise(self._signal(first, self._block), self.channels))
@@ -100,16 +110,16 @@ class SimulatedSource:
 
 @dataclass(frozen=True)
 class EmulationSetup:
-    """What is on the inputs of an emulated device, and how it is to be served."""
+    """Signals of an emulated device and the way it is served."""
 
     signal_at: Callable[[float], SignalFunction]
-    """Function that makes, for a sample rate (Hz), the signal that the sensors feel."""
+    """Function that returns, for a sample rate (Hz), the signal function of the sensors."""
     inputs: tuple[SensorInput, ...]
-    """The sensors, in the order of the signal's rows."""
+    """Sensors, in the order of the signal's rows."""
     sample_rate: float
     """Sample rate of a device that has only one (Hz)."""
     realtime: bool = True
-    """Whether it sends by the clock; False sends as fast as the host reads."""
+    """Whether it sends by the clock. False sends as fast as the host reads."""
     tcp: bool = False
     """Whether it serves a TCP port of this computer instead of a pseudo-terminal."""
     digital_clock: bool = False
@@ -117,15 +127,21 @@ class EmulationSetup:
 
 
 class Wire(Protocol):
-    """Bytes both ways."""
+    """Emulator's end of the cable, without blocking."""
 
     port: str
     """Port that the host opens."""
     pending: bytearray
-    """Bytes that wait to be sent."""
+    """Bytes waiting to be sent."""
 
     def exchange(self, timeout: float) -> bytes:
-        """Send what fits of `pending` and return what has come, after at most timeout (s)."""
+        """Send what fits of `pending` and return what has arrived.
+
+        Parameters
+        ----------
+        timeout
+            Longest time to wait (s).
+        """
         ...
 
     def close(self) -> None:
@@ -134,20 +150,31 @@ class Wire(Protocol):
 
 
 class PtyWire:
-    """A pseudo-terminal in raw mode."""
+    """Pseudo-terminal in raw mode.
+
+    The host's end stays open here too, so that a host may come and go.
+
+    Parameters
+    ----------
+    link
+        Path that is made to lead to the pseudo-terminal.
+
+    Raises
+    ------
+    DataError
+        The system has no pseudo-terminal.
+    """
 
     def __init__(self, link: Path | None = None) -> None:
-        """Open it, and make link lead to it; the host's end stays open here too, so that a host may come and go.
-
-        DataError where there is none.
-        """
         import pty
         import tty
 
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            raise DataError(f"no pseudo-terminal can be had here ({error}); go through TCP, with --tcp") from error
+            raise DataError(
+                f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
+            ) from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -158,7 +185,13 @@ class PtyWire:
             link.symlink_to(self.port)
 
     def exchange(self, timeout: float) -> bytes:
-        """See Wire."""
+        """Send what fits of `pending` and return what has arrived.
+
+        Parameters
+        ----------
+        timeout
+            Longest time to wait (s).
+        """
         sending = [self._master] if self.pending else []
         readable, writable, _ = select.select([self._master], sending, [], timeout)
         with contextlib.suppress(BlockingIOError):  # the host may flush between select and here
@@ -169,16 +202,22 @@ class PtyWire:
         return b""
 
     def close(self) -> None:
-        """See Wire."""
         while self._open:  # each once: the numbers of closed files are given to others
             os.close(self._open.pop())
 
 
 class TcpWire:
-    """A listening socket; one host at a time."""
+    """Listening socket for one host at a time.
+
+    Parameters
+    ----------
+    number
+        TCP port number, 0 for a free one.
+    address
+        Address of this computer to listen at.
+    """
 
     def __init__(self, number: int = 0, address: str = "127.0.0.1") -> None:
-        """Listen on this port, 0 for a free one, at an address of this computer."""
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         self._listener = socket.create_server((address, number), family=family)
         self._host: socket.socket | None = None
@@ -188,11 +227,17 @@ class TcpWire:
 
     @property
     def has_host(self) -> bool:
-        """Whether one is connected."""
+        """Whether a host is connected."""
         return self._host is not None
 
     def exchange(self, timeout: float) -> bytes:
-        """See Wire."""
+        """Send what fits of `pending` and return what has arrived.
+
+        Parameters
+        ----------
+        timeout
+            Longest time to wait (s).
+        """
         if self._host is None:
             return self._accept(timeout)
         sending = [self._host] if self.pending else []
@@ -208,7 +253,6 @@ class TcpWire:
         return data or b""
 
     def close(self) -> None:
-        """See Wire."""
         self._hang_up()
         self._listener.close()
 
@@ -226,13 +270,20 @@ class TcpWire:
 
 
 class EmulatorThread(ABC):
-    """A context manager; while it lasts `serve_once` is called over and over."""
+    """Thread that serves one end of a wire, whose other end opens like a real port. A context manager.
+
+    Parameters
+    ----------
+    tcp
+        Whether to listen on loopback instead of a pseudo-terminal.
+    link
+        Path that always leads to the pseudo-terminal.
+    """
 
     def __init__(self, tcp: bool, link: Path | None = None) -> None:
-        """tcp listens on loopback instead of a pseudo-terminal; link: a name that always leads to that."""
         self._tcp, self._link = tcp or os.name == "nt", link
         self.port = ""
-        """What the host opens."""
+        """Port that the host opens."""
         self.plug_in()
 
     def __enter__(self) -> Self:
@@ -243,11 +294,10 @@ class EmulatorThread(ABC):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Hang up."""
         self.unplug()
 
     def plug_in(self) -> None:
-        """A new wire that nobody serves yet: with tcp on the same port as before, if there was one."""
+        """Make a wire that nothing serves yet. With TCP it keeps the port of an earlier one."""
         self.wire: Wire = TcpWire(int(self.port.rpartition(":")[2] or 0)) if self._tcp else PtyWire(self._link)
         self.port = self.wire.port
         self._stopping = False
@@ -255,11 +305,10 @@ class EmulatorThread(ABC):
         self._thread = threading.Thread(target=self._serve, name=type(self).__name__, daemon=True)
 
     def serve(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def unplug(self) -> None:
-        """Pull the cable: the host's port fails, whatever it was doing."""
+        """Pull the cable: the host's port fails."""
         self._stopping = True
         self._thread.join(timeout=5.0)
         self.wire.close()
@@ -271,7 +320,7 @@ class EmulatorThread(ABC):
 
     @abstractmethod
     def serve_once(self) -> bool:
-        """Answer what has come and send what is due; False to hang up."""
+        """Answer what has arrived and send what is due. Return False to hang up."""
 
     def _serve(self) -> None:
         try:

@@ -1,8 +1,8 @@
-"""What hammer and accelerometer would give on a structure of known modes, exact in continuous time.
+"""Signals of hammer and accelerometer on a structure of known modes, exact in continuous time.
 
-One pulse is F(t) = A sin^4(pi t/T), 0 <= t <= T: a sum of three cosines, so that the response of every mode is
-known in closed form (a forced part and a free one while the pulse lasts, a free one after it) and no integration
-error stands between the truth and the samples. What the modes leave out is a static residual flexibility.
+A pulse is F(t) = A sin^4(pi t/T), 0 <= t <= T: a sum of three cosines. The response of each mode is known in closed
+form: a forced and a free part during the pulse, a free part after it. Hence the samples contain no integration error.
+A static residual flexibility represents the modes left out.
 """
 
 from __future__ import annotations
@@ -14,16 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
+
 NOISE_BLOCK_SCANS = 512
-"""Scans whose noise is drawn at once: blocks of any multiple of so many have the same noise."""
+"""Scans whose noise is generated at once. Blocks of any multiple of them have the same noise."""
 _PULSE_HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
 """sin^4(pi t/T) = 3/8 - 1/2 cos(2 pi t/T) + 1/8 cos(4 pi t/T)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Dynamics from where a hammer hits to where a sensor sits: modes with viscous damping and a static residual.
+    """Dynamics from the hammer's point to the sensor: modes with viscous damping and a static residual.
 
+    Examples
+    --------
     >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> time = np.arange(4096) / 10240.0
     >>> response = spindle.response(time, width=1e-3)  # m/s^2 after a pulse of 1 N
@@ -31,17 +35,30 @@ class Structure:
     True
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Undamped natural frequencies (Hz), shape (n,)."""
-    damping_ratio: NDArray[np.float64]
+    damping_ratio: Floats
     """Viscous damping ratios (-), shape (n,)."""
-    stiffness: NDArray[np.float64]
-    """Modal stiffnesses from hammer to sensor (N/m), shape (n,); negative where these move against each other."""
+    stiffness: Floats
+    """Modal stiffnesses from hammer to sensor (N/m), shape (n,). Negative if both move in opposite directions."""
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 
-    def response(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
-        """Acceleration (m/s^2) at times (n,) in s after the start of a pulse sin^4(pi t/T) of 1 N, T its width (s)."""
+    def response(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
+        """Return the acceleration after a pulse sin^4(pi t/T) of 1 N.
+
+        Parameters
+        ----------
+        time : ndarray, shape (n,)
+            Times after the start of the pulse (s).
+        width
+            Foot width T of the pulse (s).
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Acceleration (m/s^2).
+        """
         w = 2 * np.pi * self.frequency
         nu = 2 * np.pi / width * np.arange(3)
         decay = self.damping_ratio * w
@@ -64,60 +81,58 @@ class Structure:
         return result
 
 
-def _free_amplitude(
-    displacement: NDArray[np.float64], velocity: NDArray[np.float64], root: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
-    """C such that Re(C exp(root t)) has this displacement and velocity at t = 0, shape (n,)."""
+def _free_amplitude(displacement: Floats, velocity: Floats, root: Complexes) -> Complexes:
+    """Return C such that Re(C exp(root t)) has this displacement and velocity at t = 0, shape (n,)."""
     return displacement + 1j * (root.real * displacement - velocity) / root.imag
 
 
 @dataclass(frozen=True)
 class Hammering:
-    """How somebody taps."""
+    """Impacts of an emulated operator."""
 
     force_range: tuple[float, float] = (150.0, 350.0)
-    """Peak force (N)."""
+    """Range of the peak force (N)."""
     width_range: tuple[float, float] = (0.55e-3, 0.75e-3)
-    """Foot width of the pulse (s)."""
+    """Range of the foot width of the pulse (s)."""
     interval_range: tuple[float, float] = (0.4, 0.5)
-    """Time between hits (s)."""
+    """Range of the time between impacts (s)."""
     double_hits: float = 0.05
-    """Share of hits with a second touch."""
+    """Share of double hits."""
     overloads: float = 0.05
-    """Share of hits far too hard."""
+    """Share of impacts that are far too hard."""
     force_noise: float = 0.1
-    """rms (N)."""
+    """Noise of the force (N rms)."""
     response_noise: float = 2.0
-    """rms (m/s^2)."""
+    """Noise of the acceleration (m/s^2 rms)."""
 
 
 @dataclass(eq=False)
 class HammeredStructure:
-    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n); call it in order.
+    """Signal function (first_scan, n_scans) of a structure that is hit. Call it in order.
 
-    With more sensors there are as many more rows of acceleration.
+    It returns force (N) and acceleration (m/s^2), shape (2, n_scans), with one more row per cross structure.
     """
 
     structure: Structure
     """Structure that is hit."""
     sample_rate: float
-    """Samples a second (Hz)."""
+    """Sample rate (Hz)."""
     random: np.random.Generator
-    """Source of every random number."""
+    """Generator of all random numbers."""
     hammering: Hammering = field(default_factory=Hammering)
-    """Way in which it is hit."""
+    """Impacts."""
     cross_structures: Sequence[Structure] = ()
-    """What further sensors feel of the same blows: modes from the hammer to each of them."""
+    """Modes from the hammer to each further sensor."""
     _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
-    _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)
+    _waves: list[tuple[int, Floats]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        """Noise has a generator of its own, so that hits do not depend on how the stream is cut into blocks."""
+        """Give the noise its own generator, so that hits do not depend on the block length."""
         self._noise = self.random.spawn(1)[0]
 
-    def __call__(self, first_scan: int, n_scans: int) -> NDArray[np.float64]:
-        """The next n_scans scans."""
+    def __call__(self, first_scan: int, n_scans: int) -> Floats:
+        """Return the next scans."""
         while self._next_hit < first_scan + n_scans:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
             self._waves.append(self._hit(self._next_hit))
@@ -129,14 +144,14 @@ class HammeredStructure:
                 signals[:, low - first_scan : high - first_scan] += wave[:, low - start : high - start]
         return signals
 
-    def _noise_of(self, n_scans: int) -> NDArray[np.float64]:
+    def _noise_of(self, n_scans: int) -> Floats:
         rms = [self.hammering.force_noise, *[self.hammering.response_noise] * (1 + len(self.cross_structures))]
         pieces, rest = divmod(n_scans, NOISE_BLOCK_SCANS)
         whole = self._noise.standard_normal((pieces, len(rms), NOISE_BLOCK_SCANS))
         drawn = np.concatenate([*whole, self._noise.standard_normal((len(rms), rest))], axis=1)
         return np.asarray(np.array(rms)[:, np.newaxis] * drawn)
 
-    def _hit(self, scan: float) -> tuple[int, NDArray[np.float64]]:
+    def _hit(self, scan: float) -> tuple[int, Floats]:
         peak = self.random.uniform(*self.hammering.force_range)
         width = self.random.uniform(*self.hammering.width_range)
         fault = self.random.uniform()
@@ -151,11 +166,11 @@ class HammeredStructure:
         return start, wave
 
     def _length(self, width: float) -> int:
-        """Samples until the slowest mode has fallen to a millionth."""
+        """Return the samples until the slowest mode has decayed to a millionth."""
         felt = (self.structure, *self.cross_structures)
         slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in felt)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
-    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
+    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         return np.stack([force, *(felt.response(time, width) for felt in (self.structure, *self.cross_structures))])

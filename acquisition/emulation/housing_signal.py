@@ -9,48 +9,68 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.milling import TipMotion
 
-Floats = NDArray[np.float64]
-
 SENSOR_MOUNT_FREQUENCY = 20e3
-"""Above this frequency (Hz) the sensor, glued or on a magnet, hears less and less (12 dB an octave)."""
+"""Frequency above which the sensor mount attenuates by 12 dB per octave (Hz)."""
 IDLE_HAMMER_NOISE = 0.1
-"""rms of a hammer that lies idle (N)."""
+"""Noise of an idle hammer (N rms)."""
 HOUSING_OVERSAMPLING = 4
-"""How much finer the motion is laid out before samples are taken from it."""
+"""Oversampling of the motion before samples are taken from it."""
 FFT_LENGTH_STEP = 4096
-"""The motion is filled up to a multiple of so many samples: a length with a large prime factor is slow."""
+"""Length step to which the motion is padded. A length with a large prime factor is slow."""
 
 
 @dataclass(frozen=True, eq=False)
 class Housing:
-    """The way from tool tip to sensor, and what else is heard there."""
+    """Transfer path from tool tip to sensor, with the disturbances there."""
 
     gain: tuple[float, float]
-    """Acceleration of the housing over that of the tip along x and y, away from the modes of the housing."""
+    """Acceleration of the housing over that of the tip along x and y, away from the housing modes."""
     modes: tuple[tuple[float, float, float], ...] = ()
-    """Modes of the housing: frequency (Hz), damping ratio, and share of the gain that it adds at low frequency."""
+    """Housing modes: frequency (Hz), damping ratio, and share of the gain added at low frequency."""
     tones: tuple[tuple[float, float], ...] = ()
-    """Frequency (Hz) and amplitude (m/s^2) of what sounds whether it cuts or not: pump, bearing, mains."""
+    """Frequency (Hz) and amplitude (m/s^2) of constant tones: pump, bearing, mains."""
     unbalance: float = 0.0
     """Amplitude at the frequency of the spindle (m/s^2)."""
     noise: float = 0.0
-    """rms of the sensor and its cable (m/s^2)."""
+    """Noise of the sensor and its cable (m/s^2 rms)."""
 
-    def transfer(self, frequency: NDArray[np.floating[Any]]) -> NDArray[np.complex128]:
-        """Acceleration heard over acceleration of a tip, for a gain of 1, at frequencies (Hz), shape (n,)."""
+    def transfer(self, frequency: NDArray[np.floating[Any]]) -> Complexes:
+        """Return the transfer function from tip to sensor acceleration for a gain of 1.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (n,)
+            Frequencies (Hz).
+        """
         total = np.ones(frequency.shape, dtype=complex)
         for natural, zeta, share in self.modes:
             r = frequency / natural
             total += share / (1 - r**2 + 2j * zeta * r)
         r = frequency / SENSOR_MOUNT_FREQUENCY
-        heard: NDArray[np.complex128] = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
+        heard: Complexes = total / (1 - r**2 + 2j * np.sqrt(0.5) * r)
         return heard
 
 
 def make_random_housing(random: np.random.Generator, speed_rpm: float) -> Housing:
-    """A housing as machines have them: gain 0.02 to 0.3, two or three modes, pump, bearing and mains, unbalance."""
+    """Make a random housing of a typical machine.
+
+    The gain is 0.02 to 0.3, with two or three modes, tones of pump, bearing and mains, and unbalance.
+
+    Parameters
+    ----------
+    random
+        Generator of all random numbers.
+    speed_rpm
+        Spindle speed (rpm).
+
+    Returns
+    -------
+    Housing
+        Housing with its disturbances.
+    """
     gain = np.exp(random.uniform(np.log(0.02), np.log(0.3)))
     modes = random.uniform((300.0, 0.01, 0.05), (6000.0, 0.05, 0.5), (int(random.integers(2, 4)), 3))
     pump = random.uniform(200, 6000)
@@ -68,9 +88,27 @@ def make_random_housing(random: np.random.Generator, speed_rpm: float) -> Housin
 def sample_housing(
     motion: TipMotion, housing: Housing, speed_rpm: float, sample_rate: float, random: np.random.Generator
 ) -> Floats:
-    """Acceleration of the housing (m/s^2) in a passage as a device samples it at a rate (Hz), shape (n,).
+    """Sample the acceleration of the housing in one passage.
 
-    speed_rpm: the true one. The device has no filter: what lies above half the sample rate is folded below it.
+    The device has no filter: content above half the sample rate is folded below it.
+
+    Parameters
+    ----------
+    motion
+        Motion of the tool tip, from rest to rest.
+    housing
+        Housing that carries the sensor.
+    speed_rpm
+        True spindle speed (rpm).
+    sample_rate
+        Sample rate of the device (Hz).
+    random
+        Generator of all random numbers.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Acceleration (m/s^2).
     """
     sound = HousingSignal(motion, housing, speed_rpm, sample_rate, random)
     return np.asarray(sound(0, sound.n_scans)[1])
@@ -78,26 +116,25 @@ def sample_housing(
 
 @dataclass(eq=False)
 class HousingSignal:
-    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n), of a passage, repeated.
+    """Signal function (first_scan, n_scans) of a passage, repeated, with an idle hammer. Call it in order.
 
-    The hammer lies idle. Call it in order.
+    It returns force (N) and acceleration (m/s^2), shape (2, n_scans).
     """
 
     motion: TipMotion
     """Motion of the tip, from rest to rest."""
     housing: Housing
-    """Housing that the sensor is on."""
+    """Housing that carries the sensor."""
     speed_rpm: float
     """True spindle speed (rpm)."""
     sample_rate: float
-    """Samples a second (Hz); what lies above half of it is folded below it."""
+    """Sample rate (Hz). Content above half of it is folded below it."""
     random: np.random.Generator
-    """Source of every random number."""
+    """Generator of all random numbers."""
     _tip: Floats = field(init=False)
     _phases: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Lay out what comes from the tip."""
         fine = _housing_acceleration(self.motion, self.housing)
         time = np.arange(int(self.motion.acceleration.shape[1] * self.sample_rate / self.motion.sample_rate))
         self._tip = np.interp(
@@ -107,11 +144,11 @@ class HousingSignal:
 
     @property
     def n_scans(self) -> int:
-        """Of one passage."""
+        """Scans per passage."""
         return self._tip.size
 
     def __call__(self, first_scan: int, n_scans: int) -> Floats:
-        """The next n_scans scans."""
+        """Return the next scans."""
         scan = np.arange(first_scan, first_scan + n_scans)
         signals = self.random.normal(scale=[[IDLE_HAMMER_NOISE], [self.housing.noise]], size=(2, n_scans))
         signals[1] += self._tip[scan % self._tip.size]
@@ -122,7 +159,7 @@ class HousingSignal:
 
 
 def _housing_acceleration(motion: TipMotion, housing: Housing) -> Floats:
-    """Acceleration of the housing from the tip, FINER times as many samples."""
+    """Return the oversampled acceleration of the housing caused by the tip."""
     n = motion.acceleration.shape[1]
     long = math.ceil(n / FFT_LENGTH_STEP) * FFT_LENGTH_STEP
     spectrum = np.fft.rfft(np.array(housing.gain) @ motion.acceleration, long)

@@ -1,17 +1,17 @@
-"""Simulate milling in the time domain, with even or uneven tooth pitch.
+"""Simulate milling in the time domain, many cuts at once.
 
-As `acquisition.emulation.milling`, one cut at a time. A turn has a whole number of steps, and every pitch nearly so;
-the surface is kept by its angle, not by its time.
-
-    chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r how far the tooth stands out
+    chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r run-out of the tooth
     surface  u <- u - feed sin(phi) + max(h, 0): the furthest material that all earlier teeth have left at this angle
     force    F = -b (Kt (cos, -sin) + Kr (sin, cos)) max(h, 0) - b (Kte (cos, -sin) + Kre (sin, cos))
 
-q is the displacement of the tip along the feed and its normal. A tooth that leaves the cut and comes back finds what
-was left one, two or more tooth periods ago. Between steps the modes swing freely, which is exact; the force of a step
-acts as one impulse in its middle: second order, no damping of its own, in the frequency domain a residual flexibility
-of -(w dt)^2 / 12 K. The depth comes and goes as a factor of the force. Edges push wherever they are in the arc of cut:
-a force that ended with the chip would push the tooth out of a thin one, and move the limit of stability.
+q is the displacement of the tip along the feed and its normal. A tooth that leaves the cut and comes back meets the
+surface left one, two or more tooth periods ago. Between steps the modes vibrate freely, which is exact. The force of a
+step acts as one impulse at its center: second order, no numerical damping, in the frequency domain a residual
+flexibility of -(w dt)^2 / 12 K. The depth ramps as a factor of the force. Edges push wherever they are in the arc of
+cut: a force that ended with the chip would push the tooth out of a thin one and move the stability limit.
+
+With uneven tooth pitch one cut is stepped at a time. A turn has a whole number of steps, and each pitch nearly so. The
+surface is stored by its angle, not by its time.
 
 Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation with run-out and loss of contact).
 """
@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.milling_cut import (
     MillingCut,
     ModeTables,
@@ -34,14 +35,12 @@ from acquisition.emulation.milling_cut import (
     count_steps_needed,
 )
 
-Floats = NDArray[np.float64]
-
 MAX_STEP_COUNT_FACTOR = 1.25
-"""Steps of a turn are up to this many times those needed, where pitches then are more nearly whole numbers of them."""
+"""Factor by which steps per turn may exceed those needed, to make pitches whole numbers of steps."""
 
 
 def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
-    """Tables of one tooth over a turn."""
+    """Build the tables of one tooth over a turn."""
     needed = count_steps_needed(cut) * cut.teeth
     number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
     steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
@@ -52,8 +51,11 @@ def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
 
 def simulate_uneven_cutting(
     cut: MillingCut, modes: ModeTables, tooth: ToothTables, passage: Passage
-) -> tuple[NDArray[np.complex128], Floats, NDArray[np.complex128]]:
-    """How modes swing after each step from first to last contact, what they gained in it (n, 1, m), and the last."""
+) -> tuple[Complexes, Floats, Complexes]:
+    """Simulate a cut with uneven pitch from first to last contact.
+
+    Returns the mode states after each step and their gains in it, both (n, 1, m), and the last state (m,).
+    """
     cells, step = len(tooth.root), float(modes.step[0])
     behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
     share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
@@ -79,34 +81,64 @@ def simulate_uneven_cutting(
 
 
 MAX_TOOTH_PERIOD_RATIO = 1.25
-"""Cuts are stepped together whose tooth periods differ by this factor at most ..."""
+"""Largest ratio of tooth periods in a group of cuts that are stepped together."""
 MAX_CUTS_PER_GROUP = 48
-"""... and no more than so many."""
+"""Most cuts that are stepped together."""
 COMPARED_TURNS = 8
-"""Turns of the spindle that are compared."""
+"""Spindle turns that are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class TipMotion:
-    """What a tool tip did in a passage through a part."""
+    """Motion of a tool tip in a passage through a part."""
 
     sample_rate: float
-    """Steps a second (Hz)."""
+    """Step rate (Hz)."""
     acceleration: Floats
     """Acceleration along x and y of the machine (m/s^2), shape (2, n)."""
     nonperiodic_share: float = 0.0
-    """Part of the motion that did not repeat from turn to turn late at full depth, as a share of the rms: 0 for a
-    stable cut, and for a flip of an even number of teeth. A cut above its limit may be stable where run-out keeps teeth
-    out of it."""
+    """Share of the rms that did not repeat from turn to turn late at full depth.
+
+    It is 0 for a stable cut, and for flip chatter with an even number of teeth. A cut above its limit may be stable if
+    run-out keeps teeth out of it.
+    """
 
 
 def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:
-    """What the tip does in one cut."""
+    """Simulate one cut.
+
+    Parameters
+    ----------
+    cut
+        Cut and machine.
+    passage
+        Times in air and in the cut, None for the defaults.
+
+    Returns
+    -------
+    TipMotion
+        Motion of the tool tip.
+    """
     return next(simulate_cuts([cut], passage))[1]
 
 
 def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) -> Iterator[tuple[int, TipMotion]]:
-    """Index and tip motion of each cut, in the order in which they are ready: cuts alike are stepped together."""
+    """Simulate many cuts, similar ones together.
+
+    Parameters
+    ----------
+    cuts
+        Cuts and their machines.
+    passage
+        Times in air and in the cut, None for the defaults.
+
+    Yields
+    ------
+    index : int
+        Index of the cut. Cuts come in the order in which they are ready.
+    motion : TipMotion
+        Motion of the tool tip.
+    """
     passage = passage or Passage()
     for number, cut in enumerate(cuts):
         if cut.pitch:
@@ -128,7 +160,7 @@ def _simulate_uneven_cut(cut: MillingCut, passage: Passage) -> TipMotion:
 
 
 def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
-    """Indices of cuts to step together, all whose teeth are evenly spaced."""
+    """Yield the indices of cuts to step together, all with evenly spaced teeth."""
     group: list[int] = []
     for i in sorted((i for i, cut in enumerate(cuts) if not cut.pitch), key=lambda i: cuts[i].tooth_period):
         if group and (
@@ -144,8 +176,8 @@ def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
 
 def _simulate_group(
     cuts: Sequence[MillingCut], modes: ModeTables, teeth: ToothTables, passage: Passage
-) -> tuple[NDArray[np.float32], NDArray[np.complex128]]:
-    """Acceleration from first to last contact (n, c, 2) in m/s^2, and how the modes swing then (c, m)."""
+) -> tuple[NDArray[np.float32], Complexes]:
+    """Return acceleration from first to last contact (n, c, 2) in m/s^2, and the mode states then (c, m)."""
     steps, step = len(teeth.root), modes.step
     periods = math.ceil(passage.cutting / (steps * float(np.min(step))))
     number = np.array([cut.teeth for cut in cuts])[:, np.newaxis]
@@ -170,14 +202,9 @@ def _simulate_group(
 
 
 def _step_tooth_period(
-    swing: NDArray[np.complex128],
-    flight: NDArray[np.complex128],
-    reach: Floats,
-    push: Floats,
-    rub: Floats,
-    room: Floats,
-) -> tuple[NDArray[np.complex128], Floats, Floats]:
-    """A tooth period: how modes swing after each step, what they gained in it (s, c, m), and chips (s, c, e)."""
+    swing: Complexes, flight: Complexes, reach: Floats, push: Floats, rub: Floats, room: Floats
+) -> tuple[Complexes, Floats, Floats]:
+    """Step one tooth period: mode states after each step, their gains in it (s, c, m), and chips (s, c, e)."""
     swings = np.empty((len(room), *swing.shape), dtype=complex)
     gains, chips = np.empty(swings.shape), np.empty(room.shape)
     columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], chips[..., np.newaxis])
@@ -194,8 +221,8 @@ def _step_tooth_period(
     return swings, gains, chips
 
 
-def _tip_acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
-    """q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), in the middle of the impulse of each step."""
+def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Floats:
+    """Return q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), at the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
     acceleration: Floats = np.einsum(
         "cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis]
@@ -204,14 +231,9 @@ def _tip_acceleration(swings: NDArray[np.complex128], gains: Floats, modes: Mode
 
 
 def _assemble_motion(
-    cutting: NDArray[np.float32],
-    swing: NDArray[np.complex128],
-    modes: ModeTables,
-    place: int,
-    passage: Passage,
-    turn: int,
+    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage, turn: int
 ) -> TipMotion:
-    """One cut between rest and ringing down; turn: steps of one."""
+    """Put one cut between rest and free decay. turn: steps per turn."""
     step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]
     n = round((passage.cutting + passage.after) / step)
     left = step * np.arange(1, n - len(cutting) + 1)
@@ -222,7 +244,7 @@ def _assemble_motion(
 
 
 def _nonperiodic_share(acceleration: NDArray[np.float32], turn: int) -> float:
-    """What of the last turns differs from their mean, as a share of the rms; 0 for less than two."""
+    """Return the share of the rms by which the last turns differ from their mean. 0 for less than two."""
     number = min(COMPARED_TURNS, len(acceleration) // turn)
     if number < 2:
         return 0.0

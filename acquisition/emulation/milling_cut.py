@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.emulation.hammered_structure import Structure
 
 
 @dataclass(frozen=True, eq=False)
 class MillingCut:
-    """A cut and the machine that makes it; conventions of `lobes.Cut`, whose angles and coefficients it takes.
+    """Milling cut and the machine that makes it. Conventions are those of `lobes.Cut`.
 
-    x and y are axes of the machine, x along the feed at feed_angle = 0; the tooth angle runs clockwise from the normal
-    of the feed (rad). Raises ValueError for what is no cut.
+    x and y are axes of the machine, x along the feed at feed_angle = 0. The tooth angle runs clockwise from the normal
+    of the feed (rad). Invalid values raise ValueError.
     """
 
     teeth: int
@@ -26,36 +27,35 @@ class MillingCut:
     entry_angle: float
     """Angle at which a tooth enters the cut (rad), 0 to pi."""
     exit_angle: float
-    """Angle at which it leaves (rad), entry_angle to pi."""
+    """Angle at which a tooth leaves the cut (rad), entry_angle to pi."""
     tangential: float
     """Tangential cutting coefficient Kt (Pa)."""
     radial: float
     """Radial cutting coefficient Kr (Pa)."""
     depth: float
-    """Axial depth (m)."""
+    """Axial depth of cut ap (m)."""
     feed_per_tooth: float
     """Feed per tooth (m)."""
     speed_rpm: float
     """True spindle speed (rpm)."""
     x: Structure | None
-    """Modes of the tip in x as it turns, its residual left out; None for rigid."""
+    """Modes of the rotating tip in x without residual, None for rigid."""
     y: Structure | None
-    """Modes of the tip in y, likewise."""
+    """Modes of the rotating tip in y without residual, None for rigid."""
     runout: tuple[float, ...] = ()
-    """Distance that each tooth stands out (m), `teeth` of them; none where all stand alike."""
+    """Run-out of each tooth (m), `teeth` values, empty for none."""
     tangential_edge: float = 0.0
-    """Tangential force of an edge wherever it is in the arc of cut, whatever its chip (N/m)."""
+    """Tangential edge force coefficient Kte (N/m), acting wherever the edge is in the arc of cut."""
     radial_edge: float = 0.0
-    """The same, radial (N/m)."""
+    """Radial edge force coefficient Kre (N/m)."""
     helix_lag: float = 0.0
-    """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
+    """Lag of a helical tooth along the axis (rad/m), 0 for straight teeth."""
     feed_angle: float = 0.0
     """Angle from x to the feed (rad)."""
     pitch: tuple[float, ...] = ()
-    """Angle by which each tooth follows the tooth before it (rad), in order of entry; () for evenly spaced teeth."""
+    """Angle from each tooth to the one before it (rad), in order of entry. () for evenly spaced teeth."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
         if self.teeth < 1 or self.teeth != int(self.teeth):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1")
         if not 0 <= self.entry_angle < self.exit_angle <= np.pi + 1e-9:
@@ -82,56 +82,59 @@ class MillingCut:
 
     @property
     def tooth_period(self) -> float:
-        """From tooth to tooth, in the mean (s)."""
+        """Mean tooth period (s)."""
         return 60 / (self.teeth * self.speed_rpm)
 
 
 @dataclass(frozen=True)
 class Passage:
-    """How the tool goes through the part; raises ValueError for times below 0 and for no cut at all."""
+    """Passage of the tool through the part. ValueError for negative times and for no cut."""
 
     before: float = 0.4
-    """Time that the spindle turns without a cut (s)."""
+    """Time in air before the cut (s)."""
     ramp: float = 0.05
-    """Time in which the depth grows from 0 to all of it, and in which it falls again (s)."""
+    """Time in which the depth grows from 0 to full, and in which it falls again (s)."""
     steady: float = 1.1
     """Time at full depth (s)."""
     after: float = 0.2
-    """Time without a cut again (s)."""
+    """Time in air after the cut (s)."""
 
     def __post_init__(self) -> None:
-        """Refuse times that are none."""
         if not (min(self.before, self.ramp, self.steady, self.after) >= 0 and self.cutting > 0):
             raise ValueError(f"{self}: times must be >= 0, and ramp or steady > 0")
 
-    def depth_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Share of the depth at times since first contact (s)."""
+    def depth_at(self, time: Floats) -> Floats:
+        """Return the share of the full depth.
+
+        Parameters
+        ----------
+        time : ndarray
+            Times since first contact (s).
+        """
         times = [0.0, self.ramp, self.ramp + self.steady, self.cutting]
         return np.interp(time, times, [float(self.ramp == 0), 1.0, 1.0, 0.0])
 
     @property
     def cutting(self) -> float:
-        """From first to last contact (s)."""
+        """Time from first to last contact (s)."""
         return 2 * self.ramp + self.steady
 
     @property
     def seconds(self) -> float:
-        """All of it (s)."""
+        """Total time (s)."""
         return self.before + self.cutting + self.after
 
 
-Floats = NDArray[np.float64]
-
 MIN_STEPS_PER_CYCLE, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC = 16, 30, 16
-"""Fewest steps in a cycle of the fastest mode (as stiffened by the cut), in a tooth period, and in the arc of cut."""
+"""Fewest steps per cycle of the fastest mode (as stiffened by the cut), per tooth period, and per arc of cut."""
 MIN_STEP_RATE = 60e3
-"""Fewest steps a second: a device without a filter hears what is above half its sample rate, too."""
+"""Lowest step rate (Hz). A device without a filter also records content above half its sample rate."""
 MAX_SLICE_LAG = 0.15
 """Largest lag between two slices of a helical tooth (rad)."""
 
 
 def count_steps_needed(cut: MillingCut) -> int:
-    """Steps a tooth period that a cut needs."""
+    """Return the steps per tooth period that a cut needs."""
     pitch, arc = 2 * np.pi / cut.teeth, cut.exit_angle - cut.entry_angle
     cutting = cut.depth * math.hypot(cut.tangential, cut.radial) * math.ceil(arc / pitch)
     sides = [side for side in (cut.x, cut.y) if side is not None]
@@ -142,33 +145,33 @@ def count_steps_needed(cut: MillingCut) -> int:
 
 @dataclass(frozen=True, eq=False)
 class ModeTables:
-    """Modes m of cuts c: a real mode swings as z = (q' + zeta w q) / w_d + i q, so that free flight is a factor."""
+    """Modes m of cuts c. A real mode is z = (q' + zeta w q) / w_d + i q, so that free vibration is a factor."""
 
-    pole: NDArray[np.complex128]
-    """-zeta w + i w_d (rad/s), shape (c, m); 0 where a cut has fewer modes."""
-    flight: NDArray[np.complex128]
+    pole: Complexes
+    """Poles -zeta w + i w_d (rad/s), shape (c, m). 0 if a cut has fewer modes."""
+    flight: Complexes
     """Factor of z over a step, shape (c, m)."""
     axis: Floats
     """Motion of the tip along x and y of the machine by each mode, shape (c, 2, m)."""
     step: Floats
-    """Length of a step (s), shape (c,)."""
+    """Step length (s), shape (c,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ToothTables:
-    """Teeth (and slices of helical ones) e that are in the cut at each step s, of cuts c.
+    """Teeth (and slices of helical ones) e in the cut at each step s, of cuts c.
 
-    Chip and force carry one root of the share of a step and of the depth in which the tooth cuts.
+    Chip and force each carry the square root of the share of a step and of the depth in which the tooth cuts.
     """
 
     root: Floats
-    """Root of that share, shape (s, c, e); 0 where fewer are in the cut."""
+    """Square root of that share, shape (s, c, e). 0 if fewer are in the cut."""
     rigid_chip: Floats
     """Chip of a rigid tool (m), shape (s, c, e)."""
     pitch_index: NDArray[np.int64]
-    """Number of the pitch after angle 0 that the tooth is in, shape (s, c, e)."""
+    """Index of the pitch after angle 0 that the tooth is in, shape (s, c, e)."""
     reach: Floats
-    """Reach of a tooth further into the part by each mode's displacement, shape (s, c, e, m)."""
+    """Depth by which each mode's displacement moves a tooth into the part, shape (s, c, e, m)."""
     chip_gain: Floats
     """Gain of z.real in a step from each chip at full depth, shape (s, c, m, e)."""
     edge_gain: Floats
@@ -176,7 +179,7 @@ class ToothTables:
 
 
 def build_tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTables]:
-    """Tables of cuts with `steps` steps a tooth period."""
+    """Build the tables of cuts for this number of steps per tooth period."""
     pole, axis, shape, kick, rub = _stack_padded([_build_mode_arrays(cut, cut.tooth_period / steps) for cut in cuts], 0)
     root, place, normal = _stack_padded([_find_teeth_in_cut(cut, steps) for cut in cuts], 1)
     step = np.array([cut.tooth_period / steps for cut in cuts])
@@ -189,7 +192,7 @@ def build_tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, To
 
 
 def _stack_padded(of_cuts: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[Any]:
-    """Arrays of each cut side by side along a new axis, zeros where others have more along the last one."""
+    """Stack the arrays of each cut along a new axis, padded with zeros along the last one."""
     most = max(arrays[0].shape[-1] for arrays in of_cuts)
     return [
         np.stack([np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, most - a.shape[-1])]) for a in same], axis=axis)
@@ -198,7 +201,7 @@ def _stack_padded(of_cuts: Sequence[tuple[NDArray[Any], ...]], axis: int) -> lis
 
 
 def _build_mode_arrays(cut: MillingCut, step: float) -> tuple[NDArray[Any], ...]:
-    """Pole (m,); along x and y, along feed and normal, gain of z.real from chips, from edges, each (2, m)."""
+    """Return poles (m,); axes, shapes along feed and normal, gains from chips and from edges, each (2, m)."""
     rigid = Structure(np.empty(0), np.empty(0), np.empty(0))
     x, y = cut.x or rigid, cut.y or rigid
     w = 2 * np.pi * np.concatenate([x.frequency, y.frequency])
@@ -215,7 +218,7 @@ def _build_mode_arrays(cut: MillingCut, step: float) -> tuple[NDArray[Any], ...]
 
 
 def _find_teeth_in_cut(cut: MillingCut, steps: int) -> tuple[NDArray[Any], ...]:
-    """Root of the share and place (s, e), outward normal along the feed and its normal times the root (s, 2, e)."""
+    """Return root of the share and pitch index (s, e), and outward normal times root (s, 2, e)."""
     slices = max(1, math.ceil(cut.helix_lag * cut.depth / MAX_SLICE_LAG))
     lag = cut.helix_lag * cut.depth * (np.arange(slices) + 0.5) / slices
     step = 2 * np.pi / (cut.teeth * steps)

@@ -8,29 +8,51 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Flags, Floats
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
 from acquisition.hits.pulse import window_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
-Spectra = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]
+Spectra = tuple[Floats, Floats, Complexes]
 
 EXCITATION_FLOOR = np.finfo(np.float64).eps ** 2
-"""Share of the largest force power at or below which a line holds rounding alone: of few codes it can be exactly 0."""
+"""Share of the largest force power up to which a line holds only rounding; with few codes it can be exactly 0."""
 
 
 def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
-    """FRF of hits that share sample rate and length, with coherence and usable band.
+    """Estimate the averaged FRF of hits with coherence and usable band.
 
-    H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), Hv their geometric mean with
-    the phase of S_fx. S_fx = mean of conj(F) X. The response window is rectangular; the force is tapered to zero
-    after its pulse, which keeps its noise out. Source: ISO 7626-5; Bendat & Piersol, Random Data, ch. 6.
+    H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), and Hv is their geometric mean with
+    the
+    phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to zero
+    after
+    its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
 
-    Lines that no hit excites, beyond the usable band, have receptance 0 and coherence 0.
+    Parameters
+    ----------
+    hits
+        Hits of the same sample rate and length.
+    estimator
+        "H1", "H2" or "Hv".
 
-    Raises ValueError for no hits, hits of different length or rate, and hits without a pulse.
+    Returns
+    -------
+    Frf
+        Receptance (m/N) without the line at 0 Hz.
 
+    Raises
+    ------
+    ValueError
+        For no hits, hits of different length or rate, and hits without a pulse.
+
+    References
+    ----------
+    ISO 7626-5; Bendat & Piersol, Random Data, ch. 6.
+
+    Examples
+    --------
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
@@ -46,10 +68,10 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
 
 
 def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
-    """The same from the mean, or the sum, of the spectra of these hits."""
+    """Estimate the FRF from the mean, or the sum, of the spectra of these hits."""
     s_ff, s_xx, s_fx = spectra
     excited = s_ff > EXCITATION_FLOOR * np.max(s_ff)
-    forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
+    forms: dict[Estimator, Callable[[], Complexes]] = {
         "H1": lambda: s_fx * _divide_where_excited(np.ones_like(s_ff), s_ff, excited),
         "H2": lambda: _divide_where_excited(s_xx * s_fx, np.abs(s_fx) ** 2, excited),
         "Hv": lambda: np.sqrt(_divide_where_excited(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
@@ -61,19 +83,39 @@ def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: 
     return from_accelerance(frequency, forms[estimator](), coherence, len(hits), find_usable_band(frequency, s_ff))
 
 
-def _divide_where_excited(
-    dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArray[np.bool_]
-) -> NDArray[Any]:
-    """dividend / power at excited lines with any, else 0."""
+def _divide_where_excited(dividend: NDArray[Any], power: Floats, excited: Flags) -> NDArray[Any]:
+    """Divide at excited lines with any power; 0 elsewhere."""
     return np.asarray(np.divide(dividend, power, out=np.zeros_like(dividend), where=excited & (power > 0)))
 
 
 def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
-    """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,).
+    """Compute the mean auto-spectra and the mean cross-spectrum of hits.
 
-    S_fx (N m/s^2) is the mean of conj(F) X, F the force tapered to zero after its pulse. Raises ValueError as
-    `estimate_frf`. Source: Bendat & Piersol, Random Data, ch. 6.
+    Parameters
+    ----------
+    hits
+        Hits of the same sample rate and length.
 
+    Returns
+    -------
+    s_ff : ndarray, shape (n // 2 + 1,)
+        Auto-spectrum of the force (N^2), tapered to zero after its pulse.
+    s_xx : ndarray, shape (n // 2 + 1,)
+        Auto-spectrum of the response ((m/s^2)^2).
+    s_fx : ndarray, shape (n // 2 + 1,)
+        Cross-spectrum, the mean of conj(F) X (N m/s^2).
+
+    Raises
+    ------
+    ValueError
+        As for `estimate_frf`.
+
+    References
+    ----------
+    Bendat & Piersol, Random Data, ch. 6.
+
+    Examples
+    --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
     >>> s_ff, s_xx, s_fx = compute_cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
@@ -107,27 +149,29 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
 
 
 def _get_response_skew(hit: Hit) -> float:
-    """How much later the response is sampled than the force (s): its spectrum leads by 2 pi f skew."""
+    """Return how much later the response is sampled than the force (s); its spectrum leads by 2 pi f skew."""
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
-def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
-    """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
+def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: Floats) -> tuple[float, float]:
+    """Return the band from the first line to the first one with a force spectrum 20 dB below its largest value."""
     weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
     return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])
 
 
 MIN_CONVERGED_HITS = 4
-"""Under so many hits a mean is not called settled."""
+"""Smallest number of hits of a converged mean."""
 MAX_CONVERGED_ERROR = 0.005
-"""Standard error of |H| near the highest peak below which the mean has settled (-)."""
+"""Standard error of |H| near the highest peak below which the mean has converged (-)."""
 NEAR_PEAK_SHARE = 0.5
-"""Near the peak is where |accelerance| is at least this share of its largest value in the usable band."""
+"""Share of the largest |accelerance| in the usable band from which a line is near the peak."""
 
 
 class RunningMean:
-    """H1 of hits of one set-up from the sum of their spectra; of hits without force the hits alone.
+    """Running H1 mean of hits of one set-up; of hits without a force, only the hits.
 
+    Examples
+    --------
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
     >>> response = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7])).response(time, 1e-3)
@@ -139,7 +183,6 @@ class RunningMean:
     """
 
     def __init__(self) -> None:
-        """No hit yet."""
         self.hits: tuple[Hit, ...] = ()
         """The hits in it, in the order in which they came."""
         self.frf: Frf | None = None
@@ -149,9 +192,10 @@ class RunningMean:
 
     @property
     def relative_change(self) -> float | None:
-        """By which share the last hit moved the mean; None under 2 hits.
+        """Change of the mean by the last hit (-); None below 2 hits.
 
-        rms of the difference of the accelerance with and without it over rms of the accelerance, in the usable band.
+        Rms of the difference of the accelerance with and without it over the rms of the accelerance, in the usable
+        band.
         """
         if self.frf is None or self._before is None:
             return None
@@ -161,13 +205,17 @@ class RunningMean:
 
     @property
     def has_converged(self) -> bool:
-        """Whether more hits would hardly change the peak: at least SETTLED_HITS of them, and the random error of |H|,
-        sqrt((1 - g2) / (2 n g2)), as rms over the lines near the highest peak, is below SETTLED_ERROR."""
+        """Whether more hits would hardly change the peak.
+
+        There are at least MIN_CONVERGED_HITS hits, and the rms of the random error sqrt((1 - g2) / (2 n g2)) over the
+        lines near
+        the highest peak is below MAX_CONVERGED_ERROR.
+        """
         return len(self.hits) >= MIN_CONVERGED_HITS and self.peak_error < MAX_CONVERGED_ERROR
 
     @property
     def peak_error(self) -> float:
-        """Standard error of |H| near the highest peak (-); inf under 3 hits, where coherence says nothing yet."""
+        """Standard error of |H| near the highest peak (-); inf below 3 hits, where the coherence has no meaning."""
         frf = self.frf
         if frf is None or frf.random_error is None:
             return float("inf")
@@ -176,7 +224,18 @@ class RunningMean:
         return float(np.sqrt(np.mean(frf.random_error[near] ** 2)))
 
     def add(self, hit: Hit) -> None:
-        """Take a good hit in; ValueError where it has no pulse, or another length or rate than those before."""
+        """Add a good hit.
+
+        Parameters
+        ----------
+        hit
+            Hit with a pulse, of the length and the sample rate of the others.
+
+        Raises
+        ------
+        ValueError
+            Where the hit has no pulse, or another length or rate.
+        """
         size = hit.acceleration.size
         if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
             raise ValueError(
@@ -193,14 +252,36 @@ class RunningMean:
         self._sums, self.hits = sums, hits
 
     def estimate_without(self, hit: Hit) -> Frf:
-        """H1 of the other hits; ValueError where this one is not in the mean, or alone in it."""
+        """Return H1 of the other hits.
+
+        Parameters
+        ----------
+        hit
+            Hit of the mean to leave out.
+
+        Raises
+        ------
+        ValueError
+            Where the hit is not in the mean, or the only one.
+        """
         others = self._others(hit)
         if not others:
             raise ValueError("this hit is the only one in the mean; there is no mean of the others")
         return estimate_frf(others)
 
     def remove(self, hit: Hit) -> None:
-        """Take a hit back; ValueError where it is not in the mean."""
+        """Take a hit out of the mean.
+
+        Parameters
+        ----------
+        hit
+            Hit of the mean.
+
+        Raises
+        ------
+        ValueError
+            Where the hit is not in the mean.
+        """
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
         for remaining in kept:  # anew: subtraction would leave its rounding errors
@@ -213,32 +294,52 @@ class RunningMean:
         return kept
 
 
-def _is_in_usable_band(frf: Frf) -> NDArray[np.bool_]:
+def _is_in_usable_band(frf: Frf) -> Flags:
     low, high = frf.usable_band or (0.0, np.inf)
     return np.asarray((frf.frequency >= low) & (frf.frequency <= high))
 
 
-def propagate_force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator[NDArray[np.complex128]]:
-    """Errors that noise of the hammer brings into H1 at these lines (Hz), as shares of it; an array for each hit.
+def propagate_force_noise(hits: Sequence[Hit], frequency: Floats) -> Iterator[Complexes]:
+    """Propagate the noise of the hammer into H1, as shares of H1.
 
-    Column t of that of hit i, shape (n, samples in its force window + 1), is the error that one standard deviation of
-    the noise at sample t makes, to first order:
+    To first order, one standard deviation of the noise at sample t of hit i changes H1 by
 
         -sigma_i w_i(t) conj(F_i) exp(-2 pi j f t) / sum_k |F_k|^2
 
-    F_i(f) is the spectrum of the windowed force, w_i the window, sigma_i the rms of the baseline, in which the noise
-    is taken as white. The last column is that of the mean of the baseline, which is taken off all samples. Each column
-    has an independent real factor of variance one, and is smooth over lines closer than one over the window's length.
+    where F_i(f) is the spectrum of the windowed force, w_i the window, and sigma_i the rms of the baseline with white
+    noise.
 
-    Source: H1 of `estimate_frf` with F + N for F, expanded in N. Raises ValueError for a hit without a pulse.
+    Parameters
+    ----------
+    hits
+        Hits of the mean.
+    frequency : ndarray, shape (n,)
+        Lines of H1 (Hz).
+
+    Yields
+    ------
+    ndarray, shape (n, samples + 1)
+        For each hit the errors of the samples in its force window. The last column is that of the mean of the baseline,
+        which is subtracted from all samples. Each column has an independent real factor of variance one, and is smooth
+        over
+        lines closer than one over the window's length.
+
+    Raises
+    ------
+    ValueError
+        For a hit without a pulse.
+
+    References
+    ----------
+    H1 of `estimate_frf` with F + N for F, expanded in N.
     """
     yield from propagate_force_noise_through(np.eye(frequency.size), hits, frequency)
 
 
 def propagate_force_noise_through(
-    rows: NDArray[np.complex128] | NDArray[np.float64], hits: Sequence[Hit], frequency: NDArray[np.float64]
-) -> Iterator[NDArray[np.complex128]]:
-    """What linear maps (k, n) make of each array of `propagate_force_noise`, without making that: shape (k, samples + 1)."""
+    rows: Complexes | Floats, hits: Sequence[Hit], frequency: Floats
+) -> Iterator[Complexes]:
+    """Yield the result of linear maps (k, n) of each array of `propagate_force_noise` without making it: (k, samples + 1)."""
     parts = [window_force(hit) for hit in hits]
     time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
     waves = np.exp(-2j * np.pi * np.outer(frequency, time))

@@ -12,12 +12,31 @@ from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baselin
 
 
 def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
-    """Force and response, both without their offsets, times exp(-t/time_constant) (s) from the hit on.
+    """Multiply force and response, without their offsets, by exp(-t/time_constant) from the hit on.
 
-    Over both, because then the FRF is that of the structure at a shifted frequency, H(s + 1/time_constant), exactly and
-    however long the pulse is: exp(-at) (h * f) = (exp(-at) h) * (exp(-at) f). Raises ValueError for a hit without a
-    pulse, and for a time constant that is not > 0.
+    With both windowed the FRF is that of the structure at a shifted frequency, H(s + 1/time_constant), exactly and for
+    any
+    length of the pulse: exp(-at) (h * f) = (exp(-at) h) * (exp(-at) f).
 
+    Parameters
+    ----------
+    hit
+        Hit with a pulse.
+    time_constant
+        Time constant of the window (s), > 0.
+
+    Returns
+    -------
+    Hit
+        Windowed hit without codes.
+
+    Raises
+    ------
+    ValueError
+        For a hit without a pulse, and for a time constant that is not > 0.
+
+    Examples
+    --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
     >>> windowed = apply_exponential_window(Hit(force, np.ones(1000), 10000.0, pre_trigger=100), time_constant=0.02)
@@ -34,11 +53,25 @@ def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
 
 
 def correct_windowed_receptance(frf: Frf, time_constant: float) -> Frf:
-    """An FRF of responses under an exponential window with the receptance that belongs to them.
+    """Correct the receptance of an FRF whose responses were recorded under an exponential window.
 
-    Acceleration under it is receptance times s^2 at s = 2 pi i f + 1/time_constant (s), no longer at 2 pi i f, velocity
-    times s. An FRF that was measured as receptance is right as it is.
+    Acceleration under the window is receptance times s^2 at s = 2 pi i f + 1/time_constant, velocity is receptance
+    times s.
 
+    Parameters
+    ----------
+    frf
+        FRF as it was measured; one measured as receptance is right as it is.
+    time_constant
+        Time constant of the window (s).
+
+    Returns
+    -------
+    Frf
+        FRF with the corrected receptance.
+
+    Examples
+    --------
     >>> line, tau = np.array([100.0, 200.0]), 0.05
     >>> seen = from_accelerance(line, (2j * np.pi * line + 1 / tau) ** 2 * 1e-8)  # 0.01 um/N under a window
     >>> round(float(correct_windowed_receptance(seen, tau).receptance[0].real) * 1e6, 6)  # um/N
@@ -52,8 +85,25 @@ def correct_windowed_receptance(frf: Frf, time_constant: float) -> Frf:
 
 
 def find_hit_time(hit: Hit) -> float:
-    """When the hammer hits, the centre of its pulse (s from the record's start); ValueError without a pulse.
+    """Find the time of the hit, the centre of its pulse.
 
+    Parameters
+    ----------
+    hit
+        Hit with a pulse.
+
+    Returns
+    -------
+    float
+        Time from the start of the record (s).
+
+    Raises
+    ------
+    ValueError
+        For a hit without a pulse.
+
+    Examples
+    --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N, samples at 10.0 to 10.9 ms
     >>> hit = Hit(force, np.zeros(1000), 10000.0, pre_trigger=100)
@@ -66,8 +116,25 @@ def find_hit_time(hit: Hit) -> float:
 
 
 def measure_time_after_hit(hit: Hit) -> float:
-    """What the record holds from the hit on (s); ValueError without a pulse.
+    """Measure the length of the record after the hit.
 
+    Parameters
+    ----------
+    hit
+        Hit with a pulse.
+
+    Returns
+    -------
+    float
+        Time from the hit to the end of the record (s).
+
+    Raises
+    ------
+    ValueError
+        For a hit without a pulse.
+
+    Examples
+    --------
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N, at 10 ms of a record of 100 ms
     >>> hit = Hit(force, np.zeros(1000), 10000.0, pre_trigger=100)
@@ -85,12 +152,30 @@ def _require_pulse(hit: Hit) -> Pulse:
 
 
 def remove_sensor_mass(frf: Frf, mass: float) -> Frf:
-    """The FRF of a driving point without a mass (kg) that moves along with it; the same for none.
+    """Remove the mass of the sensor from the FRF of a driving point.
 
-    The structure feels the hammer's force and -mass x acceleration of what rides on it, so that 1/H = 1/H_m + mass w^2
-    with the measured receptance H_m: H = H_m / (1 + mass w^2 H_m). Of a response that is not where the hammer hits this
-    does not hold. Source: Ashory (1998), Correction of mass-loading effects of transducers, IMAC 16.
+    The structure feels the hammer's force and -mass x acceleration of the sensor, so that 1/H = 1/H_m + mass w^2 with
+    the
+    measured receptance H_m. This does not hold where the response is not at the hammer's point.
 
+    Parameters
+    ----------
+    frf
+        Measured FRF.
+    mass
+        Mass that moves with the driving point (kg).
+
+    Returns
+    -------
+    Frf
+        FRF without the mass; the same for 0 kg.
+
+    References
+    ----------
+    Ashory (1998), Correction of mass-loading effects of transducers, IMAC 16.
+
+    Examples
+    --------
     A sensor of 20 g on a mass of 2 kg:
 
     >>> measured = from_accelerance([100.0, 200.0], [1 / 2.02, 1 / 2.02])

@@ -5,30 +5,46 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
 
 COHERENCE_BLOCK_LINES = 32
-"""Lines looked at together."""
+"""Number of lines averaged together."""
 MIN_COHERENCE_BLOCKS = 4
-"""With fewer the answer is too uncertain."""
+"""Smallest number of blocks for a certain answer."""
 MAX_QUARTILE_RATIO = 3.0
-"""Ratio of the upper to the lower quartile of the blocks above which the coherence is not that of the FRF."""
+"""Ratio of the upper to the lower quartile of the blocks above which the coherence does not belong to the FRF."""
 MIN_INCOHERENCE = 1e-7
-"""1 - coherence below which only rounding is seen."""
+"""Smallest 1 - coherence above rounding."""
 
 
 def infer_averages(frf: Frf) -> int | None:
-    """Number of hits whose scatter from line to line fits the coherence; None where it cannot be told.
+    """Infer the number of averaged hits from the scatter of an FRF and its coherence.
 
-    The coherence says how far single hits scatter, |H|^2 (1 - g2)/g2; the mean of n of them scatters by 1/n of that,
-    which third differences of neighbouring lines show. It takes the noise of neighbouring lines as independent: a
-    Hann window or interpolated lines make the answer too large. Its error is some 15 % with 500 lines. Source: variance
-    of H1, Bendat & Piersol, Random Data, ch. 9; n - 1 degrees of freedom of the residual of n hits.
+    The coherence gives the scatter of single hits, |H|^2 (1 - g2)/g2. The mean of n hits scatters by 1/n of that, which
+    third
+    differences of neighbouring lines show. The noise of neighbouring lines is assumed independent: a Hann window or
+    interpolated lines make the answer too large. Its error is about 15 % with 500 lines.
 
+    Parameters
+    ----------
+    frf
+        FRF with its coherence.
+
+    Returns
+    -------
+    int or None
+        Number of hits; None where it cannot be inferred.
+
+    References
+    ----------
+    Variance of H1, Bendat & Piersol, Random Data, ch. 9; n - 1 degrees of freedom of the residual of n hits.
+
+    Examples
+    --------
     >>> random = np.random.default_rng(1)
     >>> noise = random.normal(0.0, 0.1, (2, 2000)) / np.sqrt(2 * 8)  # of a mean of 8
     >>> frf = Frf(np.arange(1.0, 2001.0), 1 + noise[0] + 1j * noise[1], coherence=np.full(2000, 1 / 1.01))
@@ -48,8 +64,7 @@ def infer_averages(frf: Frf) -> int | None:
     return round(1 + middle) if high < MAX_QUARTILE_RATIO * low and middle > 1.5 else None
 
 
-def _compute_block_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Means over some lines each."""
+def _compute_block_means(values: Floats) -> Floats:
     return np.asarray(
         values[: values.size // COHERENCE_BLOCK_LINES * COHERENCE_BLOCK_LINES]
         .reshape(-1, COHERENCE_BLOCK_LINES)
@@ -58,17 +73,29 @@ def _compute_block_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 WINDOW_NOISE_RATIO = 2.0
-"""Times that the noise before the hit is that of the last tenth where a window lies over both; chance reaches 1.3."""
+"""Noise before the hit over that of the last tenth from which a window is inferred; chance reaches 1.3."""
 MIN_WINDOW_SAMPLES = 32
-"""Samples before the hit that are too few to tell."""
+"""Smallest number of samples before the hit."""
 
 
 def infer_window(hits: Sequence[Hit]) -> float | None:
-    """Time constant of the window over the responses of these hits (s), about; None where there is no sign of one.
+    """Infer an exponential window over responses that nobody stated.
 
-    Nothing that rings after a hit can make its end quieter than it was before it: a window does. The noise is that of
-    differences of neighbouring samples, which hum hardly enters; the window falls from its middle before the hit to
-    that of the last tenth. An end of zeros is padding and tells nothing.
+    No ringing after a hit can make its end quieter than before the hit, but a window does. The noise is that of
+    differences
+    of neighbouring samples, which hum hardly enters. The window falls from its middle before the hit to that of the
+    last
+    tenth. An end of zeros is padding and shows nothing.
+
+    Parameters
+    ----------
+    hits
+        Hits that were recorded in the same way.
+
+    Returns
+    -------
+    float or None
+        Approximate time constant (s); None where there is no sign of a window.
     """
     falls = [fall for fall in map(_measure_noise_drop, hits) if fall is not None]
     if not falls:
@@ -78,7 +105,7 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
 
 
 def _measure_noise_drop(hit: Hit) -> tuple[float, float] | None:
-    """Noise before the hit over that at the end, and the time between (s); None where one of them cannot be told."""
+    """Return the noise before the hit over that at the end, and the time between (s); None where one is unknown."""
     before, tenth = int(0.8 * count_pre_hit_samples(hit)), hit.acceleration.size // 10
     if min(before, tenth) < MIN_WINDOW_SAMPLES:
         return None
@@ -88,22 +115,34 @@ def _measure_noise_drop(hit: Hit) -> tuple[float, float] | None:
 
 
 TIME_PARTS = 40
-"""Parts of the time that are looked at."""
+"""Number of parts of the time that are compared."""
 PADDING_DROP_RATIO = 10.0
-"""Times that the end of what was recorded is what follows it, and that it falls faster there than just before."""
+"""Smallest ratio of the end of the record to what follows it, also relative to the decay just before the end."""
 MIN_PADDING_LINES = 160
-"""Lines that are too few to tell."""
+"""Smallest number of lines."""
 MIN_PADDING_LEVEL = 1e-7
-"""Share of the hit below which a level means nothing."""
+"""Smallest level with a meaning, as a share of the hit."""
 
 
 def infer_recorded_share(frf: Frf) -> float:
-    """Share (0 to 1) of one over the line spacing that was recorded; the rest is zeros, and 1 where nothing shows it.
+    """Infer which share of one over the line spacing was recorded; the rest is zero padding.
 
-    A record that is filled up with zeros has lines nearer to each other than one over its length, and its impulse
-    response, noise and all, ends at once where the zeros begin; ringing falls no faster there than before. Told of an
-    evenly spaced axis only.
+    The lines of a padded record are closer than one over its length, and its impulse response with its noise ends at
+    once
+    where the zeros begin. Ringing falls no faster there than before. An unevenly spaced axis shows nothing.
 
+    Parameters
+    ----------
+    frf
+        FRF on an evenly spaced axis.
+
+    Returns
+    -------
+    float
+        Share, 0 to 1; 1 where nothing shows a padding.
+
+    Examples
+    --------
     >>> time = np.arange(1000)
     >>> decay = np.exp(-time / 200.0) * np.cos(time) + np.random.default_rng(1).normal(0.0, 0.01, 1000)
     >>> spectrum = np.fft.rfft(np.append(decay, np.zeros(1000)))[1:-1]  # filled up with as many zeros
@@ -126,24 +165,39 @@ def infer_recorded_share(frf: Frf) -> float:
 
 
 MIN_SMOOTHING_LINES = 128
-"""Lines that are too few to tell."""
+"""Smallest number of lines."""
 NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN = (0.85, 0.95), (0.45, 0.55)
-"""Times, as shares of the record, just before the hit comes round again, and as far from it as can be."""
+"""Span of time, as shares of the record, half a record away from the hit."""
 SMOOTHING_NOISE_RATIO = 2.0
-"""Times that the noise near the hit is that far from it where lines were smoothed; of three it is 2.3 and more."""
+"""Noise near the hit over that far from it from which lines were smoothed; three smoothed lines give 2.3 or more."""
 MAX_PRE_HIT_SHARE = 0.1
-"""Share of the hit itself above which what comes before it is no noise: an FRF whose phase is conjugated."""
+"""Largest noise before the hit, as a share of the hit; above it the phase of the FRF is conjugated."""
 TAPER_LEAK_RATIO = 10.0
-"""Least level that means anything, over what the taper lets through of the hit."""
+"""Smallest level with a meaning, over the leakage of the hit through the taper."""
 
 
 def is_smoothed(frf: Frf) -> bool:
-    """Whether the noise of neighbouring lines is alike, as a mean over them, or a Hann window on them, makes it.
+    """Return whether lines were smoothed over their neighbours, as a mean over them or a Hann window does.
 
-    To smooth the lines is to lay a window over the impulse response that falls away from the hit on both sides. What
-    rings decays after the hit, and noise is the same everywhere, so that nothing else leaves more just before the hit
-    than half a record away from it. Told of an evenly spaced axis only, and only where there is noise.
-    Source: Bendat & Piersol, Random Data, ch. 11 (smoothing over frequency as a window over lag).
+    Smoothing lines means a window over the impulse response that falls away from the hit on both sides. Ringing decays
+    after
+    the hit and noise is the same everywhere, so nothing else leaves more just before the hit than half a record away.
+    Only an
+    evenly spaced axis with noise shows it.
+
+    Parameters
+    ----------
+    frf
+        FRF on an evenly spaced axis.
+
+    Returns
+    -------
+    bool
+        Whether the lines were smoothed.
+
+    References
+    ----------
+    Bendat & Piersol, Random Data, ch. 11 (smoothing over frequency as a window over lag).
     """
     frf = frf.in_band(frf.usable_band)
     frequency, steps = frf.frequency, np.diff(frf.frequency)

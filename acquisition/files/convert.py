@@ -67,7 +67,7 @@ class Conversion:
     """Recording that it was made from."""
 
 
-def convert(path: Path | str, out: Path | str, said: Description, *, hits: bool = False) -> Conversion:
+def convert(path: Path | str, out: Path | str, description: Description, *, hits: bool = False) -> Conversion:
     """Write the FRF of a recorded file, or its hits, in the format that the extension of `out` names.
 
     hits: the signals over time; a format without FRFs has them anyway. DataError for a file that does not say enough or
@@ -79,16 +79,16 @@ def convert(path: Path | str, out: Path | str, said: Description, *, hits: bool 
         raise ValueError(f"{out}: files that end with {', '.join(EXPORT_FORMATS)} are written; give one of them")
     if out.exists() and path.exists() and out.samefile(path):
         raise ValueError(f"{out}: this is the file that is read; name another")
-    recording = inspect_file(path, said).require_valid()
+    recording = inspect_file(path, description).require_valid()
     labels = ExportLabels(
-        said.date.astimezone() if said.date else recording.created,
-        said.direction or recording.direction,
-        said.tool or recording.tool,
+        description.date.astimezone() if description.date else recording.created,
+        description.direction or recording.direction,
+        description.tool or recording.tool,
         path.name,
         format_window(recording.window),
     )
     if writer.encode_frf is not None and not hits:
-        frf = recording.frf or read_frf(path, said)
+        frf = recording.frf or read_frf(path, description)
         content, amount = writer.encode_frf(frf, labels), f"FRF of {frf.frequency.size} lines"
     elif recording.hits:
         content, amount = writer.encode_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"

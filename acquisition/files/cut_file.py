@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Flags, Floats
 from acquisition.channel import Channel
 from acquisition.errors import DataError
 from acquisition.file_io import atomic_write, read_regular_file
@@ -35,11 +36,11 @@ CUT_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True
 class CutSignal:
     """The accelerometer or the microphone during a cut."""
 
-    acceleration: NDArray[np.float64]
+    acceleration: Floats
     """Acceleration (m/s^2; of a microphone Pa or shares of its full scale), shape (n,) or (responses, n)."""
     sample_rate: float
     """Samples a second (Hz)."""
-    codes: NDArray[np.int32] | None = None
+    codes: Codes | None = None
     """Codes of the converter, shape (n,); None where a recording of another program holds values."""
     channel: Channel | None = None
     """Channel that turns codes into m/s^2; None where there are no codes."""
@@ -49,7 +50,7 @@ class CutSignal:
     """Whether the device has told that its input was overloaded."""
     sensor: str = "accelerometer"
     """Kind of sensor: accelerometer or microphone."""
-    speed_rpm: NDArray[np.float64] | None = None
+    speed_rpm: Floats | None = None
     """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
 
     @property
@@ -58,7 +59,7 @@ class CutSignal:
         return float(self.acceleration.shape[-1] / self.sample_rate)
 
     @property
-    def clipped(self) -> NDArray[np.bool_]:
+    def clipped(self) -> Flags:
         """Where it stands at a rail of its converter, or without codes three times in a row at its extreme value.
 
         Everywhere where the device has told of an overload; of several responses in any of them. Shape (n,).
@@ -78,7 +79,7 @@ class CutSignal:
         return replace(self, acceleration=self.acceleration[..., inside], codes=codes, speed_rpm=speed)
 
 
-def _find_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _find_extremes(values: Floats) -> Flags:
     """Where one response stands three times in a row at its extreme value; nowhere where it has one value only."""
     top, bottom = np.max(values), np.min(values)
     if top == bottom:
@@ -86,7 +87,7 @@ def _find_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return _find_runs_of_three(values == top) | _find_runs_of_three(values == bottom)
 
 
-def _find_runs_of_three(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _find_runs_of_three(extreme: Flags) -> Flags:
     """Where three or more stand beside each other."""
     padded = np.pad(extreme, 2)
     three = padded[2:] & padded[1:-1] & padded[:-2]

@@ -7,17 +7,15 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 REPLAY_QUIET_TIME = 1.0
 """Quiet before, between and after the hits (s)."""
@@ -27,7 +25,7 @@ REPLAY_ADC_BITS = 24
 """Converter that recordings without codes are read through."""
 
 
-class FileSource:
+class FileSource(ClosedOnExit):
     """The hits of a recording one after the other, with quiet between them.
 
     Codes are those of the recording, bit by bit; lost scans and reported overloads are there again. A recording
@@ -60,16 +58,6 @@ class FileSource:
         """It tells of no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
-
-    def __enter__(self) -> Self:
-        """The source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End it."""
-        self.close()
 
     def start(self) -> None:
         """Begin at the first hit."""
@@ -106,7 +94,7 @@ class FileSource:
             yield from _split_blocks(codes[:, middle:], hit.overload, hit.lost_scans)
         yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
 
-    def _codes(self, hit: Hit) -> NDArray[np.int32]:
+    def _codes(self, hit: Hit) -> Codes:
         if hit.codes is not None:
             return hit.codes
         return np.stack([channel.encode(values) for channel, values in zip(self.channels, hit.signals, strict=True)])
@@ -121,14 +109,14 @@ def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
     return Channel(quantity, 1.0, full_scale or 1.0, REPLAY_ADC_BITS)
 
 
-def _extract_quiet_scans(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
+def _extract_quiet_scans(hit: Hit, codes: Codes) -> Codes:
     """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, channels)."""
     before = int(0.8 * count_pre_hit_samples(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])
 
 
-def _split_blocks(codes: NDArray[np.int32], overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
+def _split_blocks(codes: Codes, overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
     for first in range(0, codes.shape[1], REPLAY_BLOCK_SCANS):
         block = codes[:, first : first + REPLAY_BLOCK_SCANS]
         yield Block(0, block, overload, lost_before if first == 0 else 0)

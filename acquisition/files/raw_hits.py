@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from acquisition.channel import Channel
-from acquisition.hit import Hit, HitFlags
+from acquisition.hit import Hit
+from acquisition.hit_fault import HitFlags
 
 if TYPE_CHECKING:
     import h5py

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
 from acquisition.files.contents.contents import Contents, Signal
@@ -17,88 +17,81 @@ from acquisition.files.contents.spindle_speed import resolve_speed, split_speed_
 from acquisition.files.cut_file import CutSignal, is_cut_file, read_cut_signal
 from acquisition.files.read_recording import EMPTY_DESCRIPTION, detect_format, read_contents
 
-CUT_COLUMNS_EXAMPLE = '--columns "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
-"""How an acceleration is named."""
+CUT_COLUMNS_EXAMPLE = ' "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
+"""Example of the columns of a cut."""
 MICROPHONE_SENSOR = "microphone"
-"""Sensor whose values need no unit: what is told rests on how loud one is beside another."""
+"""Sensor whose values need no unit, because only their ratios count."""
 
 
-def resolve_cut_signals(
-    contents: Contents, description: Description, ledger: ImportReport
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64] | None] | None:
-    """What heard a cut, its sample rate (Hz), and the speed of the spindle where the file has it (rpm, shape (n,)).
+def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> CutSignal:
+    """Read what accelerometers or a microphone recorded of a cut, from a file of any known format.
 
-    None where the ledger says what is missing or wrong.
-
-    Acceleration in m/s^2, a microphone in what the file holds: shape (n,), or (responses, n) where there are several
-    and nobody says which is meant.
+    Raises DataError for a file without such a signal, or with too few statements.
     """
-    named = assign_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
-    signals, turning = split_speed_column(named, description, ledger)
-    is_microphone = description.sensor == MICROPHONE_SENSOR
-    in_units = (
-        list(signals)
-        if is_microphone and not description.full_scale
-        else apply_full_scale(signals, description, ledger)
-    )
-    scaled = convert_to_sensor_units(in_units, description, ledger)
-    if scaled is None or not ledger.is_clean:
-        return None
-    over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
-    responses = [signal for signal in over_time if infer_kind(signal) == "response"]
-    heard = responses or [signal for signal in over_time if not infer_kind(signal)]
-    if not heard:
-        ledger.add_missing(
-            f"which of its columns is the acceleration ({format_signal_names(signals)})", CUT_COLUMNS_EXAMPLE
-        )
-        return None
-    meant = (
-        [choose_signal(heard, description.response, "responses", ledger)] if description.response is not None else heard
-    )
-    settled = [signal for signal in meant if signal is not None]
-    factors = [
-        1.0 if is_microphone else _resolve_acceleration_factor(signal, description, ledger) for signal in settled
-    ]
-    beside = [turning] if turning is not None and settled else []
-    rate, used = resolve_rate(scaled, [*settled, *beside], description, ledger)
-    if is_microphone and responses:
-        ledger.faults.append(f"{responses[0].name} moves; leave --sensor microphone out")
-    if not settled or not ledger.is_clean:
-        return None
-    settled, beside = used[: len(settled)], used[len(settled) :]
-    speed = resolve_speed(beside[0], rate, description, ledger) if beside else None
-    if not ledger.is_clean:
-        return None
-    values = np.stack([signal.values * factor for signal, factor in zip(settled, factors, strict=True)])
-    return np.asarray(values if len(settled) > 1 else values[0], dtype=np.float64), rate, speed
-
-
-def _resolve_acceleration_factor(signal: Signal, description: Description, ledger: ImportReport) -> float:
-    """Of an acceleration, to m/s^2; 0 where it is none, or its unit is not known."""
-    unit = resolve_response_unit(signal, description, ledger)
-    if unit is None:
-        return 0.0
-    if unit[0] != "acceleration":
-        ledger.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
-    return unit[1]
-
-
-def read_cut_recording(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> CutSignal:
-    """What accelerometers or a microphone have recorded; DataError for a file without, or that says not enough."""
     path = Path(path)
     if not path.is_file():
         raise DataError(f"{path}: no such file")
     if is_cut_file(path):
         return read_cut_signal(path)[0]
     file_format = detect_format(path)
-    contents = read_contents(file_format, path, said)
+    contents = read_contents(file_format, path, description)
     if not isinstance(contents, Contents):
         raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
-    ledger = ImportReport()
-    sound = resolve_cut_signals(contents, said, ledger)
-    if sound is None or not ledger.is_clean:
-        raise DataError(f"{path}: {ledger.format_problems()}")
-    if not np.all(np.isfinite(sound[0])):
+    report = ImportReport()
+    signals = resolve_cut_signals(contents, description, report)
+    if signals is None or not report.is_clean:
+        raise DataError(f"{path}: {report.format_problems()}")
+    values, rate, speed = signals
+    if not np.all(np.isfinite(values)):
         raise DataError(f"{path}: holds values that are no numbers; export it again")
-    values, rate, speed = sound
-    return CutSignal(values, rate, sensor=said.sensor, speed_rpm=speed)
+    return CutSignal(values, rate, sensor=description.sensor, speed_rpm=speed)
+
+
+def resolve_cut_signals(
+    contents: Contents, description: Description, report: ImportReport
+) -> tuple[Floats, float, Floats | None] | None:
+    """Return signal, sample rate (Hz) and spindle speed (rpm, shape (n,), None without one) of a cut.
+
+    The signal is an acceleration (m/s^2), or what a microphone recorded: shape (n,), or (responses, n) where there are
+    several and the description chooses none. None where the report says what is missing or wrong.
+    """
+    named = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
+    signals, speed_signal = split_speed_column(named, description, report)
+    is_microphone = description.sensor == MICROPHONE_SENSOR
+    needs_scale = not is_microphone or description.full_scale
+    full_scale = apply_full_scale(signals, description, report) if needs_scale else signals
+    scaled = convert_to_sensor_units(full_scale, description, report)
+    if scaled is None or not report.is_clean:
+        return None
+    over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
+    responses = [signal for signal in over_time if infer_kind(signal) == "response"]
+    candidates = responses or [signal for signal in over_time if not infer_kind(signal)]
+    if not candidates:
+        fact = f"which of its columns is the acceleration ({format_signal_names(signals)})"
+        report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
+        return None
+    if description.response is not None:
+        one = choose_signal(candidates, description.response, "responses", report)
+        candidates = [] if one is None else [one]
+    factors = [1.0 if is_microphone else _resolve_factor(signal, description, report) for signal in candidates]
+    speed_signals = [speed_signal] if speed_signal is not None and candidates else []
+    rate, used = resolve_rate(scaled, [*candidates, *speed_signals], description, report)
+    if is_microphone and responses:
+        report.faults.append(f"{responses[0].name} moves; leave Description.sensor microphone out")
+    if not candidates or not report.is_clean:
+        return None
+    speed = resolve_speed(used[-1], rate, description, report) if speed_signals else None
+    if not report.is_clean:
+        return None
+    values = np.stack([signal.values * factor for signal, factor in zip(used, factors, strict=False)])
+    return np.asarray(values if len(factors) > 1 else values[0], dtype=np.float64), rate, speed
+
+
+def _resolve_factor(signal: Signal, description: Description, report: ImportReport) -> float:
+    """Return the factor of an acceleration to m/s^2; 0 where it is none, or its unit is unknown."""
+    unit = resolve_response_unit(signal, description, report)
+    if unit is None:
+        return 0.0
+    if unit[0] != "acceleration":
+        report.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
+    return unit[1]

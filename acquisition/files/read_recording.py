@@ -43,77 +43,51 @@ BUILT_IN_FORMATS = (
     PULSE_FORMAT,
     TEXT_TABLE_FORMAT,
 )
-"""The table last: it takes any text."""
+"""Formats of this package; the text table is last because it takes any text."""
 FORMAT_HEAD_SIZE = 4096
-"""Bytes at the start of a file that a format is asked with."""
+"""Number of bytes at the start of a file by which formats recognize it."""
+EMPTY_DESCRIPTION = Description()
+"""Description that states nothing."""
+DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
+"""Decimal signs of a text by their names."""
+Result = TypeVar("Result")
 
 _log = logging.getLogger(__name__)
 
 
 def list_formats() -> tuple[Format, ...]:
-    """All formats in the order in which they are asked: those of other packages, which know their own files, first."""
+    """List all formats in the order of their detection.
+
+    Returns
+    -------
+    tuple of Format
+        Formats of other packages first, because they know their own files, then those of this package.
+    """
     return (*_load_plugin_formats()[0], *BUILT_IN_FORMATS)
 
 
-def detect_format(path: Path) -> Format:
-    """The format of a file by its content; DataError for one that is empty or of no known format."""
-    with open_regular_file(path, math.inf) as file:
-        head = file.read(FORMAT_HEAD_SIZE)
-    if not head:
-        raise DataError(f"{path}: the file is empty")
-    for file_format in list_formats():
-        if _matches_format(file_format, head, path):
-            return file_format
-    titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
-    raise DataError(
-        f"{path}: of no format that is known here; export it as one of these: {titles}{describe_broken_formats()}"
-    )
+def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> Recording:
+    """Inspect a recorded file of any known format.
 
+    Parameters
+    ----------
+    path
+        Recorded file.
+    description
+        What the file does not state.
 
-def describe_broken_formats() -> str:
-    """What is wrong with formats of other packages, to be added to the error of a file; empty where nothing is."""
-    return "".join(f"; {fault}" for fault in _load_plugin_formats()[1])
+    Returns
+    -------
+    Recording
+        Hits or FRF, or the `problems` that prevent it.
 
+    Raises
+    ------
+    DataError
+        For a file that is damaged or of no known format.
 
-def _matches_format(file_format: Format, head: bytes, path: Path) -> bool:
-    try:
-        return file_format.matches(head, path)
-    except PLUGIN_ERRORS as error:  # code of others may raise anything; the other formats are asked still
-        _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, format_exception_line(error))
-        return False
-
-
-@functools.cache
-def _load_plugin_formats() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
-    """Formats of other packages, and a remark on each that cannot be used."""
-    formats: dict[str, Format] = {}
-    remarks: list[Remark] = []
-    taken = {built_in.name for built_in in BUILT_IN_FORMATS}
-    for point in sorted(entry_points(group=FORMATS_ENTRY_POINT_GROUP), key=lambda point: point.name):
-        plugin = load_plugin(point, Format)
-        if isinstance(plugin, Format) and plugin.name not in taken | formats.keys():
-            formats[plugin.name] = plugin
-        elif isinstance(plugin, Format):
-            remarks.append(
-                make_unusable_remark(Format, point.name, f"{get_package_name(point)} is not the only one to bring it")
-            )
-        else:
-            remarks.append(plugin)
-    return tuple(formats.values()), tuple(remarks)
-
-
-Result = TypeVar("Result")
-EMPTY_DESCRIPTION = Description()
-"""A person who says nothing."""
-DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
-"""Decimal signs of a text by what a person calls them."""
-
-
-def inspect_file(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Recording:
-    """A recorded file as it is understood, what is missing or wrong in it told as its `complaint`.
-
-    DataError for a file that is damaged or of no format that is known.
-
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> line = np.arange(400.0, 500.0)
     >>> with TemporaryDirectory() as folder:
@@ -122,52 +96,75 @@ def inspect_file(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Rec
     ...     unclear = inspect_file(f"{folder}/frf.csv")
     ...     clear = inspect_file(f"{folder}/frf.csv", Description(unit="m/N"))
     >>> print(unclear.complaint)
-    it does not say: the unit of real (--unit, such as m/N, um/N, g/N)
+    it does not say: the unit of real (Description.unit, such as m/N, um/N, g/N)
     >>> clear.complaint, clear.frf.frequency.size
     ('', 100)
     """
     path = Path(path)
     file_format = detect_format(path)
-    held = read_contents(file_format, path, said)
+    held = read_contents(file_format, path, description)
     if isinstance(held, Contents):
-        contents = (
-            held
-            if said.force is None
-            else append_force_signals(held, _read_force_contents(said.force, said), said.force)
-        )
-        return _convert_errors(file_format, path, lambda: resolve_recording(path, file_format.title, contents, said))
+        contents = held
+        if description.force is not None:
+            contents = append_force_signals(
+                held, _read_force_contents(description.force, description), description.force
+            )
+        title = file_format.title
+        return _convert_errors(file_format, path, lambda: resolve_recording(path, title, contents, description))
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
-    options = said.list_signal_options()
-    complaint = f"a {file_format.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
-    recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), complaint)
+    options = ", ".join(description.list_signal_options())
+    problems = f"a {file_format.title} says itself what it holds; leave out {options}" if options else ""
+    recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), problems)
     return recording if about is None else _add_circumstances(recording, about)
 
 
-def read_contents(file_format: Format, path: Path, said: Description) -> Contents | list[Hit] | Frf:
-    """What a file of this format holds, behind the lines that are passed over of a text; DataError where it is none."""
-    read_from, option = file_format.read_from, f"--skip {said.skip}" if said.skip else f"--decimal {said.decimal}"
-    if not said.skip and not said.decimal:
-        return _convert_errors(file_format, path, lambda: file_format.read(path))
-    if read_from is None:
-        raise DataError(f"{path}: {option}: a {file_format.title} is no text of lines; leave the option out")
-    if said.decimal not in DECIMAL_SIGNS:
-        raise DataError(f"{path}: {option}: is no decimal sign; give comma or point")
-    sign = DECIMAL_SIGNS[said.decimal]
-    return _convert_errors(file_format, path, lambda: read_from(path, said.skip or 0, sign))
+def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
+    """Read the hits of a recorded file with time histories, or the FRF of one with an FRF.
+
+    Parameters
+    ----------
+    path
+        Recorded file of any known format.
+    description
+        What the file does not state.
+
+    Returns
+    -------
+    list of Hit or Frf
+        Contents in SI units.
+
+    Raises
+    ------
+    DataError
+        Where the file holds neither, or does not state enough.
+    """
+    recording = inspect_file(path, description).require_valid()
+    return list(recording.hits) if recording.frf is None else recording.frf
 
 
-def _read_force_contents(path: Path, said: Description) -> Contents:
-    file_format = detect_format(path)
-    held = read_contents(file_format, path, said if file_format.read_from else EMPTY_DESCRIPTION)
-    if not isinstance(held, Contents):
-        raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
-    return held
+def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit]:
+    """Read the hits of a recorded file, bad ones too (see `check_hit`).
 
+    Parameters
+    ----------
+    path
+        Recorded file of any known format.
+    description
+        What the file does not state.
 
-def read_hits(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit]:
-    """The hits in a recorded file of any known format, bad ones too (see `check_hit`); DataError where there are none.
+    Returns
+    -------
+    list of Hit
+        Hits in the order of the file.
 
+    Raises
+    ------
+    DataError
+        Where the file has no hits, or does not state enough.
+
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
@@ -180,17 +177,34 @@ def read_hits(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[H
     >>> f"{hit.sample_rate:.0f} Hz, {hit.force.max():.0f} N, {abs(hit.acceleration).max():.1f} m/s^2"
     '10240 Hz, 199 N, 102.1 m/s^2'
     """
-    recording = read_recording(path, said)
+    recording = read_recording(path, description)
     if isinstance(recording, Frf):
         raise DataError(f"{path}: holds an FRF, not the hits it was made from")
     return recording
 
 
-def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
-    """The FRF that a recorded file holds, or that estimated (H1) from its good hits.
+def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> Frf:
+    """Read the FRF of a recorded file, or estimate it (H1) from its good hits.
 
-    DataError where it holds neither, or no good hit.
+    Parameters
+    ----------
+    path
+        Recorded file of any known format.
+    description
+        What the file does not state.
 
+    Returns
+    -------
+    Frf
+        Receptance (m/N).
+
+    Raises
+    ------
+    DataError
+        Where the file has neither an FRF nor a good hit, or does not state enough.
+
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> line = np.arange(400.0, 500.0)
     >>> with TemporaryDirectory() as folder:
@@ -205,7 +219,7 @@ def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
     file_format = detect_format(path)
     if file_format.read_frf is not None:
         return file_format.read_frf(path)
-    recording = read_recording(path, said)
+    recording = read_recording(path, description)
     if isinstance(recording, Frf):
         return recording
     try:
@@ -217,18 +231,52 @@ def read_frf(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> Frf:
     return frf
 
 
-def read_recording(path: Path | str, said: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
-    """Hits where the file holds time histories, an FRF where it holds one; DataError where it holds neither."""
-    recording = inspect_file(path, said).require_valid()
-    return list(recording.hits) if recording.frf is None else recording.frf
+def detect_format(path: Path) -> Format:
+    """Detect the format of a file by its content; raise DataError for an empty file or an unknown format."""
+    with open_regular_file(path, math.inf) as file:
+        head = file.read(FORMAT_HEAD_SIZE)
+    if not head:
+        raise DataError(f"{path}: the file is empty")
+    for file_format in list_formats():
+        try:
+            if file_format.matches(head, path):
+                return file_format
+        except PLUGIN_ERRORS as error:  # the code of other packages may raise anything
+            reason = format_exception_line(error)
+            _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, reason)
+    titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
+    raise DataError(
+        f"{path}: of no format that is known here; export it as one of these: {titles}{_describe_broken_formats()}"
+    )
+
+
+def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:
+    """Read a file of this format, with the skipped lines and the decimal sign of the description for a text."""
+    read_from, skip, decimal = file_format.read_from, description.skip, description.decimal
+    if not skip and not decimal:
+        return _convert_errors(file_format, path, lambda: file_format.read(path))
+    option = f"{path}: Description.skip {skip}" if skip else f"{path}: Description.decimal {decimal}"
+    if read_from is None:
+        raise DataError(f"{option}: a {file_format.title} is no text of lines; leave the option out")
+    if decimal not in DECIMAL_SIGNS:
+        raise DataError(f"{option}: is no decimal sign; give comma or point")
+    return _convert_errors(file_format, path, lambda: read_from(path, skip or 0, DECIMAL_SIGNS[decimal]))
+
+
+def _read_force_contents(path: Path, description: Description) -> Contents:
+    file_format = detect_format(path)
+    held = read_contents(file_format, path, description if file_format.read_from else EMPTY_DESCRIPTION)
+    if not isinstance(held, Contents):
+        raise DataError(f"Description.force {path}: a {file_format.title}; it needs no other file")
+    return held
 
 
 def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
-    """What some work on a file gives; DataError for whatever goes wrong in it."""
+    """Return the result of some work on a file; raise DataError for any failure."""
     try:
         return work()
     except DataError as error:
-        raise DataError(f"{error}{describe_broken_formats()}") from error
+        raise DataError(f"{error}{_describe_broken_formats()}") from error
     except OSError:
         raise
     except Exception as error:
@@ -236,6 +284,29 @@ def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result])
         raise DataError(
             f"{path}: cannot be read as {file_format.title} ({reason}); export it in another format"
         ) from error
+
+
+def _describe_broken_formats() -> str:
+    """Return the faults in formats of other packages, to append to the error of a file."""
+    return "".join(f"; {remark}" for remark in _load_plugin_formats()[1])
+
+
+@functools.cache
+def _load_plugin_formats() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
+    """Return the formats of other packages, and a remark on each that cannot be used."""
+    formats: dict[str, Format] = {}
+    remarks: list[Remark] = []
+    taken = {built_in.name for built_in in BUILT_IN_FORMATS}
+    for point in sorted(entry_points(group=FORMATS_ENTRY_POINT_GROUP), key=lambda point: point.name):
+        plugin = load_plugin(point, Format)
+        if not isinstance(plugin, Format):
+            remarks.append(plugin)
+        elif plugin.name in taken | formats.keys():
+            text = f"{get_package_name(point)} is not the only one to bring it"
+            remarks.append(make_unusable_remark(Format, point.name, text))
+        else:
+            formats[plugin.name] = plugin
+    return tuple(formats.values()), tuple(remarks)
 
 
 def _list_facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
@@ -247,12 +318,6 @@ def _list_facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
 
 
 def _add_circumstances(recording: Recording, about: Circumstances) -> Recording:
-    return replace(
-        recording,
-        created=about.created,
-        tool=about.tool,
-        direction=about.direction,
-        operator=about.operator,
-        device=about.device,
-        conditions=about.conditions if about.machine else None,
-    )
+    names = ("created", "tool", "direction", "operator", "device")
+    conditions = about.conditions if about.machine else None
+    return replace(recording, conditions=conditions, **{name: getattr(about, name) for name in names})

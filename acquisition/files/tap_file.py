@@ -41,7 +41,8 @@ from acquisition.files.raw_hits import (
     write_raw_hits,
 )
 from acquisition.frf import Frf
-from acquisition.hit import Hit, HitFlags
+from acquisition.hit import Hit
+from acquisition.hit_fault import HitFlags
 from acquisition.tap_test import Circumstances, Conditions, SourceFile, TapTest
 
 if TYPE_CHECKING:

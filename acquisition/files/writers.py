@@ -14,8 +14,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
 from acquisition.frf import Frf
 from acquisition.hit import Hit
@@ -46,7 +46,7 @@ FRF_UNITS = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
 """Unit of each form of an FRF."""
 
 
-def convert_to_measured_form(frf: Frf) -> tuple[NDArray[np.complex128], str]:
+def convert_to_measured_form(frf: Frf) -> tuple[Complexes, str]:
     """An FRF in the form that its sensors gave, which keeps it exact, and its unit."""
     values = {"receptance": frf.receptance, "mobility": frf.mobility, "accelerance": frf.accelerance}
     return values[frf.measured_as], FRF_UNITS[frf.measured_as]
@@ -70,7 +70,7 @@ def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     return _encode_table({"time [s]": time, "force [N]": hit.force, "acceleration [m/s^2]": hit.acceleration}, labels)
 
 
-def _encode_table(columns: dict[str, NDArray[np.float64]], labels: ExportLabels, averages: int | None = None) -> bytes:
+def _encode_table(columns: dict[str, Floats], labels: ExportLabels, averages: int | None = None) -> bytes:
     keys = {
         "written by": "lobewatch",
         "recorded": labels.created.isoformat() if labels.created else "",
@@ -178,7 +178,7 @@ def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
 class _Abscissa:
     """An abscissa with its step, where it has one."""
 
-    def __init__(self, values: NDArray[np.float64], what: tuple[int, str, str], step: float | None = None) -> None:
+    def __init__(self, values: Floats, what: tuple[int, str, str], step: float | None = None) -> None:
         self.values, self.what = values, what
         self.step = step or float(values[-1] - values[0]) / (values.size - 1)
         even = values[0] + self.step * np.arange(values.size)
@@ -188,7 +188,7 @@ class _Abscissa:
 def _format_data_set_58(
     kind: int,
     axis: _Abscissa,
-    values: NDArray[np.float64] | NDArray[np.complex128],
+    values: Floats | Complexes,
     ordinates: tuple[tuple[int, str, str], tuple[int, str, str]],
     labels: ExportLabels,
     extra: str,
@@ -221,7 +221,7 @@ def _check_identification_line(text: str) -> str:
     return text or "NONE"
 
 
-def _format_values(axis: _Abscissa, values: NDArray[np.float64] | NDArray[np.complex128]) -> Iterator[str]:
+def _format_values(axis: _Abscissa, values: Floats | Complexes) -> Iterator[str]:
     """Even: 20 characters a number, four a line (complex: two pairs). Uneven: the abscissa (13) before each value."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     numbers = np.stack(parts, axis=1)

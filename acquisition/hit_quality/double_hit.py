@@ -7,43 +7,47 @@ from statistics import NormalDist
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hits.pulse import Pulse
 
 DOUBLE_HIT_SHARE = 0.025
-"""A second pulse above this share of the first makes a double hit: one of 3 % is found whatever its shape ..."""
+"""Height over the first pulse from which a second pulse makes a double hit; 3 % is found whatever its shape ..."""
 HEIGHT_NOISE_MARGIN = 3.0
-"""... and in noise: it is let pass only where it is smaller by this many times the noise of its height."""
+"""... in noise: a pulse is accepted only where it is lower by this many times the noise of its height."""
 PULSE_WIDTH_RATIOS = (0.7, 1.0, 1.4, 2.0)
-"""Widths searched for, against that of the first pulse: a lighter touch lasts longer."""
+"""Widths to search for, over that of the first pulse: a lighter touch lasts longer."""
 MIN_PULSE_PROMINENCE = 0.3
-"""Its middle stands this share of its height above either side: 0.75 of a pulse, 0 where the force only recovers."""
+"""Smallest prominence over either side, as a share of the height: 0.75 of a pulse, 0 of a recovering force."""
 PULSE_FALSE_ALARM_RATE = 1e-3
-"""Chance that noise alone passes for a second touch in one hit."""
+"""Probability that noise passes for a second pulse in one hit."""
 BINS_PER_PULSE = 8
-"""Samples a pulse width after averaging neighbours; fewer where it was recorded with fewer."""
+"""Number of averaged samples per pulse width; fewer where it was recorded with fewer."""
 
 
 @dataclass(frozen=True)
 class SecondPulse:
-    """A second pulse."""
+    """Second pulse of a hit."""
 
     delay: float
-    """Samples from the peak of the main pulse, negative where it came before."""
+    """Floats from the peak of the main pulse, negative before it."""
     share: float
     """Height over that of the main pulse (-)."""
 
 
 def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
-    """The highest second pulse farther than one pulse width from the main one; None where there is none.
+    """Find the highest second pulse more than one pulse width away from the main one; None without one.
 
-    The force is correlated with a raised-cosine bump less its own mean over three times its length: offset, drift and
-    mains hum drop out, and noise is averaged over a pulse. It must stand above either side: behind a conditioner with
-    a high pass the force sinks below zero after the main pulse and recovers, which is no touch. A pulse counts where
-    it stands out of the noise of that estimate (found by its median absolute deviation in the same record) farther
-    than noise alone would do in one of a thousand hits, however many samples it has, and is not for certain below
-    2.5 % of the main pulse.
+    The force is correlated with a raised-cosine bump less its own mean over three times its length. Offset, drift and
+    mains
+    hum drop out, and noise is averaged over a pulse. The bump must be higher than either side: behind a conditioner
+    with a
+    high pass the force sinks below zero after the main pulse and recovers, which is no touch. A pulse counts where it
+    is
+    farther out of the noise of that estimate (median absolute deviation in the same record) than noise would reach in
+    one of
+    a thousand hits, and is not certainly below 2.5 % of the main pulse.
+
     Source of the matched filter: Turin, IRE Trans. Inform. Theory 6 (1960) 311.
     """
     width = pulse.end - pulse.start
@@ -71,8 +75,8 @@ def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
     return best if best.share else None
 
 
-def _remove_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
-    """The force with a straight line where the main pulse stands, half its width on either side included."""
+def _remove_main_pulse(pulse: Pulse, width: int) -> Floats:
+    """Replace the main pulse and half its width on either side by a straight line."""
     low, high = max(pulse.start - width // 2, 0), min(pulse.end + width // 2, pulse.recorded.size)
     force = pulse.force
     before, after = force[max(low - width // 2, 0) : low], force[high : high + max(width // 2, 1)]
@@ -82,9 +86,11 @@ def _remove_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
     return force
 
 
-def _fit_bump_heights(force: NDArray[np.float64], foot: float) -> NDArray[np.float64]:
-    """Least-squares height of a raised cosine of this foot width (samples) around every sample, and how far its middle
-    stands above the higher of both sides, shape (2, n)."""
+def _fit_bump_heights(force: Floats, foot: float) -> Floats:
+    """Fit a raised cosine around every sample, shape (2, n).
+
+    Rows: its least-squares height, and its prominence over the higher side. foot: width of the bump (samples).
+    """
     half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
     place = np.arange(-wing, wing + 1)
     bump = 0.5 * (1 + np.cos(2 * np.pi * place / foot))
@@ -102,30 +108,31 @@ def _fit_bump_heights(force: NDArray[np.float64], foot: float) -> NDArray[np.flo
 
 
 PREDICTION_ORDER = 32
-"""Samples that the next one is predicted from: two for each mode, and more of them for noise."""
+"""Number of samples that the next one is predicted from: two per mode, and more for noise."""
 MIN_DECAY_SAMPLES = 8 * PREDICTION_ORDER
-"""Samples of a decay below which nothing is told."""
+"""Smallest number of samples of a decay."""
 ERROR_AVERAGING_TIME = 3e-4
-"""Time over which errors of the prediction are taken together (s): half of a short pulse."""
+"""Time over which prediction errors are averaged (s): half of a short pulse."""
 SECOND_INPUT_RISE_TIME = 1e-3
-"""Time in which a second touch has risen (s): errors are compared with those before it."""
+"""Rise time of a second touch (s): errors are compared with those before it."""
 MIN_ERROR_RISE = 2.0
-"""Times the largest error before it: what is not linear in a structure errs most while it moves most."""
+"""Smallest ratio to the largest error before it: nonlinear structures err most while they move most."""
 DECAY_FALSE_ALARM_RATE = 1e-4
-"""Chance that noise alone passes for a second touch in one decay ..."""
+"""Probability that noise passes for a second touch in one decay ..."""
 NOISE_LIMIT_MARGIN = 1.25
-"""... times this, for its errors are not quite independent."""
+"""... with this margin, as its errors are not quite independent."""
 REWEIGHTING_ROUNDS = 4
-"""Rounds in which errors that stand out lose weight."""
-
-Samples = NDArray[np.float64]
+"""Number of rounds in which outlying errors lose weight."""
 
 
-def find_second_input(decay: Samples, sample_rate: float, noise: float) -> float | None:
-    """Time (s) from the first sample of a free decay (m/s^2) at which it was hit again; None where nothing shows it.
+def find_second_input(decay: Floats, sample_rate: float, noise: float) -> float | None:
+    """Find the time (s) in a free decay (m/s^2) at which it was hit again; None without a sign of it.
 
-    noise: rms at rest (m/s^2); what has fallen below three times that does not count. What comes within 1 ms is not
-    told from a decay that is not linear. Source of the prediction: Makhoul (1975), Proc. IEEE 63, 561.
+    A second touch breaks the linear prediction that a free decay obeys. noise: rms at rest (m/s^2); a decay below three
+    times
+    that does not count. A touch within 1 ms cannot be distinguished from a nonlinear decay.
+
+    Source of the prediction: Makhoul (1975), Proc. IEEE 63, 561.
     """
     visible = _cut_at_noise(decay, max(round(1e-3 * sample_rate), 4), noise)
     if visible.size < MIN_DECAY_SAMPLES:
@@ -144,15 +151,15 @@ def find_second_input(decay: Samples, sample_rate: float, noise: float) -> float
     return float(above[0] + rise + PREDICTION_ORDER) / sample_rate if above.size else None
 
 
-def _cut_at_noise(decay: Samples, width: int, noise: float) -> Samples:
-    """The decay up to where it is lost in noise."""
+def _cut_at_noise(decay: Floats, width: int, noise: float) -> Floats:
+    """Return the decay up to where noise hides it."""
     pieces = decay[: decay.size // width * width].reshape(-1, width)
     loud = np.flatnonzero(np.sqrt(np.mean(pieces**2, axis=1)) > 3 * noise)
     return decay[: (int(loud[-1]) + 1) * width] if loud.size else decay[:0]
 
 
-def _compute_prediction_error(signal: Samples) -> Samples:
-    """What the samples before it do not tell of each sample, by a prediction that outliers do not bend."""
+def _compute_prediction_error(signal: Floats) -> Floats:
+    """Return the errors of a linear prediction that outliers do not bend."""
     past = np.lib.stride_tricks.sliding_window_view(signal[:-1], PREDICTION_ORDER)
     now, weight = signal[PREDICTION_ORDER:], np.ones(signal.size - PREDICTION_ORDER)
     error = now

@@ -5,44 +5,45 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline
 
 MIN_RAIL_SAMPLES = 3
-"""Samples at a rail of the converter, or in a row at the extreme value of one without codes."""
+"""Smallest number of samples at a rail, or in a row at the extreme value of a converter without codes."""
 FLAT_TOP_SHARE = 0.7
-"""Share of the samples of a band below the maximum in its uppermost third: a round top has 1/sqrt(3) = 0.58 ..."""
+"""Share of a band's samples in its uppermost third from which a top is flat; a round top has 1/sqrt(3) = 0.58 ..."""
 FLAT_TOP_SAMPLES = 2.5
-"""... and a flat one this many samples more than that."""
+"""... and a flat top this many samples more than that."""
 FLAT_TOP_SCALES = (1.0, 0.25, 0.0625)
-"""Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier cuts that off too."""
+"""Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier clips the noise too.
+"""
 
 STEP_SEARCH_SAMPLES = 1024
-"""Samples that are looked at first for steps finer than any that are believed."""
+"""Number of samples that are searched first for a step finer than any credible one."""
 MIN_STEP_SHARE = 1e-4
-"""Finest step, as a share of the maximum, that is believed of a recording without codes."""
+"""Finest credible step of a recording without codes, as a share of the maximum."""
 
 
 @dataclass(frozen=True)
 class Overload:
-    """A cut-off signal."""
+    """Clipped signal."""
 
     level: float
-    """Level at which it was cut off (N or m/s^2)."""
+    """Level at which it was clipped (N or m/s^2)."""
     samples: int
-    """Number of samples there."""
+    """Number of samples at that level."""
     inferred: bool
-    """Whether this is told by the shape of the signal, not by the codes at the rail of the converter."""
+    """Whether the shape of the signal shows it instead of codes at the rail of the converter."""
 
 
 def find_overload(hit: Hit, index: int) -> Overload | None:
-    """Overload of the force (index 0) or of the response (1); None where there is none.
+    """Find an overload of the force (index 0) or of the response (1); None without one.
 
-    Certain: three codes at one rail. Inferred: the extreme value three times in a row in a recording without codes
-    whose steps are not that coarse; or a flat top, as an amplifier makes it that saturates before the converter does,
-    with noise on top.
+    Certain: three codes at one rail. Inferred: the extreme value three times in a row in a recording without codes and
+    with
+    finer steps; or a flat top with noise on it, as an amplifier makes that saturates before its converter.
     """
     signal = np.asarray((hit.force, hit.acceleration)[index])
     scale, row = 0.0, index if hit.has_force else 0
@@ -66,11 +67,12 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     return None
 
 
-def _count_flat_top(above: NDArray[np.float64], half: float) -> int:
-    """Samples of a flat top whose noise stays within +-half of it; 0 where the top is round.
+def _count_flat_top(above: Floats, half: float) -> int:
+    """Count the samples of a flat top whose noise stays within +-half of it; 0 where the top is round.
 
-    Of a round top, whatever its width, the band below the maximum holds 1/sqrt(3) of the samples that one three
-    times as deep holds; of a cut one nearly all. Neither can be told where the signal is not well above its noise.
+    The band below a round maximum of any width holds 1/sqrt(3) of the samples of a band three times as deep. Of a flat
+    top
+    it holds nearly all. Neither can be seen where the signal is not well above its noise.
     """
     top = float(above.max())
     if top <= 8 * half:
@@ -80,8 +82,8 @@ def _count_flat_top(above: NDArray[np.float64], half: float) -> int:
     return inside if flat else 0
 
 
-def _find_finest_step(above: NDArray[np.float64]) -> float:
-    """Smallest step between two values: that of the converter; at least that of four written digits."""
+def _find_finest_step(above: Floats) -> float:
+    """Return the smallest step between two values, that of the converter; at least that of four written digits."""
     top = float(above.max())
     for part in (above[:STEP_SEARCH_SAMPLES], above):
         step = float(np.min(np.diff(np.unique(part)), initial=top))
@@ -90,10 +92,10 @@ def _find_finest_step(above: NDArray[np.float64]) -> float:
     return max(step, MIN_STEP_SHARE * top)
 
 
-def _count_at_rail(above: NDArray[np.float64], step: float) -> int:
-    """Samples at the maximum where it stands three times in a row; 0 where it does so because the steps are coarse.
+def _count_at_rail(above: Floats, step: float) -> int:
+    """Count the samples at a maximum held three times in a row; 0 where the steps are coarse.
 
-    The three steps below the one that holds a round top together hold at least as many samples as that one.
+    The three steps below the one that holds a round top together hold at least as many samples.
     """
     equal = above == above.max()
     in_a_row = np.convolve(equal, np.ones(MIN_RAIL_SAMPLES), "valid").max() >= MIN_RAIL_SAMPLES
@@ -105,21 +107,21 @@ def _count_at_rail(above: NDArray[np.float64], step: float) -> int:
 MAINS_FREQUENCIES = (50.0, 60.0)
 """Frequencies of the mains (Hz)."""
 MAINS_HARMONICS = 5
-"""Multiples of them that hum has."""
+"""Number of harmonics of hum."""
 HUM_TAIL_SHARE = 0.2
-"""Share of the record at its end that hum is looked for in."""
+"""Share of the record at its end that is searched for hum."""
 MAX_UNEXPLAINED_VARIANCE = 0.5
-"""Share of the variance that hum leaves at most, before the hit and at the end of the record."""
+"""Largest share of the variance that hum leaves, before the hit and at the end of the record."""
 MIN_HUM_SAMPLES = 8
-"""Samples before the hit that are too few to tell."""
+"""Smallest number of samples before the hit."""
 
 
-def fit_mains_hum(hit: Hit, before: int) -> NDArray[np.float64] | None:
-    """Tones at 50 or 60 Hz and their multiples in the response (m/s^2), shape (n,); None where there is no hum.
+def fit_mains_hum(hit: Hit, before: int) -> Floats | None:
+    """Fit tones at 50 or 60 Hz and their harmonics to the response (m/s^2), shape (n,); None without hum.
 
-    before: samples that stand before the hit. Hum goes on through the hit with one phase: the same tones must stand in
-    these samples and in the last fifth of the record, and be most of what is there. What rings after the hit was not
-    there before it.
+    before: samples ahead of the hit. Hum goes on through the hit with one phase: the same tones must make up most of
+    these
+    samples and of the last fifth of the record. Ringing after the hit was not there before it.
     """
     quiet, tail = slice(0, before), slice(int((1 - HUM_TAIL_SHARE) * hit.acceleration.size), None)
     if before < MIN_HUM_SAMPLES:
@@ -130,15 +132,15 @@ def fit_mains_hum(hit: Hit, before: int) -> NDArray[np.float64] | None:
 
 
 def is_like_hum(hit: Hit) -> bool:
-    """Whether the last two fifths of the response are mostly steady tones at multiples of the mains, proved or not."""
+    """Return whether the last two fifths of the response are mostly harmonics of the mains, proved or not."""
     size = hit.acceleration.size
     last, last_two = slice(int((1 - HUM_TAIL_SHARE) * size), None), slice(int((1 - 2 * HUM_TAIL_SHARE) * size), None)
     tones = (_fit_tones(hit, mains, last_two) for mains in MAINS_FREQUENCIES)
     return any(_is_mostly_tone(tone, hit.acceleration, last) for tone in tones)
 
 
-def _fit_tones(hit: Hit, mains: float, *parts: slice) -> NDArray[np.float64]:
-    """Multiples of this frequency (Hz) that fit these parts together, over the whole record."""
+def _fit_tones(hit: Hit, mains: float, *parts: slice) -> Floats:
+    """Fit harmonics of a frequency (Hz) to these parts together, and return them over the whole record."""
     angle = (
         2
         * np.pi
@@ -153,5 +155,5 @@ def _fit_tones(hit: Hit, mains: float, *parts: slice) -> NDArray[np.float64]:
     return np.asarray(waves @ np.linalg.lstsq(columns, values, rcond=None)[0][:-1])
 
 
-def _is_mostly_tone(tone: NDArray[np.float64], signal: NDArray[np.float64], part: slice) -> bool:
+def _is_mostly_tone(tone: Floats, signal: Floats, part: slice) -> bool:
     return bool(np.var((signal - tone)[part]) <= MAX_UNEXPLAINED_VARIANCE * np.var(signal[part]))

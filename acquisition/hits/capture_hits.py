@@ -1,6 +1,7 @@
 """Capture hits from a stream of scans or from one long record.
 
-again when the structure is at rest.
+A hit starts at a crossing of the trigger level, with hysteresis and real pre-trigger samples. The trigger arms again
+when the structure is at rest.
 """
 
 from __future__ import annotations
@@ -14,33 +15,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.hit import Hit, TapInputs
 from acquisition.source import Source
 
 MAX_REST_RMS_RATIO = 2.0
-"""The response is at rest where its rms is at most this many times that of the baseline ..."""
+"""Largest rms of a response at rest, over that of the baseline ..."""
 MAX_REST_CODES = 2.0
-"""... or this many steps of the converter."""
+"""... or in steps of the converter."""
 STEADY_RMS_SHARE = 0.8
-"""A response does not fall where the median rms of the second half of what was seen is this share of the first's."""
+"""Median rms of the second half of the observed stretches over that of the first half from which a response is steady.
+"""
 
 
 class RestDetector:
-    """The level of rest of one response, in steps of the converter."""
+    """Detector of rest for one response, in steps of the converter."""
 
     def __init__(self, rms: float, patience: int) -> None:
-        """rms: of the baseline (steps); patience: after how many stretches that do not fall they are the new baseline,
-        e.g. because of a machine started next door."""
+        """Start with the rms of the baseline (steps).
+
+        patience: number of stretches after which a steady level becomes the new baseline, e.g. of a machine next door.
+        """
         self._rms = rms
         self._seen: deque[float] = deque(maxlen=patience)
 
-    def is_at_rest(self, response: NDArray[np.int32]) -> bool:
-        """Whether the structure is at rest over these samples."""
+    def is_at_rest(self, response: Codes) -> bool:
+        """Return whether the structure is at rest over these samples."""
         return bool(np.std(response) <= max(MAX_REST_RMS_RATIO * self._rms, MAX_REST_CODES))
 
-    def update(self, response: NDArray[np.int32]) -> bool:
-        """The same, for the next of successive stretches that rest is waited for in."""
+    def update(self, response: Codes) -> bool:
+        """Take the next stretch while waiting for rest, and return whether the structure is at rest in it."""
         self._seen.append(float(np.std(response)))
         if len(self._seen) == self._seen.maxlen:
             half = len(self._seen) // 2
@@ -54,31 +59,31 @@ class RestDetector:
 
 
 NEW_BASELINE_TIME = 2.0
-"""A response that has not fallen for so long is no ringing but the new baseline (s)."""
+"""Time after which a steady response is the new baseline instead of ringing (s)."""
 
 
 @dataclass(frozen=True)
 class Trigger:
-    """When a record begins and how long it is."""
+    """Start and length of a record."""
 
     level: float
-    """Force that starts a record when crossed upwards (N); size of the acceleration where that starts it (m/s^2)."""
+    """Force that starts a record when crossed upwards (N), or absolute acceleration where that triggers (m/s^2)."""
     n_samples: int
     """Length of a record (samples)."""
     pre_trigger: int
-    """Samples kept from before the crossing."""
+    """Samples to keep from before the crossing."""
     hysteresis: float = 0.5
-    """The trigger arms only after the quantity has stayed below this share of the level for pre_trigger samples."""
+    """Share of the level below which the quantity must stay for pre_trigger samples before the trigger arms."""
     rest_rms: float | None = None
-    """rms of the acceleration at rest (m/s^2): armed only after pre_trigger samples at rest; None arms
-    by the level alone."""
+    """Rms of the acceleration at rest (m/s^2): the trigger arms only after pre_trigger samples at rest. None: no such
+    check.
+    """
     quantity: ChannelQuantity = "force"
-    """Quantity that starts a record: the acceleration where no sensor measures the force."""
+    """Quantity that triggers: the acceleration where no sensor measures the force."""
     offset: float = 0.0
-    """Value of that quantity at rest, from which the level counts (N or m/s^2): a sensor may feel gravity."""
+    """Value of that quantity at rest, from which the level counts (N or m/s^2), e.g. gravity."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot trigger."""
         if not (np.isfinite(self.level) and self.level > 0):
             raise ValueError(f"trigger level={self.level} is not > 0")
         if not 0 < self.pre_trigger < self.n_samples:
@@ -86,10 +91,24 @@ class Trigger:
 
 
 def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
-    """Hits of a started source, one after the other, unchecked; scans that were lost inside one are counted in it.
+    """Yield the hits of a started source without evaluating them.
 
     Nothing is interpolated: a record with a gap has its samples closed up and `lost_scans` > 0.
 
+    Parameters
+    ----------
+    source
+        Started source.
+    trigger
+        Start and length of a record.
+
+    Yields
+    ------
+    Hit
+        Hits in the order of their time.
+
+    Examples
+    --------
     >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> careful = Hammering(double_hits=0.0, overloads=0.0)
     >>> tapped = HammeredStructure(spindle, 10240.0, np.random.default_rng(1), careful)
@@ -106,22 +125,34 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
 
 
 class HitSearch:
-    """The scans not yet done with, and where in them the search stands (positions count scans received)."""
+    """Search of a stream for hits."""
 
     def __init__(
         self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger, direction: str = ""
     ) -> None:
-        """Search a stream of these channels from its next scan on; direction: as for `select_input_channels`."""
+        """Search a stream of these channels from its next scan on.
+
+        Parameters
+        ----------
+        channels
+            Channels of the stream.
+        sample_rate
+            Sample rate (Hz).
+        trigger
+            Start and length of a record.
+        direction
+            Direction of the hits; selects one of several responses as `TapInputs.select` does.
+        """
         self._inputs = TapInputs.select(channels, trigger.quantity, direction)
         self._used = self._inputs.channels
         self._rate, self._trigger = sample_rate, trigger
-        self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
+        self._level, self._offset = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
         self._gap = 1 if trigger.quantity == "force" else trigger.pre_trigger
-        self._codes: NDArray[np.int32] = np.empty((len(self._used), 0), np.int32)
-        self._added: list[NDArray[np.int32]] = []
+        self._codes: Codes = np.empty((len(self._used), 0), np.int32)
+        self._added: list[Codes] = []
         self._size = 0
-        self._from = 0
-        self._quiet = 0
+        self._position = 0
+        self._quiet_count = 0
         self._crossing: int | None = None
         self._gaps: list[tuple[int, int]] = []
         self._overloads: list[tuple[int, int, int]] = []
@@ -129,7 +160,7 @@ class HitSearch:
         if trigger.rest_rms is not None:
             patience = max(round(NEW_BASELINE_TIME * sample_rate / trigger.pre_trigger), 2)
             self._rest = RestDetector(trigger.rest_rms / abs(self._used[-1].scale), patience)
-        self._settled = self._rest is None
+        self._rested = self._rest is None
         self.too_early = 0
         """Hits passed over because the structure was not at rest."""
 
@@ -140,11 +171,17 @@ class HitSearch:
 
     @property
     def armed(self) -> bool:
-        """Whether a hit that comes now is recorded."""
-        return self._crossing is None and self._settled and self._quiet >= self._trigger.pre_trigger
+        """Whether the next hit would be recorded."""
+        return self._crossing is None and self._rested and self._quiet_count >= self._trigger.pre_trigger
 
     def feed(self, block: Block) -> Iterator[Hit]:
-        """The hits that are complete with this block."""
+        """Yield the hits that are complete with this block.
+
+        Parameters
+        ----------
+        block
+            Next scans of the stream.
+        """
         if block.lost_before:
             self._gaps.append((self._size, block.lost_before))
         self._add(block)
@@ -161,10 +198,10 @@ class HitSearch:
         self._added.append(block.codes if is_all else block.codes[list(self._inputs.rows)])
         self._size = end
 
-    def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
-        """The next complete record, the scans lost in it and its overloads; None until more blocks have come."""
+    def _next_record(self) -> tuple[Codes, int, int] | None:
+        """Return the next complete record, its lost scans and its overloads; None until more blocks arrive."""
         if self._crossing is None and not self._trigger_on_crossing():
-            self._forget(self._from - self._trigger.pre_trigger)
+            self._forget(self._position - self._trigger.pre_trigger)
             return None
         start = (self._crossing or 0) - self._trigger.pre_trigger
         end = start + self._trigger.n_samples
@@ -174,25 +211,25 @@ class HitSearch:
         record = self._codes[:, start:end].copy()
         lost = sum(count for position, count in self._gaps if start < position < end)
         masks = (mask for first, last, mask in self._overloads if first < end and last > start)
-        self._from, self._quiet, self._crossing, self._settled = end, 0, None, self._rest is None
+        self._position, self._quiet_count, self._crossing, self._rested = end, 0, None, self._rest is None
         return record, lost, functools.reduce(operator.or_, masks, 0)
 
     def _join(self) -> None:
-        """Not at every block: a record under way would be copied as often."""
+        """Join the blocks, but not at every block: a record in progress would be copied as often."""
         self._codes = np.concatenate([self._codes, *self._added], axis=1)
         self._added.clear()
 
-    def _heard(self, start: int, end: int | None = None) -> NDArray[np.float64]:
-        """Codes of what triggers, positive for a hit: the acceleration swings to either side of its rest."""
-        codes = self._codes[0, start:end] - self._middle
+    def _get_trigger_signal(self, start: int, end: int | None = None) -> Floats:
+        """Return the triggering codes, positive for a hit; an acceleration swings to either side of its rest."""
+        codes = self._codes[0, start:end] - self._offset
         swings = self._trigger.quantity == "acceleration"
         return np.asarray(np.abs(codes) if swings else np.sign(self._used[0].scale) * codes, dtype=np.float64)
 
     def _trigger_on_crossing(self) -> bool:
-        """Find the next crossing that is preceded by rest; hits before it are passed over."""
+        """Find the next crossing after rest, and pass over hits before it."""
         self._join()
         before = self._trigger.pre_trigger
-        while self._settled or self._settle():
+        while self._rested or self._wait_for_rest():
             crossing = self._find_crossing()
             if crossing is None:
                 return False
@@ -202,49 +239,50 @@ class HitSearch:
                 self._crossing = crossing
                 return True
             self.too_early += 1
-            self._from, self._quiet, self._settled = crossing + 1, 0, False
+            self._position, self._quiet_count, self._rested = crossing + 1, 0, False
         return False
 
-    def _settle(self) -> bool:
+    def _wait_for_rest(self) -> bool:
         """Step over stretches of pre_trigger samples to the end of the first one without a hit and at rest."""
         width = self._trigger.pre_trigger
-        while self._rest is not None and self._from + width <= self._codes.shape[1]:
-            start, self._from = self._from, self._from + width
-            heard = self._heard(max(start - 1, 0), self._from)
-            above = heard >= self._level
+        while self._rest is not None and self._position + width <= self._codes.shape[1]:
+            start, self._position = self._position, self._position + width
+            signal = self._get_trigger_signal(max(start - 1, 0), self._position)
+            above = signal >= self._level
             self.too_early += int(np.count_nonzero(above[1:] & ~above[:-1]))
-            still = self._rest.update(self._codes[-1, start : self._from])
-            if still and np.max(heard) < self._trigger.hysteresis * self._level:
-                self._settled, self._quiet = True, width
+            still = self._rest.update(self._codes[-1, start : self._position])
+            if still and np.max(signal) < self._trigger.hysteresis * self._level:
+                self._rested, self._quiet_count = True, width
                 return True
         return False
 
     def _find_crossing(self) -> int | None:
-        """First sample at the level in a loud run that follows pre_trigger quiet samples.
+        """Find the first sample at the level in a loud run after pre_trigger quiet samples.
 
-        Loud is above the hysteresis level; what swings is loud in between, too. A run that is still open at the end is
-        looked at again with the next block, unless it has lasted a whole record (an offset, not a hit).
+        Loud is above the hysteresis level, and the gaps of a swinging signal count as loud. A run that is open at the
+        end is
+        searched again with the next block, unless it has lasted a whole record: then it is an offset instead of a hit.
         """
-        heard = self._heard(self._from)
-        loud = np.flatnonzero(heard >= self._trigger.hysteresis * self._level)
+        signal = self._get_trigger_signal(self._position)
+        loud = np.flatnonzero(signal >= self._trigger.hysteresis * self._level)
         if not loud.size:
-            self._quiet += heard.size
-            self._from += heard.size
+            self._quiet_count += signal.size
+            self._position += signal.size
             return None
         starts = loud[np.diff(loud, prepend=-self._gap - 1) > self._gap]
-        ends = loud[np.diff(loud, append=heard.size + self._gap) > self._gap] + 1
-        quiet = starts - np.concatenate(([-self._quiet], ends[:-1]))
+        ends = loud[np.diff(loud, append=signal.size + self._gap) > self._gap] + 1
+        quiet = starts - np.concatenate(([-self._quiet_count], ends[:-1]))
         armed = quiet >= self._trigger.pre_trigger
         for start, end in zip(starts[armed], ends[armed], strict=True):
-            above = heard[start:end] >= self._level
+            above = signal[start:end] >= self._level
             if above.any():
-                return self._from + int(start) + int(np.argmax(above))
-        if heard.size - ends[-1] < self._gap and heard.size - starts[-1] < self._trigger.n_samples:
-            self._quiet = int(quiet[-1])
-            self._from += int(starts[-1])
+                return self._position + int(start) + int(np.argmax(above))
+        if signal.size - ends[-1] < self._gap and signal.size - starts[-1] < self._trigger.n_samples:
+            self._quiet_count = int(quiet[-1])
+            self._position += int(starts[-1])
         else:
-            self._quiet = int(heard.size - ends[-1])
-            self._from += heard.size
+            self._quiet_count = int(signal.size - ends[-1])
+            self._position += signal.size
         return None
 
     def _forget(self, count: int) -> None:
@@ -252,33 +290,32 @@ class HitSearch:
             return
         self._codes = self._codes[:, count:]
         self._size -= count
-        self._from -= count
+        self._position -= count
         self._gaps = [(position - count, lost) for position, lost in self._gaps if position > count]
         self._overloads = [(first - count, last - count, mask) for first, last, mask in self._overloads if last > count]
 
 
 MIN_HIT_SPACING = 0.2
-"""A pulse that comes sooner after the one before is a second touch: a hammer bounces within 0.1 s (s)."""
+"""Time below which a pulse belongs to the hit before it (s): a hammer bounces within 0.1 s."""
 PULSE_LEVEL_SHARE = 0.1
-"""A pulse is one where the force is above this share of the largest ..."""
+"""Level of a pulse as a share of the largest force ..."""
 PULSE_NOISE_RATIO = 10.0
-"""... and so many times its noise."""
+"""... and over the noise of the force."""
 PRE_HIT_TIME = 0.02
-"""Kept before each pulse, at rest (s)."""
+"""Time at rest to keep before each pulse (s)."""
 REST_RESPONSE_SHARE = 0.02
-"""The response is at rest where its rms over BEFORE is at most this share of the loudest after the hit before ..."""
+"""Largest rms of a response at rest, over the loudest stretch since the previous hit ..."""
 REST_NOISE_RATIO = 2.0
-"""... or so many times that of the quietest tenth of the record."""
+"""... or over the quietest tenth of the record."""
 MIN_LAST_HIT_SHARE = 0.5
-"""The last hit is left out where the record ends sooner after it than after this share of the others."""
+"""Shortest last hit that is kept, as a share of the others' length."""
 
 
 def split_record(record: Hit) -> list[Hit]:
-    """Each hit of a record by itself, all of one length; the record itself where it holds one hit or none.
+    """Split a long record into its hits, all of one length; return the record itself where it holds one hit or none.
 
-    A hit begins where the force rises at least 0.2 s after the pulse before and the response has come to rest; what
-    comes sooner belongs to the hit before it, which is then a double hit, or has not decayed. All are as long as the
-    shortest; nothing is interpolated.
+    A hit begins where the force rises at least 0.2 s after the previous pulse and the response is at rest. What comes
+    sooner belongs to the previous hit, which is then a double hit or has not decayed. Nothing is interpolated.
     """
     starts = _find_hit_starts(record)
     if len(starts) < 2:
@@ -300,7 +337,7 @@ def _cut_hit(record: Hit, begin: int, size: int, before: int) -> Hit:
 
 
 def _find_hit_starts(record: Hit) -> NDArray[np.intp]:
-    """Samples at which the force rises at the beginning of a hit, or without one the response."""
+    """Return the samples at which the force rises at the start of a hit; without a force, the response."""
     force, rate = record.signals[0] - np.median(record.signals[0]), record.sample_rate
     force = force if record.has_force else np.abs(force)
     noise = 1.4826 * float(np.median(np.abs(force)))
@@ -320,7 +357,7 @@ def _find_hit_starts(record: Hit) -> NDArray[np.intp]:
     return np.array(kept)
 
 
-def _compute_stretch_rms(response: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """rms about its mean of each stretch of so many samples; at least one."""
+def _compute_stretch_rms(response: Floats, width: int) -> Floats:
+    """Return the rms about the mean of each stretch of `width` samples, at least one."""
     count = max(response.size // width, 1)
     return np.array([float(np.std(part)) for part in np.array_split(response[: count * width], count)])

@@ -3,40 +3,69 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, find_pulse
 
 MAX_CONTACT_TIME = 1.5e-3
-"""Time after the beginning of a hit at which a decay begins (s): a hammer touches for 0.3 to 3 ms, and what is left of
-its force then moves no mode (`modal.decay_spectra`)."""
+"""Time after the start of a hit at which the free decay begins (s).
+
+A hammer touches for 0.3 to 3 ms; the rest of its force moves no mode (`modal.decay_spectra`).
+"""
 
 
-def extract_free_decay(hit: Hit) -> NDArray[np.float64]:
-    """Acceleration (m/s^2) from HIT_ENDS after the hit began to the end of the record, less what it is at rest."""
+def extract_free_decay(hit: Hit) -> Floats:
+    """Return the acceleration after the contact of the hammer, without its mean at rest.
+
+    Parameters
+    ----------
+    hit
+        Hit with a response.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Acceleration (m/s^2) from 1.5 ms after the start of the hit to the end of the record.
+    """
     before = count_pre_hit_samples(hit)
     rest = float(np.mean(extract_baseline(hit.acceleration, before)))
     return hit.acceleration[before + round(MAX_CONTACT_TIME * hit.sample_rate) :] - rest
 
 
 def measure_rest_noise(hit: Hit) -> float:
-    """rms of the acceleration about its mean at rest (m/s^2)."""
+    """Return the rms of the acceleration about its mean at rest (m/s^2)."""
     return float(np.std(extract_baseline(hit.acceleration, count_pre_hit_samples(hit))))
 
 
 FINE_ENVELOPE_PIECES, COARSE_ENVELOPE_PIECES = 200, 8
-"""Pieces of what is looked at whose rms make the envelope: many for a fast decay, few for one that outlasts them."""
+"""Number of pieces of the envelope for a decay that outlasts the fine ones."""
 ENVELOPE_NOISE_RATIO = 3.0
-"""The envelope counts while its rms is above this many times that of the baseline."""
+"""Level over the rms of the baseline above which the envelope counts."""
 
 
 def estimate_decay_time(hit: Hit) -> float:
-    """Time constant of the slowest decay that stands out of the noise in the response of a hit (s).
+    """Estimate the time constant of the slowest visible decay in the response of a hit.
 
-    The slope of the logarithm of the response's envelope over the later half of what is visible; inf where nothing
-    falls, 0 where nothing rings. Raises ValueError for a hit without a pulse.
+    It is the slope of the logarithm of the response's envelope over the later half of its visible part.
 
+    Parameters
+    ----------
+    hit
+        Hit with or without a force.
+
+    Returns
+    -------
+    float
+        Time constant (s); inf where nothing decays, 0 where nothing rings.
+
+    Raises
+    ------
+    ValueError
+        Where the force has no pulse.
+
+    Examples
+    --------
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
@@ -63,7 +92,7 @@ def estimate_decay_time(hit: Hit) -> float:
 
 
 def _locate_hit(hit: Hit) -> tuple[int, int]:
-    """First sample of the hit, and the first after it."""
+    """Return the first sample of the hit and the first after it."""
     if not hit.has_force:
         before = count_pre_hit_samples(hit)
         return int(0.8 * before), before + round(MAX_CONTACT_TIME * hit.sample_rate)
@@ -73,13 +102,13 @@ def _locate_hit(hit: Hit) -> tuple[int, int]:
     return pulse.start, pulse.end
 
 
-def _compute_rms_envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+def _compute_rms_envelope(signal: Floats, width: int) -> Floats:
     pieces = signal[: signal.size // width * width].reshape(-1, width)
     return np.asarray(np.sqrt(np.mean(pieces**2, axis=1)))
 
 
-def _fit_time_constant(signal: NDArray[np.float64], width: int) -> float:
-    """Of the later half of a ringing (samples)."""
+def _fit_time_constant(signal: Floats, width: int) -> float:
+    """Fit the time constant of the later half of a decay (samples)."""
     rms = _compute_rms_envelope(signal, width)
     late = rms[rms.size // 2 :] if rms.size >= 4 else rms
     if late.size < 2:

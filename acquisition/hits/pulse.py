@@ -6,26 +6,26 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.hit import Hit
 
 PULSE_END_SHARE = 0.05
-"""The pulse ends where the force has first fallen below this share of its peak, or into its noise ..."""
+"""Share of the peak below which a pulse ends, unless the noise is larger."""
 BASELINE_NOISE_RATIO = 3.0
-"""... which reaches to this many times the baseline's rms."""
+"""Level of the noise over the rms of the baseline, below which a pulse ends."""
 SEARCH_BLOCK_SIZE = 1024
-"""Samples looked at together."""
+"""Number of samples searched at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """The main force pulse of a hit."""
+    """Main force pulse of a hit."""
 
-    recorded: NDArray[np.float64]
-    """Force as it was recorded (N), shape (n,)."""
+    recorded: Floats
+    """Recorded force (N), shape (n,)."""
     offset: float
-    """Mean of its baseline (N)."""
+    """Mean of the baseline (N)."""
     peak_index: int
     """Sample of the largest force."""
     peak: float
@@ -35,16 +35,16 @@ class Pulse:
     end: int
     """First sample below 5 % of the peak or in the noise after it."""
     baseline_rms: float
-    """rms of the force before the pulse, or after it where nothing was recorded before (N)."""
+    """Rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
     @property
-    def force(self) -> NDArray[np.float64]:
-        """Force with the baseline's mean taken off (N), shape (n,)."""
+    def force(self) -> Floats:
+        """Force without its offset (N), shape (n,)."""
         return self.recorded - self.offset
 
 
 def find_pulse(hit: Hit) -> Pulse | None:
-    """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms, or none is known."""
+    """Find the highest force pulse; None where it is below 6 times the rms of the baseline, or no force was measured."""
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))
@@ -59,8 +59,8 @@ def find_pulse(hit: Hit) -> Pulse | None:
     return Pulse(hit.force, offset, top, peak, start, end, rms)
 
 
-def _count_above(foot: float, signal: NDArray[np.float64]) -> int:
-    """How many samples stand before the first one below the foot; looked for piece by piece, as pulses are short."""
+def _count_above(foot: float, signal: Floats) -> int:
+    """Count the samples before the first one below the foot. The search goes block by block because pulses are short."""
     for at in range(0, signal.size, SEARCH_BLOCK_SIZE):
         below = np.flatnonzero(signal[at : at + SEARCH_BLOCK_SIZE] < foot)
         if below.size:
@@ -69,9 +69,9 @@ def _count_above(foot: float, signal: NDArray[np.float64]) -> int:
 
 
 def count_pre_hit_samples(hit: Hit) -> int:
-    """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak.
+    """Count the samples before the hit: the pre-trigger, else those before the force last rises above 5 % of its peak.
 
-    Without a force: before the response first does. Each hit is looked at once.
+    Without a force the response is used. The count is cached per hit.
     """
     if hit.pre_trigger:
         return hit.pre_trigger
@@ -82,13 +82,13 @@ def count_pre_hit_samples(hit: Hit) -> int:
     return _pre_hit_counts[hit]
 
 
-def _count_before_force(force: NDArray[np.float64]) -> int:
+def _count_before_force(force: Floats) -> int:
     above = force[: int(np.argmax(force)) + 1] - np.median(force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
 
 
-def _count_before_response(response: NDArray[np.float64]) -> int:
+def _count_before_response(response: Floats) -> int:
     size = np.abs(response - np.median(response))
     return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
 
@@ -96,33 +96,34 @@ def _count_before_response(response: NDArray[np.float64]) -> int:
 _pre_hit_counts: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()
 
 
-def extract_baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:
-    """The first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
+def extract_baseline(signal: Floats, before: int) -> Floats:
+    """Return the first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
     quiet = signal[: int(0.8 * before)]
     return quiet if quiet.size >= 8 else signal[-max(signal.size // 10, 8) :]
 
 
 @dataclass(frozen=True, eq=False)
 class WindowedForce:
-    """The samples about the pulse of a hit, tapered; all others are taken as zero."""
+    """Tapered samples around the pulse of a hit; all others count as zero."""
 
     samples: slice
     """Place in the hit."""
-    force: NDArray[np.float64]
-    """Baseline's mean taken off, times window (N), shape (m,)."""
-    window: NDArray[np.float64]
+    force: Floats
+    """Force without its offset times the window (N), shape (m,)."""
+    window: Floats
     """Weight of each sample, 0 to 1, shape (m,)."""
     noise: float
-    """rms of the baseline (N)."""
+    """Rms of the baseline (N)."""
     mean_noise: float
     """Standard error of the baseline's mean (N)."""
 
 
 def window_force(hit: Hit) -> WindowedForce:
-    """The pulse with one of its widths on either side kept whole, then tapered to zero over one more (raised cosine).
+    """Return the pulse with one pulse width on either side, tapered to zero over one more (raised cosine).
 
-    A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
-    Each hit is looked at once. Raises ValueError for a hit without a pulse.
+    A tight window matters: noise inside it is alike at neighbouring lines, and shifts the mode. The result is cached
+    per
+    hit. Raises ValueError for a hit without a pulse.
     """
     if hit not in _windowed_forces:
         _windowed_forces[hit] = _compute_windowed_force(hit)

@@ -1,4 +1,4 @@
-"""Serial ports: finding them, opening them, and saying why one cannot be opened."""
+"""Serial ports: list, find and open them, and explain why one cannot be opened."""
 
 from acquisition.ports.serial_ports import (
     PortInfo,
@@ -9,11 +9,4 @@ from acquisition.ports.serial_ports import (
     list_serial_ports,
 )
 
-__all__ = [
-    "PortInfo",
-    "SerialLink",
-    "explain_no_ports",
-    "find_usb_identity",
-    "find_usb_port",
-    "list_serial_ports",
-]
+__all__ = ["PortInfo", "SerialLink", "explain_no_ports", "find_usb_identity", "find_usb_port", "list_serial_ports"]

@@ -23,9 +23,19 @@ from acquisition.errors import DeviceError
 
 
 def find_usb_port(vid: int, serial_number: str) -> str | None:
-    """The port of the USB device with this vendor id and serial number; None while it is not plugged in.
+    """Find the port of a USB device, whose number may change when it is plugged in again.
 
-    A look at the list of ports, for a caller that waits for a device to come back.
+    Parameters
+    ----------
+    vid
+        USB vendor id.
+    serial_number
+        Serial number of the USB device, in any case.
+
+    Returns
+    -------
+    str or None
+        Port, None while the device is not plugged in.
     """
     wanted = (vid, serial_number.casefold())
     ports = (
@@ -35,7 +45,18 @@ def find_usb_port(vid: int, serial_number: str) -> str | None:
 
 
 def find_usb_identity(port: str) -> tuple[int, str] | None:
-    """Vendor id and serial number of what is plugged in at a port; None where it is no USB device or has no number."""
+    """Find what is plugged in at a port.
+
+    Parameters
+    ----------
+    port
+        Port name.
+
+    Returns
+    -------
+    tuple of int and str, or None
+        USB vendor id and serial number, None if it is no USB device or has no number.
+    """
     for listed in list_ports.comports(include_links=True):
         if listed.device == port and listed.vid is not None and listed.serial_number:
             return listed.vid, listed.serial_number
@@ -44,22 +65,28 @@ def find_usb_identity(port: str) -> tuple[int, str] | None:
 
 @dataclass(frozen=True)
 class PortInfo:
-    """What the system knows of a port; pseudo-terminals are never listed."""
+    """Port, as the system describes it. Pseudo-terminals are never listed."""
 
     device: str
     """Path or name to open, e.g. /dev/ttyACM0 or COM3."""
     vendor: int | None = None
-    """USB vendor; None where it is no USB device."""
+    """USB vendor id, None if it is no USB device."""
     product: int | None = None
-    """USB product."""
+    """USB product id."""
     serial_number: str = ""
     """Serial number of the USB device."""
     description: str = ""
-    """Description in the system's words."""
+    """Description by the system."""
 
 
 def list_serial_ports() -> list[PortInfo]:
-    """All ports, by name."""
+    """List all serial ports.
+
+    Returns
+    -------
+    list of PortInfo
+        Ports, sorted by name.
+    """
     return [
         PortInfo(port.device, port.vid, port.pid, port.serial_number or "", port.description or "")
         for port in sorted(comports())
@@ -72,11 +99,22 @@ NO_PORTS_REMEDIES = {
     "darwin": "plug the DAQ in and look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
     "win32": "plug the DAQ in and look under Ports (COM & LPT) of the Device Manager",
 }
-"""Cure by sys.platform."""
+"""Remedy by sys.platform."""
 
 
 def explain_no_ports(platform: str | None = None) -> str:
-    """What to do where no serial port exists, one sentence; platform as `sys.platform` names it, None: this one."""
+    """Explain in one sentence what to do if no serial port exists.
+
+    Parameters
+    ----------
+    platform
+        Platform as in `sys.platform`, None for this one.
+
+    Returns
+    -------
+    str
+        Sentence with the remedy.
+    """
     cure = NO_PORTS_REMEDIES.get(platform or sys.platform, "plug the DAQ in")
     return (
         f"No serial port on this computer: {cure}; try another cable, some carry no data. "
@@ -85,12 +123,12 @@ def explain_no_ports(platform: str | None = None) -> str:
 
 
 def explain_open_error(port: str, error: Exception, platform: str = sys.platform) -> DeviceError:
-    """The error to raise, with the system's words and what to do."""
+    """Return the error to raise, with the system's words and the remedy."""
     text = str(error)
     busy = "another program uses it: close that program"
     if platform == "linux" and not port.startswith("socket:"):
         busy += f" (`sudo fuser -v {port}` names it; ModemManager lets go after half a minute)"
-    missing = "check the cable and the port's name (`lobewatch ports` lists all)"
+    missing = "check the cable and the port's name (`acquisition.scan_ports` lists all)"
     hints = {
         "lock": busy,
         "busy": busy,
@@ -107,7 +145,7 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
 
 
 def _explain_permission(port: str, platform: str) -> str:
-    """The exact fix; on Linux the port's group is what its owner must belong to."""
+    """Return the exact remedy. On Linux the user must belong to the port's group."""
     if platform != "linux":
         return "you may not use it: ask for the rights of an administrator"
     try:
@@ -127,13 +165,22 @@ MAX_UNREAD_BYTES = 16 << 20
 
 
 class SerialLink:
-    """An open port; `read` hands over what the reader thread has gathered."""
+    """Open serial port with a reader thread. `read` returns what the thread has received.
+
+    Parameters
+    ----------
+    port
+        Serial device name or socket://host:port. It is opened exclusively.
+    baud_rate
+        Rate of a port that is no USB device itself (baud).
+
+    Raises
+    ------
+    DeviceError
+        The port cannot be opened. The error has the system's words and a remedy.
+    """
 
     def __init__(self, port: str, baud_rate: int = 9600) -> None:
-        """Open the port for this program alone; DeviceError with the system's own words and a cure.
-
-        baud_rate: of a port that is no USB device itself (baud); such a one has none.
-        """
         self.port = port
         try:
             self._serial = _open_port(port, baud_rate)
@@ -142,7 +189,7 @@ class SerialLink:
         self._chunks: deque[bytes] = deque()
         self._waiting = 0
         self.overruns = 0
-        """How often the consumer was so late that all that waited was thrown away."""
+        """Number of times the consumer was so late that all unread bytes were discarded."""
         self._arrived = threading.Condition()
         self._running = True
         self._failure: Exception | None = None
@@ -150,7 +197,13 @@ class SerialLink:
         self._reader.start()
 
     def write(self, data: bytes) -> None:
-        """Send bytes; DeviceError where the device is gone."""
+        """Send bytes. DeviceError if the device is gone.
+
+        Parameters
+        ----------
+        data
+            Bytes to send.
+        """
         try:
             self._serial.write(data)
         except serial.SerialTimeoutException as error:
@@ -161,7 +214,13 @@ class SerialLink:
             raise self._unplugged() from error
 
     def read(self, timeout: float) -> bytes:
-        """All that has arrived, after at most timeout (s); empty where nothing came. DeviceError: unplugged."""
+        """Return all bytes that have arrived, empty if none has. DeviceError if the device was unplugged.
+
+        Parameters
+        ----------
+        timeout
+            Longest time to wait (s).
+        """
         deadline = time.monotonic() + timeout
         with self._arrived:
             while not self._chunks:
@@ -173,7 +232,7 @@ class SerialLink:
         return b"".join(chunks)  # outside the lock: the reader does not wait for it
 
     def close(self) -> None:
-        """Stop the reader and give the port back."""
+        """Stop the reader and close the port."""
         self._running = False
         with contextlib.suppress(OSError, AttributeError, TermiosError):
             self._serial.cancel_read()
@@ -209,14 +268,14 @@ class SerialLink:
 
 
 class _TcpPort:
-    """What SerialLink needs of a port, over TCP: pyserial's own socket:// hands over one byte a call."""
+    """Port interface of SerialLink over TCP. pyserial's own socket:// returns one byte per call."""
 
     def __init__(self, host: str, number: int) -> None:
         self._socket = socket.create_connection((host, number), timeout=2.0)
 
     @property
     def in_waiting(self) -> int:
-        """How much to ask for: as TCP does not tell how much there is, as much as there may be."""
+        """Number of bytes to ask for. TCP does not tell how many there are."""
         return 65536 if select.select([self._socket], [], [], 0)[0] else 0
 
     def read(self, size: int) -> bytes:
@@ -231,7 +290,7 @@ class _TcpPort:
         self._socket.sendall(data)
 
     def cancel_read(self) -> None:
-        """read() comes back by itself within 0.1 s."""
+        """Do nothing: `read` returns by itself within 0.1 s."""
 
     def close(self) -> None:
         self._socket.close()

@@ -1,4 +1,4 @@
-"""Whether hammer, accelerometer and DAQ are right: rate, skew, mass calibration, plausibility."""
+"""Check hammer, accelerometer and DAQ: sample rate, channel skew, mass calibration, plausibility."""
 
 from acquisition.sensors.daq_timing import (
     MeasuredRate,

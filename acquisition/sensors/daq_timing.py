@@ -7,35 +7,38 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DeviceError, Remark
 from acquisition.source import Source
 
 RATE_TOLERANCE = 0.002
-"""Share by which the measured rate may differ from the nominal one."""
+"""Relative deviation of the measured sample rate from the nominal one that is accepted."""
 ACCURATE_RATE_STD = RATE_TOLERANCE / 4
-"""Standard error of the rate, as a share of it, up to which it is sure ..."""
+"""Relative standard error up to which a measured rate is accurate."""
 MAX_RATE_STD = RATE_TOLERANCE
-"""... and above which nothing can be said."""
+"""Relative standard error above which a rate cannot be measured."""
 MIN_RATE_BLOCKS = 10
-"""Arrivals needed for a slope and its error."""
+"""Block arrivals needed for a slope and its error."""
 USB_POLL_INTERVAL = 1e-3
-"""A USB host asks its devices once a millisecond: neither end of the time is known better (s)."""
+"""Uncertainty of both ends of the time (s): a USB host polls its devices once a millisecond."""
 RATE_STRETCHES = 20
-"""Stretches of the stream; of each only the least delayed block counts."""
+"""Stretches of the stream. Only the least delayed block of each counts."""
 
 
 @dataclass(frozen=True)
 class MeasuredRate:
-    """The rate of a stream of scans.
+    """Measured sample rate of a stream.
 
-    >>> MeasuredRate(rate=25600.2, std=0.5, n_scans=128000, seconds=5.0).is_sure
+    Examples
+    --------
+    >>> MeasuredRate(rate=25600.2, std=0.5, n_scans=128000, seconds=5.0).is_accurate
     True
     """
 
     rate: float
-    """Scans a second (Hz)."""
+    """Sample rate (Hz)."""
     std: float
     """Standard error of the rate (Hz)."""
     n_scans: int
@@ -45,21 +48,41 @@ class MeasuredRate:
 
     @property
     def is_accurate(self) -> bool:
-        """Whether it is known to 0.05 %."""
+        """Whether the standard error is at most 0.05 %."""
         return self.std <= ACCURATE_RATE_STD * self.rate
 
 
 def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic) -> MeasuredRate:
-    """Start a source, count its scans against the clock (s) for so many seconds, and stop it.
+    """Start a source, count its scans against the clock, and stop it.
 
-    A block can arrive late, never early. The stream is cut into 20 stretches; of each the block with the least delay
-    is kept, stretches that are late as a whole (a busy computer) are left out, and time is regressed on the scan count.
-    The standard error is that of the slope, enlarged where neighbouring residuals are alike (lag-1 correlation), and
-    joined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
+    A block can arrive late, never early. The stream is cut into 20 stretches. Of each the block with the least delay is
+    kept, stretches that are late as a whole (a busy computer) are left out, and time is regressed on the scan count.
+    The standard error is that of the slope, enlarged if neighbouring residuals are similar (lag-1 correlation), and
+    combined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
 
-    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive or the stream ends
-    before, and what the source raises.
+    Parameters
+    ----------
+    source
+        Source to start.
+    seconds
+        Length of the measurement (s).
+    clock
+        Function that returns the time (s).
 
+    Returns
+    -------
+    MeasuredRate
+        Sample rate and its standard error.
+
+    Raises
+    ------
+    ValueError
+        `seconds` is not > 0.
+    DeviceError
+        Fewer than 10 blocks arrive, the stream ends too early, or the source fails.
+
+    Examples
+    --------
     >>> fast = SimulatedSource(lambda first, n: np.zeros((1, n)), (Channel("force", 2.25e-3, 5.0),), 10240.0, 10**6)
     >>> ticks = iter(np.arange(10**6) * 0.05)  # s: a clock by which a block of 512 scans comes every 50 ms
     >>> round(measure_rate(fast, seconds=5.0, clock=lambda: next(ticks)).rate)  # Hz
@@ -89,9 +112,24 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
 
 
 def check_rate(measured: MeasuredRate, nominal: float) -> None:
-    """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz); where it is not sure,
-    by two standard errors more. DeviceError, too, where the standard error exceeds 0.2 %.
+    """Check a measured sample rate against the nominal one.
 
+    The rates may differ by 0.2 %, and by two standard errors more if the measured rate is not accurate.
+
+    Parameters
+    ----------
+    measured
+        Measured sample rate.
+    nominal
+        Nominal sample rate (Hz).
+
+    Raises
+    ------
+    DeviceError
+        The rates differ by more, or the standard error exceeds 0.2 %.
+
+    Examples
+    --------
     >>> check_rate(MeasuredRate(25600.2, 0.5, 128000, 5.0), nominal=25600.0)
     >>> check_rate(MeasuredRate(24000.0, 0.5, 120000, 5.0), nominal=25600.0)
     Traceback (most recent call last):
@@ -114,16 +152,29 @@ def check_rate(measured: MeasuredRate, nominal: float) -> None:
 
 
 def rate_remark(measured: MeasuredRate) -> Remark | None:
-    """Remark on a rate that is not sure; None where it is."""
+    """Return the remark on a sample rate that is not accurate.
+
+    Parameters
+    ----------
+    measured
+        Measured sample rate.
+
+    Returns
+    -------
+    Remark or None
+        Remark, None if the rate is accurate.
+    """
     if measured.is_accurate:
         return None
     share = measured.std / measured.rate
     text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
-    return Remark("rate-not-sure", "", text, "close other programs and run lobewatch sensors, which measures it again")
+    return Remark(
+        "rate-not-sure", "", text, "close other programs and run acquisition.measure_rate, which measures it again"
+    )
 
 
-def _fit_scan_period(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[float, float]:
-    """Seconds a scan and standard error, from the least delayed block of each stretch."""
+def _fit_scan_period(scans: Floats, arrived: Floats) -> tuple[float, float]:
+    """Return seconds per scan and standard error, from the least delayed block of each stretch."""
     period = (arrived[-1] - arrived[0]) / (scans[-1] - scans[0])
     std = 0.0
     stretches = np.array_split(np.arange(scans.size), min(RATE_STRETCHES, scans.size))
@@ -135,8 +186,8 @@ def _fit_scan_period(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -
     return period, std
 
 
-def _fit_robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Least-squares slope and standard error without the points that lie far above the others."""
+def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
+    """Return least-squares slope and standard error without the points far above the others."""
     rough = y - _median_slope(x, y) * x
     above = rough - np.median(rough)
     spread = 1.4826 * np.median(np.abs(above))
@@ -150,22 +201,22 @@ def _fit_robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[f
     return slope, float(np.sqrt(variance))
 
 
-def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
-    """Median of the slopes of all pairs of points (Theil and Sen); x rises."""
+def _median_slope(x: Floats, y: Floats) -> float:
+    """Return the median of the slopes of all pairs of points (Theil and Sen). x increases."""
     first, second = np.triu_indices(x.size, 1)
     return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
 
 
 SKEW_SEGMENT_SAMPLES = 1024
-"""Samples of a segment."""
+"""Samples per segment."""
 MIN_SKEW_SEGMENTS = 16
 """Segments needed for a coherence and a standard error."""
 MIN_SKEW_COHERENCE = 0.9
-"""Least coherence of a line that counts."""
+"""Lowest coherence of a line that counts."""
 MIN_COHERENT_SHARE = 0.1
-"""Least share of the lines that must count: one hum line fixes no delay."""
+"""Lowest share of lines that must count. One hum line determines no delay."""
 CORRELATION_OVERSAMPLING = 16
-"""Of the correlation whose maximum is the first guess."""
+"""Oversampling of the correlation whose maximum is the first estimate."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +224,7 @@ class MeasuredSkew:
     """Delay of the second channel's samples."""
 
     skew: float
-    """The second channel samples so much later than the first (s); the value for Channel.skew."""
+    """Time by which the second channel samples later than the first (s), the value for Channel.skew."""
     std: float
     """Standard error of the skew (s)."""
     coherent_share: float
@@ -181,17 +232,38 @@ class MeasuredSkew:
 
 
 def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> MeasuredSkew:
-    """Skew of two channels (n,) that were fed with one broad-band signal, in any unit, at a sample rate (Hz).
+    """Measure the skew of two channels that record the same broad-band signal.
 
-    The second channel takes y_k = x(t_k + s), so that conj(X) Y has the phase 2 pi f s. The phase of the mean over
-    Hann-windowed segments is fitted by a line through zero, weighted by g2 / (1 - g2) with the coherence g2, the
-    reciprocal of its variance (Bendat & Piersol, Random Data, ch. 9); the standard error is a jackknife over the
-    segments. The second record is then shifted back by the skew and the rest fitted again, twice: windows that do not
-    fall on the same piece of the signal, and lines that leak into their neighbours, would bend the phase a little.
+    The second channel takes y_k = x(t_k + s), so that conj(X) Y has the phase 2 pi f s. A line through zero is fitted
+    to the phase of the mean over Hann-windowed segments, weighted by g2 / (1 - g2) with the coherence g2, the
+    reciprocal of its variance. The standard error is a jackknife over the segments. The second record is then shifted
+    back by the skew and the rest fitted again, twice: segments that do not contain the same piece of the signal, and
+    leakage, would bend the phase a little.
 
-    Raises ValueError for records that differ in length, are shorter than 16 segments of 1024 or hold NaN or inf, for
-    two signals that are not the same one (coherence), and for a second channel of opposite sign.
+    Parameters
+    ----------
+    first, second : array_like, shape (n,)
+        Records of both channels, in any unit.
+    sample_rate
+        Sample rate (Hz).
 
+    Returns
+    -------
+    MeasuredSkew
+        Skew and its standard error.
+
+    Raises
+    ------
+    ValueError
+        The records differ in length, are shorter than 16 segments of 1024, hold NaN or inf, are not coherent, or have
+        opposite signs.
+
+    References
+    ----------
+    Bendat & Piersol, Random Data, ch. 9.
+
+    Examples
+    --------
     >>> noise = np.random.default_rng(1).normal(size=32769)
     >>> skew = measure_skew(noise[:-1], noise[1:], 51200.0)  # the second channel is a sample late
     >>> f"{skew.skew * 1e6:.2f} us, {1e6 / 51200:.2f} us"
@@ -207,8 +279,8 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
 
 
-def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) -> MeasuredSkew:
-    """Skew of records[0] and second, in samples."""
+def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
+    """Return the skew of records[0] and second, in samples."""
     cross, power = _segment_spectra(np.stack([records[0], second]))
     mean = np.mean(cross, axis=0)
     g2 = np.abs(mean) ** 2 / np.maximum(np.prod(np.mean(power, axis=1), axis=0), np.finfo(float).tiny)
@@ -216,7 +288,8 @@ def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) 
     share = float(np.mean(counts))
     if share < MIN_COHERENT_SHARE:
         raise ValueError(
-            f"the two channels do not carry one broad-band signal (coherence over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the "
+            "the two channels do not carry one broad-band signal "
+            f"(coherence over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the "
             f"lines, {MIN_COHERENT_SHARE:.0%} are needed); join both inputs with a T-piece and feed noise or taps"
         )
     omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
@@ -232,13 +305,13 @@ def _fit_phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) 
     return MeasuredSkew(rough + float(np.angle(np.mean(turned, axis=0)) @ weight), float(std), share)
 
 
-def _shift_back(record: NDArray[np.float64], samples: float) -> NDArray[np.float64]:
-    """The record as it would have been taken so many samples earlier; its ends are not right."""
+def _shift_back(record: Floats, samples: float) -> Floats:
+    """Return the record as if taken this many samples earlier. Its ends are not right."""
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(record.size) * samples)
     return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
 
 
-def _check_record(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def _check_record(values: ArrayLike, name: str) -> Floats:
     record = np.asarray(values, dtype=np.float64)
     if record.ndim != 1 or record.size < MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES or not np.all(np.isfinite(record)):
         raise ValueError(
@@ -248,23 +321,23 @@ def _check_record(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return record - np.mean(record)
 
 
-def _check_records(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
     records = [_check_record(first, "first"), _check_record(second, "second")]
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
     return np.stack(records)
 
 
-def _segment_spectra(records: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """conj(X) Y of every segment but the two at the ends (n, lines), and |X|^2, |Y|^2 (2, n, lines)."""
+def _segment_spectra(records: Floats) -> tuple[Complexes, Floats]:
+    """Return conj(X) Y of each segment but the two at the ends (n, lines), and |X|^2, |Y|^2 (2, n, lines)."""
     n = records.shape[1] // SKEW_SEGMENT_SAMPLES
     segments = records[:, : n * SKEW_SEGMENT_SAMPLES].reshape(2, n, SKEW_SEGMENT_SAMPLES)[:, 1:-1]
     spectra = np.fft.rfft((segments - segments.mean(axis=2, keepdims=True)) * np.hanning(SKEW_SEGMENT_SAMPLES))
     return np.conj(spectra[0]) * spectra[1], np.abs(spectra) ** 2
 
 
-def _find_correlation_peak(cross: NDArray[np.complex128]) -> float:
-    """Skew, to a fraction of a sample, where the correlation of both channels is largest in size."""
+def _find_correlation_peak(cross: Complexes) -> float:
+    """Return the skew, to a fraction of a sample, at the largest magnitude of the correlation."""
     size = CORRELATION_OVERSAMPLING * SKEW_SEGMENT_SAMPLES
     lag = int(np.argmax(np.abs(np.fft.irfft(cross, size))))
     return -(lag - size if lag > size // 2 else lag) / CORRELATION_OVERSAMPLING

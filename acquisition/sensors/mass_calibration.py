@@ -1,4 +1,4 @@
-"""Hammer and accelerometer checked together: a hung mass must obey F = m a."""
+"""Check hammer and accelerometer together: a hung mass must obey F = m a."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.channel import Channel
 from acquisition.errors import Remark
 from acquisition.estimation.estimate_frf import compute_cross_spectra, estimate_frf
@@ -16,41 +17,41 @@ from acquisition.hit import Hit
 from acquisition.sensors.plausibility import unit_mistake_remark
 
 MIN_CALIBRATION_FREQUENCY = 50.0
-"""Below it the pendulum (about 1 Hz) and the conditioner's high pass show (Hz)."""
+"""Lowest frequency used (Hz). Below it the pendulum (about 1 Hz) and the conditioner's high pass show."""
 MAX_RATIO_DEVIATION = 0.05
-"""The band ends where F/(m a) has left its low-frequency value by this share: mount or block resonate."""
+"""Relative change of F/(m a) at which the band ends: mount or block resonate."""
 RATIO_SMOOTHING_WIDTH = 200.0
-"""Width over which F/(m a) is averaged before its end is looked for (Hz)."""
+"""Width over which F/(m a) is averaged to find the end of the band (Hz)."""
 MIN_CALIBRATION_LINES = 20
-"""Lines needed in the band."""
+"""Frequency lines needed in the band."""
 MAX_SENSITIVITY_DEVIATION = 0.05
-"""Share by which both sensitivities together may be off; the stiffness K is off by the same share."""
+"""Accepted relative error of both sensitivities together. The stiffness K has the same error."""
 MAX_RIGID_PHASE = 10.0
 """Largest phase of F/(m a) of a rigid mass (deg)."""
 
 
 @dataclass(frozen=True)
 class MassCalibration:
-    """F/(m a) of a known mass. `str()` is the verdict in words."""
+    """Result F/(m a) of a known mass. `str()` is the verdict in words."""
 
     ratio: float
-    """|F|/(m |a|) towards low frequency, 1 where force and acceleration sensitivity agree."""
+    """Ratio |F|/(m |a|) at low frequency, 1 if force and acceleration sensitivity agree."""
     ratio_std: float
     """Standard error of the ratio over the hits."""
     phase: float
-    """Phase of a against F over the band, sign taken off (deg)."""
+    """Phase of a against F over the band, without the sign (deg)."""
     inverted: bool
     """Whether force and acceleration have opposite signs."""
     flatness: float
-    """Change of F/(m a) from low frequency to the end of the band, a share of it."""
+    """Relative change of F/(m a) from low frequency to the end of the band."""
     band: tuple[float, float]
     """Band of the fit (Hz)."""
     mass: float
     """Total moving mass (kg)."""
     n_hits: int
-    """Hits used."""
+    """Number of hits used."""
     channels: tuple[Channel, ...] | None = None
-    """Force and acceleration channel, where known."""
+    """Force and acceleration channel, if known."""
 
     @property
     def agrees(self) -> bool:
@@ -59,22 +60,22 @@ class MassCalibration:
 
     @property
     def sizes_agree(self) -> bool:
-        """The same without the signs."""
+        """Whether both sensitivities together are right within 5 %, signs ignored."""
         return abs(self.ratio - 1) <= MAX_SENSITIVITY_DEVIATION
 
     @property
     def force_sensitivity(self) -> float | None:
-        """Force sensitivity (V/N) if the accelerometer is trusted; None without channels."""
+        """Force sensitivity (V/N) if the accelerometer is trusted, None without channels."""
         return self.channels[0].sensitivity * self.ratio if self.channels else None
 
     @property
     def acceleration_sensitivity(self) -> float | None:
-        """Acceleration sensitivity (V per m/s^2) if the hammer is trusted; None without channels."""
+        """Acceleration sensitivity (V per m/s^2) if the hammer is trusted, None without channels."""
         return self.channels[1].sensitivity / self.ratio if self.channels else None
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What is wrong; nothing where the mass is rigid and both sensitivities agree."""
+        """Remarks on what is wrong, empty if the mass is rigid and both sensitivities agree."""
         doubts = (self._phase_remark, self._sign_remark, self._size_remark)
         return tuple(remark for remark in (*doubts, *self._mistakes) if remark is not None)
 
@@ -115,7 +116,7 @@ class MassCalibration:
         return () if self.sizes_agree else (unit_mistake_remark(self.ratio),)
 
     def __str__(self) -> str:
-        """All of it, a sentence a line."""
+        """Return all results, one sentence per line."""
         low, high = self.band
         lines = [
             f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
@@ -135,15 +136,36 @@ class MassCalibration:
 
 
 def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
-    """Check both sensitivities with good hits on a freely hung rigid mass (kg; all that moves, accelerometer included).
+    """Check both sensitivities with good hits on a freely hung rigid mass.
 
-    Per hit, m A = (q0 + q2 f^2) F is fitted by least squares weighted with |F|^2, from 50 Hz to where the force has
-    fallen by 20 dB or F/(m a) by 5 %; q2 takes up the foot of the mount's resonance f_m, A ~ 1/(1 - (f/f_m)^2). The
-    ratio is 1/q0 (noise on the acceleration averages out of it). Source: ISO 7626-5, calibration by a mass.
+    Per hit, m A = (q0 + q2 f^2) F is fitted by least squares weighted with |F|^2, from 50 Hz to the frequency where the
+    force has dropped by 20 dB or F/(m a) has changed by 5 %. q2 models the mount resonance f_m,
+    A ~ 1/(1 - (f/f_m)^2). The ratio is 1/q0, so that noise on the acceleration averages out.
 
-    Raises ValueError for a mass that is not > 0, fewer than 3 hits, hits of unlike length or rate, and where fewer
-    than 20 lines are left of the band.
+    Parameters
+    ----------
+    hits
+        Good hits, at least 3.
+    mass
+        Total moving mass, accelerometer included (kg).
 
+    Returns
+    -------
+    MassCalibration
+        Ratio F/(m a) and what follows from it.
+
+    Raises
+    ------
+    ValueError
+        The mass is not > 0, there are fewer than 3 hits, they differ in length or rate, or fewer than 20 lines of the
+        band are left.
+
+    References
+    ----------
+    ISO 7626-5, calibration by a mass.
+
+    Examples
+    --------
     A mass of 2 kg whose accelerometer shows 3 % too little:
 
     >>> random, time = np.random.default_rng(1), np.arange(2048) / 10240.0
@@ -168,7 +190,8 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     n = _count_flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
     if n < MIN_CALIBRATION_LINES:
         raise ValueError(
-            f"force and acceleration of this mass keep no fixed ratio: {n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} "
+            "force and acceleration of this mass keep no fixed ratio: "
+            f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} "
             "are needed; hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
         )
     f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]
@@ -188,8 +211,8 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     )
 
 
-def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.complex128]) -> int:
-    """How many lines there are before m A/F leaves the value of the first ones by 5 % of it."""
+def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Complexes) -> int:
+    """Return the number of lines before m A/F leaves its initial value by 5 %."""
     if f.size < MIN_CALIBRATION_LINES:
         return f.size
     near = max(MIN_CALIBRATION_LINES, round(RATIO_SMOOTHING_WIDTH / (f[1] - f[0])))
@@ -200,10 +223,8 @@ def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s
     return int(off[0]) if off.size else f.size
 
 
-def _fit_ratio(
-    f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
+def _fit_ratio(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Floats) -> Floats:
+    """Return q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
     root = np.sqrt(s_ff)
     return np.asarray(
         np.linalg.lstsq(np.stack([root, root * (f / f[-1]) ** 2], axis=1), s_fa / root)[0] / [1, f[-1] ** 2]

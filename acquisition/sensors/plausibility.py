@@ -1,4 +1,4 @@
-"""Sensitivities, units, dates and stiffnesses that cannot be right: a remark each, none where all is well."""
+"""Remarks on implausible sensitivities, units, calibration dates and stiffnesses."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ SENSITIVITY_LIMITS: Mapping[ChannelQuantity, tuple[float, float, float, str]] = 
     "force": (0.1e-3, 25e-3, 1.0, "hammers have 0.1 to 25 mV/N without gain"),
     "acceleration": (1e-3, 1.0, STANDARD_GRAVITY, "accelerometers have 1 to 1000 mV/g without gain"),
 }
-"""Lowest and highest sensitivity on the market (V per shop unit), SI units in one shop unit, and both in words."""
+"""Lowest and highest sensitivity on the market (V per shop unit), SI units per shop unit, and both in words."""
 FULL_SCALE_LIMITS = (0.01, 100.0)
 """Smallest and largest range of a converter (V)."""
 STIFFNESS_LIMITS = (1e5, 1e10)
-"""Modal stiffness at a tool tip or holder (N/m), from a thin end mill to a bare spindle nose."""
+"""Limits of modal stiffness at a tool tip or holder (N/m), from a thin end mill to a bare spindle nose."""
 SENSITIVITY_SPREAD = 1.2
-"""Single sensors lie this factor beside their nominal sensitivity."""
+"""Factor by which a single sensor may deviate from its nominal sensitivity."""
 UNIT_MISTAKE_TOLERANCE = 0.15
-"""How near to the factor of a unit mistake a ratio must be."""
+"""Relative deviation from the factor of a unit mistake up to which it explains a ratio."""
 DAYS_PER_MONTH = 365.25 / 12
 
 _LBF = POUND_FORCE
@@ -42,8 +42,20 @@ _UNIT_MISTAKES: Mapping[float, tuple[str, str]] = {
 
 
 def unit_mistake_remark(ratio: float) -> Remark | None:
-    """The unit mistake that explains F/(m a) of a known mass, within 15 %; None where none does.
+    """Return the remark on the unit mistake that explains F/(m a) of a known mass within 15 %.
 
+    Parameters
+    ----------
+    ratio
+        Ratio F/(m a) (-).
+
+    Returns
+    -------
+    Remark or None
+        Remark, None if no unit mistake explains the ratio.
+
+    Examples
+    --------
     >>> print(unit_mistake_remark(STANDARD_GRAVITY).text)
     the ratio 9.807 is near 9.81
     >>> unit_mistake_remark(1.05) is None
@@ -56,10 +68,22 @@ def unit_mistake_remark(ratio: float) -> Remark | None:
 
 
 def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
-    """What speaks against a channel's sensitivity and range; nothing where both are of this world.
+    """Return remarks on an implausible sensitivity or range of a channel.
 
+    Parameters
+    ----------
+    channel
+        Channel to check.
+
+    Returns
+    -------
+    tuple of Remark
+        Remarks, empty if sensitivity and range are plausible.
+
+    Examples
+    --------
     >>> millivolts = Channel("acceleration", sensitivity=10.2, full_scale=5.0)  # taken for volts
-    >>> [doubt.code for doubt in channel_remarks(millivolts)]
+    >>> [remark.code for remark in channel_remarks(millivolts)]
     ['sensitivity-not-believed']
     >>> channel_remarks(Channel("acceleration", sensitivity=10.2e-3 / 9.81, full_scale=5.0))
     ()
@@ -89,14 +113,26 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
 
 
 def _explain_slip(value: float, low: float, high: float) -> str:
-    """The slip by 1000 that explains a value outside its bounds, as a question; empty where it does not."""
+    """Return the slip by 1000 that explains a value outside its limits, as a question. Empty if it does not."""
     slips = {value / 1e3: "did you mean mV?", value * 1e3: "was it divided by 1000 twice?"}
     return next((words for corrected, words in slips.items() if low <= corrected <= high), "")
 
 
 def stiffness_remark(stiffness: float) -> Remark | None:
-    """A modal stiffness (N/m) outside what machine tools have; None inside.
+    """Return the remark on a modal stiffness outside the limits of machine tools.
 
+    Parameters
+    ----------
+    stiffness
+        Modal stiffness (N/m).
+
+    Returns
+    -------
+    Remark or None
+        Remark, None if the stiffness is plausible.
+
+    Examples
+    --------
     >>> stiffness_remark(2e7) is None, stiffness_remark(20.0).code  # N/m; 20 N/um is 2e7
     (True, 'stiffness-not-believed')
     """
@@ -113,11 +149,27 @@ def stiffness_remark(stiffness: float) -> Remark | None:
 
 
 def calibration_remark(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
-    """A sensor's calibration that is not known, longer ago than the interval, or of a day that cannot be; else None.
+    """Return the remark on an unknown, old or impossible calibration date of a sensor.
 
-    >>> from datetime import date_of_days
+    Parameters
+    ----------
+    channel
+        Channel of the sensor.
+    today
+        Date of today.
+    interval_months
+        Calibration interval (months).
+
+    Returns
+    -------
+    Remark or None
+        Remark, None if the calibration is recent.
+
+    Examples
+    --------
+    >>> from datetime import date
     >>> sensor = Channel("force", 2.25e-3, 5.0, serial_number="4711", calibration_date="2024-02-01")
-    >>> calibration_remark(sensor, date_of_days(2026, 3, 2)).code, calibration_remark(sensor, date_of_days(2024, 6, 1))
+    >>> calibration_remark(sensor, date(2026, 3, 2)).code, calibration_remark(sensor, date(2024, 6, 1))
     ('calibration-old', None)
     """
     if not channel.calibration_date:

@@ -1,4 +1,4 @@
-"""TAPS/1, the open frame for data acquisition boards: protocol, events, stream, source, emulator and bridge."""
+"""TAPS/1, the open frame format for data acquisition boards: protocol, source, emulator and bridge."""
 
 from acquisition.taps.bridge import TapsBridge
 from acquisition.taps.emulator import TapsEmulator, TapsFaults

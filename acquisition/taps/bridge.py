@@ -1,4 +1,4 @@
-"""Any device as a TAPS/1 device on TCP: its scans, losses, overloads and events, for a host elsewhere."""
+"""Serve any device as a TAPS/1 device on TCP, so that a host elsewhere can read it."""
 
 from __future__ import annotations
 
@@ -30,17 +30,36 @@ from acquisition.taps.protocol import (
 )
 
 BRIDGE_BUFFER_BYTES = 4 << 20
-"""Bytes kept for a host that is late, 20 s of two channels at 51.2 kHz and 16 bits; then scans are dropped and told."""
+"""Bytes kept for a slow host: 20 s of two channels at 51.2 kHz and 16 bits. Later scans are dropped and reported."""
 MAX_UNCLOCKED_BACKLOG_BYTES = 1 << 16
-"""Bytes that a device without a clock may be ahead of its host: it waits, and nothing is dropped."""
+"""Backlog at which a device without a clock waits for its host (bytes). Nothing is dropped."""
 REOPEN_INTERVAL = 0.5
-"""Time between two tries to find the device again (s)."""
+"""Time between two attempts to reopen the device (s)."""
 NO_SERIAL_NUMBER = "no-number"
-"""Serial number in INFO of a device that has none."""
+"""Serial number that INFO names for a device without one."""
 
 
 class TapsBridge:
-    """Serves one device at a time to one host at a time; while the device is away nobody is let in."""
+    """TAPS/1 server for one device and one host at a time. It accepts no host while the device is away.
+
+    Parameters
+    ----------
+    open_device
+        Function that opens the device.
+    tell
+        Function called with a sentence when the device goes away or comes back.
+    address
+        Address of this computer to listen at.
+    number
+        TCP port number, 0 for a free one.
+
+    Raises
+    ------
+    DeviceError
+        There is no device.
+    OSError
+        The bridge cannot listen at this address.
+    """
 
     def __init__(
         self,
@@ -50,11 +69,6 @@ class TapsBridge:
         address: str = "127.0.0.1",
         number: int = 0,
     ) -> None:
-        """Open the device and listen at an address; number: of the TCP port, 0 for a free one.
-
-        tell is given a sentence when the device goes away or comes back. Raises DeviceError where there is no device,
-        OSError where it cannot listen.
-        """
         self._open, self._tell, self._address = open_device, tell, address
         self._device = open_device()
         self._stopping = False
@@ -66,16 +80,16 @@ class TapsBridge:
 
     @property
     def port(self) -> str:
-        """What the host opens."""
+        """Port that the host opens."""
         return self._wire.port
 
     @property
     def device(self) -> Device:
-        """The device, as it was opened last."""
+        """Device, as opened last."""
         return self._device
 
     def stop(self) -> None:
-        """End run(), from another thread."""
+        """End `run`, from another thread."""
         self._stopping = True
 
     def run(self) -> None:
@@ -97,7 +111,7 @@ class TapsBridge:
         self._wire = TcpWire(number, self._address)
 
     def _wait(self) -> None:
-        """Until the device is there again."""
+        """Wait until the device is back."""
         while not self._stopping:
             time.sleep(REOPEN_INTERVAL)
             try:
@@ -110,7 +124,7 @@ class TapsBridge:
 
 
 class _BridgeSession:
-    """One device and the wire to its host."""
+    """Device and the wire to its host."""
 
     def __init__(self, device: Device, wire: TcpWire) -> None:
         self._device, self._wire, self._decoder = device, wire, FrameDecoder()
@@ -121,7 +135,7 @@ class _BridgeSession:
         self._streaming = False
 
     def serve(self, is_over: Callable[[], bool]) -> None:
-        """Answer and send until it is over; DeviceError where the device goes away or falls silent."""
+        """Answer and send until `is_over`. DeviceError if the device goes away or falls silent."""
         while not is_over():
             if not self._streaming:
                 self._answer(0.05)
@@ -174,7 +188,7 @@ class _BridgeSession:
             self._device.stop()
 
     def _send_block(self, block: Block) -> None:
-        """Send the scans of a block, or drop them where the host is late; the index tells what is missing."""
+        """Send the scans of a block, or drop them if the host is late. Scan indices show what is missing."""
         self._next += block.lost_before
         self._lost = self._lost or block.lost_before > 0
         codes = block.codes << np.array(self._shift, np.int32)[:, np.newaxis]
@@ -196,7 +210,7 @@ class _BridgeSession:
             self._stop()
 
     def _report(self) -> None:
-        """What has happened at the device, and now and then how it fares."""
+        """Send events, and the status from time to time."""
         while self._device.events:
             self._send(MessageType.EVENT, encode_event(self._device.events.popleft()))
         self._peak = max(self._peak, min(100 * len(self._wire.pending) // BRIDGE_BUFFER_BYTES, 100))

@@ -28,40 +28,48 @@ from acquisition.taps.protocol import (
 )
 
 NOISE_BYTES = bytes(range(7, 71)) + b"\x00" + bytes(range(200, 230))
-"""Bytes that are no frame; the end of them spoils the frame that follows."""
+"""Bytes that are no frame. Their end damages the next frame."""
 
 
 @dataclass(frozen=True)
 class TapsFaults:
-    """What goes wrong on purpose; all off."""
+    """Faults of an emulated TAPS/1 device and its cable. All are off by default."""
 
     unplug_after: int | None = None
-    """Hang up after so many scans of a stream, in the middle of a frame."""
+    """Number of scans after which the device hangs up within a frame."""
     stall_after: int | None = None
-    """Send nothing more after so many scans."""
+    """Number of scans after which it sends nothing more."""
     restart_after: int | None = None
-    """Begin another session unasked after so many scans, once."""
+    """Number of scans after which it starts another session by itself, once."""
     drop_every: int | None = None
-    """Every so many DATA frames, one is lost on the wire."""
+    """Period in DATA frames at which one is lost on the wire."""
     corrupt_every: int | None = None
-    """Every so many, one byte of one is altered."""
+    """Period at which one byte of a frame is altered."""
     duplicate_every: int | None = None
-    """Every so many, one comes twice."""
+    """Period at which a frame is sent twice."""
     cut_every: int | None = None
-    """Every so many, one lacks its second half with the delimiter, which spoils the next frame too."""
+    """Period at which a frame lacks its second half and delimiter, which damages the next frame too."""
     noise_every: int | None = None
-    """Every so many, noise stands before one and spoils it."""
+    """Period at which noise before a frame damages it."""
     noise_at_start: bool = False
-    """Noise stands before the first answer."""
+    """Whether noise precedes the first answer."""
     start_streaming: bool = False
-    """The device streams already when the host connects."""
+    """Whether the device streams already when the host connects."""
     cut_infos: int = 0
     """Number of INFO answers that lack their second half."""
     overload: int = 0
-    """Mask of the channels that every DATA frame reports as overloaded."""
+    """Mask of channels that every DATA frame reports as overloaded."""
 
     def apply(self, encoded: bytes, count: int) -> bytes:
-        """What arrives of the count-th DATA frame."""
+        """Return the bytes that arrive for a DATA frame.
+
+        Parameters
+        ----------
+        encoded
+            Bytes of the frame as sent.
+        count
+            Number of the DATA frame, from 1.
+        """
         if _is_due(self.drop_every, count):
             return b""
         if _is_due(self.corrupt_every, count):
@@ -78,14 +86,33 @@ def _is_due(period: int | None, count: int) -> bool:
 
 
 EMULATOR_IDENTITY = DeviceIdentity("lobewatch emulator", "EMU-1", "1.0")
-"""Who it says it is."""
+"""Identity that the emulator reports."""
 TAPS_BUFFER_SECONDS = 1.0
-"""What the device keeps for a slow host before it drops scans (s)."""
+"""Samples kept for a slow host before scans are dropped (s)."""
 
 
 class TapsEmulator(EmulatorThread):
-    """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one.
+    """Emulated TAPS/1 device. A context manager whose `port` opens like a real one.
 
+    Parameters
+    ----------
+    signal
+        Function (first_scan, n_scans) that returns values in N and m/s^2, shape (n_channels, n_scans).
+    channels
+        Channels of the device.
+    sample_rate
+        Sample rate (Hz).
+    realtime
+        Whether it sends by the clock. False sends as fast as the host reads.
+    tcp
+        Whether it listens on loopback instead of a pseudo-terminal.
+    link
+        Path that always leads to the pseudo-terminal, also after `replug`, like /dev/serial/by-id.
+    faults
+        Faults to inject, None for none.
+
+    Examples
+    --------
     >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> tapped = HammeredStructure(spindle, 10240.0, np.random.default_rng(1))
     >>> sensors = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1e-3, 5.0)
@@ -107,10 +134,6 @@ class TapsEmulator(EmulatorThread):
         link: Path | None = None,
         faults: TapsFaults | None = None,
     ) -> None:
-        """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
-
-        link: a name that always leads to the pseudo-terminal, also after replug(), as /dev/serial/by-id does.
-        """
         super().__init__(tcp, link)
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or TapsFaults()
@@ -133,10 +156,9 @@ class TapsEmulator(EmulatorThread):
             self._start(0)
 
     def replug(self) -> None:
-        """Plug it in again: powered on anew, nothing configured; the signal goes on where it was.
+        """Plug the device in again: powered on, not configured. The signal continues where it was.
 
-        With tcp the port is the same, and so is `link`; a pseudo-terminal has a new name: see `port`. unplug_after
-        is over.
+        The TCP port and `link` stay. A pseudo-terminal gets a new name, see `port`. `unplug_after` is switched off.
         """
         self.unplug()
         self._faults = replace(self._faults, unplug_after=None)
@@ -145,11 +167,16 @@ class TapsEmulator(EmulatorThread):
         self.serve()
 
     def send_event(self, event: Event) -> None:
-        """A button is pressed or a cable pulled, now; its scan is filled in here. A fault is told again at START."""
+        """Send an event now. Its scan is filled in here. An active fault is sent again at START.
+
+        Parameters
+        ----------
+        event
+            Pressed button or cable fault.
+        """
         self._pressed.append(event)
 
     def serve_once(self) -> bool:
-        """See EmulatorThread."""
         for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
             self._send(*DeviceCommands(self._info, self._configure, self._start, self._stop).answer(frame))
         while self._pressed:
@@ -197,7 +224,7 @@ class TapsEmulator(EmulatorThread):
         self._streaming = False
 
     def _start(self, n_scans: int) -> None:
-        """Begin a session, and tell what is wrong since earlier."""
+        """Start a session and report active faults."""
         self._session = (self._session + 1) % 0x10000
         self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
         self._sent = self._overruns = self._peak = 0
@@ -205,7 +232,7 @@ class TapsEmulator(EmulatorThread):
         self._pressed.extend(event for event in self._standing.values() if event.begins)
 
     def _stream(self) -> None:
-        """Send the frames that are due, drop them where the host has fallen behind, report now and then."""
+        """Send the frames that are due, drop them if the host is late, report from time to time."""
         now = time.monotonic()
         if self._is_hindered():
             return
@@ -229,7 +256,7 @@ class TapsEmulator(EmulatorThread):
         return stalled or not (self._realtime or self._has_room())
 
     def _has_room(self) -> bool:
-        """Whether the device's buffer takes another frame; when not in real time, little is sent ahead of the host."""
+        """Return whether the buffer takes another frame. Not in real time, little is sent ahead of the host."""
         return len(self.wire.pending) <= self._buffer_bytes()
 
     def _buffer_bytes(self) -> int:

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 from cobs import cobs
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel
 from acquisition.source import DeviceIdentity, Event, EventKind
 
@@ -31,11 +31,11 @@ SAMPLE_BITS = (16, 24, 32)
 FRAME_OVERHEAD = 28
 """Bytes of a DATA frame besides its samples."""
 NO_TEMPERATURE = -327.68
-"""In STATUS, of a device without a thermometer (degC)."""
+"""Temperature in STATUS of a device without a thermometer (degC)."""
 STATUS_INTERVAL = 0.5
 """Time between STATUS frames (s)."""
 MAX_ENCODED_FRAME = MAX_FRAME + -(-MAX_FRAME // 254)
-"""The same in COBS, without its delimiter (bytes)."""
+"""Longest frame in COBS, without its delimiter (bytes)."""
 _FRAME_HEADER = struct.Struct("<BBHI")
 _DATA_HEADER = struct.Struct("<QHBBI")
 _STATUS_BODY = struct.Struct("<QQIIh")
@@ -58,16 +58,16 @@ class MessageType(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """One TAPS/1 frame."""
+    """TAPS/1 frame."""
 
     type: int
-    """Number of a MessageType; unknown ones are passed on."""
+    """Number of a MessageType. Unknown ones are passed on."""
     seq: int = 0
     """Count of the frames of one sender, modulo 2^32."""
     body: bytes = b""
-    """Bytes behind the header."""
+    """Bytes after the header."""
     session: int = 0
-    """Number of the session, another one at each START."""
+    """Session number, a new one at each START."""
     flags: int = 0
     """Bit 0: samples were lost before this frame."""
 
@@ -81,26 +81,42 @@ class DeviceStatus:
     samples_sent: int
     """Scans sent since START."""
     buffer_peak_percent: int
-    """Highest filling of the device's buffer (%)."""
+    """Highest fill level of the device's buffer (%)."""
     overruns: int
-    """Number of times that buffer ran over."""
+    """Number of overruns of that buffer."""
     temperature: float
     """Temperature of the board (degC)."""
 
     def encode(self) -> bytes:
-        """The body."""
+        """Encode the body."""
         numbers = (self.samples_taken, self.samples_sent, self.buffer_peak_percent, self.overruns)
         return _STATUS_BODY.pack(*numbers, round(self.temperature * 100))
 
     @classmethod
     def decode(cls, body: bytes) -> DeviceStatus:
-        """The status in a body; struct.error for one of the wrong length."""
+        """Decode a body. struct.error for a wrong length."""
         taken, sent, peak, overruns, centidegrees = _STATUS_BODY.unpack(body)
         return cls(taken, sent, peak, overruns, centidegrees / 100)
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """The bytes of a frame, delimiter included; ValueError for one that is too long."""
+    """Encode a frame, delimiter included.
+
+    Parameters
+    ----------
+    frame
+        Frame to encode.
+
+    Returns
+    -------
+    bytes
+        COBS bytes of header, body and CRC, and a zero byte.
+
+    Raises
+    ------
+    ValueError
+        The frame is longer than MAX_FRAME.
+    """
     raw = _FRAME_HEADER.pack(frame.type, frame.flags, frame.session, frame.seq) + frame.body
     if len(raw) + 4 > MAX_FRAME:
         raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}; send fewer scans a frame")
@@ -108,7 +124,7 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def decode_frame(encoded: bytes) -> Frame | None:
-    """The frame in COBS bytes without their delimiter; None where length, COBS or CRC do not fit."""
+    """Decode COBS bytes without their delimiter. None if length, COBS or CRC is wrong."""
     if len(encoded) > MAX_ENCODED_FRAME:
         return None
     try:
@@ -124,16 +140,21 @@ def decode_frame(encoded: bytes) -> Frame | None:
 
 
 class FrameDecoder:
-    """Cuts a byte stream into frames; what is damaged is dropped and counted."""
+    """Decoder of a byte stream into frames. It drops and counts damaged ones."""
 
     def __init__(self) -> None:
-        """Start at an arbitrary point of the stream."""
         self._rest = b""
         self.dropped = 0
-        """Pieces between two delimiters that were no frame."""
+        """Number of pieces between two delimiters that were no frame."""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that are complete with these bytes."""
+        """Return the frames that these bytes complete.
+
+        Parameters
+        ----------
+        data
+            Received bytes, cut anywhere.
+        """
         *pieces, unfinished = (self._rest + data).split(b"\x00")
         self._rest = unfinished[: MAX_ENCODED_FRAME + 1]  # what is too long stays too long until its delimiter comes
         frames = [decode_frame(piece) for piece in pieces if piece]
@@ -142,8 +163,8 @@ class FrameDecoder:
         return good
 
 
-def encode_data(first_scan: int, codes: NDArray[np.int32], bits: int = 16, overload: int = 0) -> bytes:
-    """Body of a DATA frame: scans (n_channels, n_scans), interleaved, as words of 16, 24 or 32 bits."""
+def encode_data(first_scan: int, codes: Codes, bits: int = 16, overload: int = 0) -> bytes:
+    """Encode scans (n_channels, n_scans) as the body of a DATA frame, with words of 16, 24 or 32 bits."""
     n_channels, n_scans = codes.shape
     words = np.ascontiguousarray(codes.T)
     if bits == 16:
@@ -154,7 +175,7 @@ def encode_data(first_scan: int, codes: NDArray[np.int32], bits: int = 16, overl
 
 
 def decode_data(body: bytes) -> Block:
-    """The block in the body of a DATA frame; ValueError where length and header disagree."""
+    """Decode the body of a DATA frame. ValueError if length and header disagree."""
     if len(body) < _DATA_HEADER.size:
         raise ValueError(f"a DATA body of {len(body)} bytes is shorter than its header of {_DATA_HEADER.size}")
     first, n_scans, n_channels, form, overload = _DATA_HEADER.unpack_from(body)
@@ -165,7 +186,7 @@ def decode_data(body: bytes) -> Block:
     return Block(first, codes.reshape(n_scans, n_channels).T, overload)
 
 
-def _decode_words(samples: bytes, bits: int) -> NDArray[np.int32]:
+def _decode_words(samples: bytes, bits: int) -> Codes:
     if bits == 16:
         return np.frombuffer(samples, "<i2").astype(np.int32)
     if bits == 32:
@@ -177,7 +198,7 @@ def _decode_words(samples: bytes, bits: int) -> NDArray[np.int32]:
 
 
 MAX_PENDING_EVENTS = 256
-"""Events kept for one who does not take them."""
+"""Events kept until a consumer takes them."""
 _EVENT_BODY = struct.Struct("<BBBQ")
 _NO_CHANNEL = 0xFF
 
@@ -189,28 +210,27 @@ _FAULT_TEXTS = {
 
 
 def encode_event(event: Event) -> bytes:
-    """The body of an EVENT frame."""
+    """Encode the body of an EVENT frame."""
     channel = _NO_CHANNEL if event.channel is None else event.channel
     return _EVENT_BODY.pack(event.kind, channel, event.begins, event.scan)
 
 
 def decode_event(body: bytes) -> Event:
-    """The event in a body; struct.error for one of the wrong length."""
+    """Decode the body of an EVENT frame. struct.error for a wrong length."""
     kind, channel, begins, scan = _EVENT_BODY.unpack(body)
     return Event(kind, bool(begins), None if channel == _NO_CHANNEL else channel, scan)
 
 
 class EventLog:
-    """Events not yet taken, and the faults that stand; one thread adds, any other may take and look."""
+    """Pending events and active faults. One thread adds, any other may read."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
         self.new: deque[Event] = deque(maxlen=MAX_PENDING_EVENTS)
         self._standing: tuple[Event, ...] = ()
         self._last: tuple[int, int] | None = None
 
     def add(self, frame: Frame) -> None:
-        """Take in an EVENT frame; one that came before, or that is none, changes nothing."""
+        """Add an EVENT frame. A repeated or invalid one changes nothing."""
         if self._last == (frame.session, frame.seq):
             return
         self._last = frame.session, frame.seq
@@ -223,7 +243,7 @@ class EventLog:
         self._standing = (*remaining, event) if event.begins and event.kind in _FAULT_TEXTS else tuple(remaining)
 
     def fault(self, channels: Mapping[int, Channel]) -> str:
-        """One sentence on the faults that stand; empty where all is well. channels: by their i in INFO."""
+        """Describe the active faults in one sentence, empty if there are none. channels: by their i in INFO."""
         return "; ".join(
             _FAULT_TEXTS[EventKind(event.kind)].format(_sensor_name(event, channels)) for event in self._standing
         )
@@ -237,19 +257,19 @@ def _sensor_name(event: Event, channels: Mapping[int, Channel]) -> str:
 
 @dataclass(frozen=True)
 class DeviceCommands:
-    """What a device does at the commands of its host; ValueError, LookupError and TypeError refuse one."""
+    """Actions of a device for the commands of its host. ValueError, LookupError and TypeError reject one."""
 
     info: Callable[[], dict[str, Any]]
-    """Function that gives the body of INFO."""
+    """Function that returns the body of INFO."""
     configure: Callable[[dict[str, Any]], None]
-    """Function that takes the body of CONFIG."""
+    """Function that applies the body of CONFIG."""
     start: Callable[[int], None]
-    """Function that begins a session of so many scans, 0 for endless."""
+    """Function that starts a session of this many scans, 0 for endless."""
     stop: Callable[[], None]
-    """Function that ends it."""
+    """Function that ends the session."""
 
     def answer(self, frame: Frame) -> tuple[MessageType, bytes]:
-        """Do what a frame asks for; type and body of the answer."""
+        """Execute a command frame and return type and body of the answer."""
         about = frame.seq.to_bytes(4, "little")
         try:
             if frame.type == MessageType.HELLO:
@@ -270,7 +290,7 @@ class DeviceCommands:
 def build_info(
     identity: DeviceIdentity, channels: Sequence[Channel], rate: float, *, follows_clock: bool
 ) -> dict[str, Any]:
-    """The body of INFO of a device of one sample rate (Hz)."""
+    """Build the body of INFO for a device with one sample rate (Hz)."""
     return {
         "proto": 1,
         "model": identity.model,
@@ -301,7 +321,7 @@ def build_info(
 
 
 def parse_sample_bits(wish: dict[str, Any], channels: Sequence[Channel], rate: float) -> int:
-    """Bits of the samples that a CONFIG asks for; ValueError where it asks for what such a device does not have."""
+    """Return the sample bits that a CONFIG requests. ValueError if the device does not support the CONFIG."""
     if wish["fs"] != rate or wish["channels"] != list(range(len(channels))):
         raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
     return SAMPLE_BITS[wish["format"]]

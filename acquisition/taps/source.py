@@ -8,13 +8,12 @@ import struct
 import time
 from collections import deque
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.taps.protocol import (
     FRAME_OVERHEAD,
     LOST_BEFORE_FLAG,
@@ -30,11 +29,22 @@ from acquisition.taps.protocol import (
 )
 
 TAPS_PROBE_TIMEOUT = 1.0
-"""How long an answer is waited for (s)."""
+"""Time to wait for an answer to HELLO (s)."""
 
 
 def probe_taps(link: SerialLink) -> DeviceIdentity | None:
-    """Who answers to one HELLO; None where nobody does."""
+    """Send one HELLO and return who answers.
+
+    Parameters
+    ----------
+    link
+        Open serial link.
+
+    Returns
+    -------
+    DeviceIdentity or None
+        Identity from INFO, None if no TAPS/1 device answers.
+    """
     decoder = FrameDecoder()
     link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
     deadline = time.monotonic() + TAPS_PROBE_TIMEOUT
@@ -46,7 +56,7 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
 
 
 def parse_identity(info: dict[str, Any]) -> DeviceIdentity:
-    """Who the device is that sends this INFO."""
+    """Return the identity of the device that sent this INFO."""
     return DeviceIdentity(*(str(info.get(key) or "") for key in ("model", "serial", "fw")))
 
 
@@ -58,24 +68,24 @@ def _parse_identity_json(body: bytes) -> DeviceIdentity | None:
 
 
 class ScanStream:
-    """Blocks from the DATA frames of one session, in order."""
+    """Scans of one TAPS/1 session: each at most once, missing ones counted."""
 
     def __init__(self, session: int, n_channels: int) -> None:
-        """The session that the ACK of START names, and the number of channels asked for in CONFIG."""
+        """Expect the session that the ACK of START names, with this number of channels."""
         self._session, self._n_channels = session, n_channels
         self._next_scan = 0
         self.lost_scans = 0
-        """Scans that never came."""
+        """Number of scans that never arrived."""
         self.refused = 0
-        """DATA frames of this session that came twice or late, or contradict their own header."""
+        """Number of DATA frames of this session that were repeated, late or contradictory."""
         self.foreign = 0
-        """DATA frames of other sessions since the last one of this."""
+        """Number of DATA frames of other sessions since the last one of this session."""
 
     def accept(self, frame: Frame) -> Block | None:
-        """The block of a DATA frame with the scans lost before it; None where it is refused.
+        """Return the block of a DATA frame with the scans lost before it. None if the frame is rejected.
 
-        An index that jumps tells how many scans are missing. Where the device says that it lost some and the index
-        does not jump, one is counted, so that no hit with that joint in it passes.
+        A jump of the index tells how many scans are missing. If the device reports a loss without a jump, one lost scan
+        is counted, so that no hit that contains the gap passes.
         """
         if frame.session != self._session:
             self.foreign += 1
@@ -96,29 +106,40 @@ class ScanStream:
 
 
 TAPS_ANSWER_TIMEOUT = 1.0
-"""How long a command may stay unanswered before it is sent again (s)."""
+"""Time after which an unanswered command is sent again (s)."""
 TAPS_COMMAND_TRIES = 3
-"""How often a command is sent."""
+"""Number of times a command is sent."""
 TAPS_SILENCE_TIMEOUT = 3.0
-"""A streaming device that sends no scans for so long has failed (s); it reports itself every 0.5 s."""
+"""Time without scans after which a streaming device has failed (s). It reports itself every 0.5 s."""
 MIN_SCANS_PER_FRAME = 512
-"""Asked of the device at least, where so many fit into a frame; more ..."""
+"""Scans per frame requested from the device, if as many fit into a frame."""
 TARGET_FRAME_TIME = 0.01
-"""... where they come faster than so (s)."""
+"""Duration of a frame requested at higher sample rates (s)."""
 
 
-class TapsSource:
-    """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
+class TapsSource(ClosedOnExit):
+    """Connection to a TAPS/1 device as a source of scans. A context manager.
+
+    Parameters
+    ----------
+    port
+        Serial device name or socket://host:port.
+    sample_rate
+        Sample rate (Hz), None for the highest of the device.
+
+    Raises
+    ------
+    DeviceError
+        There is no port or no TAPS/1 device.
+    ValueError
+        The device does not have this sample rate.
+    """
 
     loss_detection = "scan numbers"
-    """How lost scans are found."""
+    """Method by which lost scans are detected."""
     _frame_time = TARGET_FRAME_TIME
 
     def __init__(self, port: str, sample_rate: float | None = None) -> None:
-        """Open a port: a device name or socket://host:port. sample_rate None takes the device's highest (Hz).
-
-        Raises DeviceError where there is no port or no TAPS/1 device, ValueError for a rate it does not have.
-        """
         self._link = SerialLink(port)
         self._decoder = FrameDecoder()
         self._frames: deque[Frame] = deque()
@@ -127,7 +148,7 @@ class TapsSource:
         self._stream: ScanStream | None = None
         self._streaming = False
         self.status: DeviceStatus | None = None
-        """What the device has last reported of itself (every 0.5 s of a stream)."""
+        """Status that the device reported last, every 0.5 s of a stream."""
         try:
             self._command(MessageType.STOP)
             self._info, self.channels = self._identify()
@@ -138,56 +159,46 @@ class TapsSource:
             self._link.close()
             raise
 
-    def __enter__(self) -> Self:
-        """The connected source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop the device and close the port."""
-        self.close()
-
     @property
     def events(self) -> deque[Event]:
-        """What has happened at the device, oldest first: take with popleft(), in any thread (IndexError: empty)."""
+        """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
         return self._events.new
 
     @property
     def fault(self) -> str:
-        """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
+        """Sentence on a broken cable or unpowered sensor while it lasts, empty if all is well."""
         numbers = (entry["i"] for entry in self._info["channels"])
         return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
 
     @property
     def lost_scans(self) -> int:
-        """Scans of this or the last stream that never came."""
+        """Number of scans of this or the last stream that never arrived."""
         return self._stream.lost_scans if self._stream else 0
 
     @property
     def dropped_frames(self) -> int:
-        """Frames that were damaged, so far, and DATA frames of this stream that came twice or late."""
+        """Number of damaged frames so far, and of repeated or late DATA frames of this stream."""
         return self._decoder.dropped + (self._stream.refused if self._stream else 0)
 
     @property
     def overruns(self) -> int:
-        """How often this program was so late that what had been received was thrown away."""
+        """Number of times received data was discarded because this program was late."""
         return self._link.overruns
 
     def start(self) -> None:
-        """Begin an endless stream."""
+        """Start an endless stream."""
         self.status = None
         answer = self._command(MessageType.START, (0).to_bytes(8, "little"))
         self._stream = ScanStream(answer.session, len(self.channels))
         self._streaming = True
 
     def stop(self) -> None:
-        """End the stream; in the thread that reads the blocks."""
+        """End the stream. Call it in the thread that reads the blocks."""
         self._streaming = False
         self._command(MessageType.STOP)
 
     def close(self) -> None:
-        """Stop where the device still answers, then give the port back."""
+        """Stop the device if it still answers, and close the port."""
         try:
             self._link.write(self._encode(MessageType.STOP))
         except DeviceError:
@@ -196,7 +207,7 @@ class TapsSource:
             self._link.close()
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged."""
+        """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged."""
         heard = time.monotonic()
         while self._stream is not None and self._streaming:
             frame = self._next_frame(0.1)
@@ -256,7 +267,7 @@ class TapsSource:
         return encode_frame(Frame(kind, self._seq, body))
 
     def _command(self, kind: MessageType, body: bytes = b"", answer: MessageType = MessageType.ACK) -> Frame:
-        """Send, and wait for ACK of this command, or for the one frame it asks for."""
+        """Send a command and wait for its ACK, or for the one frame it requests."""
         for _ in range(TAPS_COMMAND_TRIES):
             self._link.write(self._encode(kind, body))
             deadline = time.monotonic() + TAPS_ANSWER_TIMEOUT
@@ -270,7 +281,7 @@ class TapsSource:
         )
 
     def _next_frame(self, timeout: float) -> Frame | None:
-        """The next frame in order of arrival; None where nothing came in time (s)."""
+        """Return the next frame in order of arrival, None after the timeout (s)."""
         if not self._frames:
             self._frames.extend(self._decoder.feed(self._link.read(timeout)))
         if not self._frames:
@@ -300,9 +311,9 @@ def _check_rates(choices: list[float]) -> list[float]:
 
 
 def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:
-    """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain.
+    """Return the channels that the device reports. sens_V_per_EU is V per N or V per m/s^2, before its gain.
 
-    Raises KeyError, TypeError or ValueError where they are none.
+    Raises KeyError, TypeError or ValueError if they are invalid.
     """
     if not 2 <= info["adc_bits"] <= SAMPLE_BITS[-1]:
         raise ValueError(f"adc_bits={info['adc_bits']} is not between 2 and {SAMPLE_BITS[-1]}")

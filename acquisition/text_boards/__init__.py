@@ -1,4 +1,4 @@
-"""Boards that print their samples, as lines of text or as simple frames: format, source, probe, emulator."""
+"""Boards that print their samples as lines of text or simple frames: decoders, source, emulator."""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
 """Decode the text lines or binary frames that a board prints, and count lost scans.
 
-The payload is a scan: the counter (u16), where there is one, and a value (i16) a sensor, little-endian. The checksum is
-the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
+The payload of a frame is a scan: the counter (u16), if there is one, and a value (i16) per sensor, little-endian. The
+checksum is the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
 """
 
 from __future__ import annotations
@@ -12,41 +12,43 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
+
 COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
-"""Where counters of boards begin anew."""
+"""Values at which board counters wrap to 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class PrintedRows:
-    """Rows of numbers that came one after the other without a broken one between them."""
+    """Consecutive rows of numbers without a broken one between them."""
 
-    rows: NDArray[np.float64]
+    rows: Floats
     """Numbers, shape (n_scans, n_columns)."""
     broken_before: int = 0
-    """Broken lines or frames before them."""
+    """Number of broken lines or frames before them."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScanRun:
     """Consecutive scans."""
 
-    values: NDArray[np.float64]
-    """Values as printed, a row a sensor, shape (n_sensors, n_scans)."""
+    values: Floats
+    """Values as printed, one row per sensor, shape (n_sensors, n_scans)."""
     lost_before: int = 0
-    """Scans lost before them: by the counter, else the broken lines or frames, which is the least there can be."""
+    """Scans lost before them, by the counter. Without one, the broken lines or frames: a lower bound."""
 
 
 class ScanCounter:
-    """Takes the counter off, where there is one, and tells by it what is lost."""
+    """Counter of lost scans, which removes the printed counter from the rows."""
 
     def __init__(self, values: int = 2) -> None:
-        """values: in a row, beside the counter. No scan has come yet."""
+        """Expect this number of values per row besides the counter."""
         self._values = values
         self._last: int | None = None
         self._largest = 0
 
     def split_runs(self, printed: PrintedRows) -> Iterator[ScanRun]:
-        """Runs of consecutive scans in rows of values, or of a counter and values."""
+        """Yield runs of consecutive scans from rows of values, with or without a counter."""
         values = printed.rows[:, -self._values :].T
         if printed.rows.shape[1] == self._values:
             yield ScanRun(values, printed.broken_before)
@@ -57,7 +59,7 @@ class ScanCounter:
             yield ScanRun(values[:, run], int(lost[run[0]]))
 
     def _lost(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Scans lost before each row. The counter begins anew at the least modulus above all counts so far."""
+        """Return the scans lost before each row. The counter wraps at the smallest modulus above all counts so far."""
         self._largest = max(self._largest, int(counts.max()))
         modulus = next((modulus for modulus in COUNTER_MODULI if modulus > self._largest), COUNTER_MODULI[-1])
         before = counts[0] - 1 if self._last is None else self._last
@@ -66,20 +68,20 @@ class ScanCounter:
 
 
 NUMBER_SEPARATORS = bytes.maketrans(b";\t ", b",,,")
-"""What may stand between numbers beside a comma."""
+"""Separators between numbers besides a comma."""
 MAX_LINE_BYTES = 200
-"""Bytes of a line; what is longer is no line of numbers."""
+"""Longest line of numbers (bytes)."""
 
 
 class LineDecoder:
-    """Finds rows of numbers in a stream of text."""
+    """Decoder of a text stream into rows of numbers."""
 
     def __init__(self, counts: Container[int] = (2, 3)) -> None:
-        """counts: of numbers that a line may have. What stands before the first line end is not counted."""
+        """Accept lines with these counts of numbers. The rest of the first line is not counted."""
         self._rest, self._begun, self._columns, self._broken, self._counts = b"", False, 0, 0, counts
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
-        """The rows that are complete."""
+        """Yield the rows that these bytes complete."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         self._rest = self._rest[-MAX_LINE_BYTES:]
         if lines and not self._begun:
@@ -104,7 +106,7 @@ class LineDecoder:
 
 
 def _parse_numbers(line: bytes) -> list[float]:
-    """Finite numbers of a line; none where it holds anything else."""
+    """Return the finite numbers of a line, none if it contains anything else."""
     words = [word for word in line.strip().translate(NUMBER_SEPARATORS).split(b",") if word]
     try:
         numbers = [float(word) for word in words]
@@ -115,27 +117,27 @@ def _parse_numbers(line: bytes) -> list[float]:
 
 @dataclass(frozen=True)
 class FrameFormat:
-    """How a frame is built."""
+    """Layout of a binary frame."""
 
     start: bytes
-    """Bytes with which a frame begins."""
+    """Bytes at the start of a frame."""
     counter: bool = False
-    """Whether a counter (u16) stands before the values."""
+    """Whether a counter (u16) precedes the values."""
     checksum: bool = True
-    """Whether a checksum follows."""
+    """Whether a checksum follows the values."""
 
 
 class SimpleFrameDecoder:
-    """Finds rows of numbers in a stream of frames."""
+    """Decoder of a stream of frames into rows of numbers."""
 
     def __init__(self, form: FrameFormat, values: int = 2) -> None:
-        """values: in a frame, beside the counter. What stands before the first whole frame is not counted."""
+        """Expect this number of values per frame. Bytes before the first whole frame are not counted."""
         self._form, self._rest, self._broken, self._begun = form, b"", 0, False
         self._payload = 2 * (values + form.counter)
         self._size = len(form.start) + self._payload + form.checksum
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
-        """The rows that are complete; bytes between frames, and a wrong checksum, are a broken frame."""
+        """Yield the complete rows. Bytes between frames, and a wrong checksum, are a broken frame."""
         form, received, place = self._form, self._rest + data, 0
         rows: list[tuple[int, ...]] = []
         while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= self._size:
@@ -163,21 +165,21 @@ def _parse_payload(payload: bytes, counter: bool) -> tuple[int, ...]:
 
 
 DEFAULT_BAUD_RATE = 115200
-"""Of a port that is no USB device itself (baud), where none is asked for."""
+"""Default rate of a port that is no USB device itself (baud)."""
 
 
 @dataclass(frozen=True)
 class OutputFormat:
-    """Numbers, what holds them, and how fast they come."""
+    """Output format of a board."""
 
     adc_bits: int | None = None
-    """Bits of the converter whose codes, from 0 on, stand in the lines; None where volts do."""
+    """Bits of the converter whose codes, from 0 up, are printed. None for volts."""
     frame: FrameFormat | None = None
-    """Frames; None where it prints lines."""
+    """Frame layout, None for text lines."""
     baud_rate: int = DEFAULT_BAUD_RATE
-    """Of a serial port that is no USB device itself (baud)."""
+    """Rate of a serial port that is no USB device itself (baud)."""
 
     @property
     def bits(self) -> int:
-        """Bits of the codes that are made of the numbers: 24 of volts, so that nothing is lost."""
+        """Bits of the codes made of the numbers: 24 for volts, so that nothing is lost."""
         return self.adc_bits or (16 if self.frame else 24)

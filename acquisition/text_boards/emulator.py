@@ -1,4 +1,4 @@
-"""A board made of software that prints a counter and what its sensors feel."""
+"""Emulate a board that prints a counter and the values of its sensors."""
 
 from __future__ import annotations
 
@@ -13,22 +13,42 @@ from acquisition.text_boards.decoders import OutputFormat
 
 @dataclass(frozen=True)
 class TextBoardTraits:
-    """What the board is made for, and what goes wrong."""
+    """Properties and faults of the board."""
 
     counter_bits: int = 16
-    """Bits of the counter; 0 prints none."""
+    """Bits of the counter, 0 for no counter."""
     drop_every: int = 0
-    """Every so many scans one is lost; 0: none."""
+    """Period in scans at which one is lost, 0 for never."""
     garble_every: int = 0
-    """Every so many scans one is printed with a broken byte; 0: none."""
+    """Period in scans at which one is printed with a broken byte, 0 for never."""
 
 
 SCANS_PER_PRINT = 64
-"""Printed at once."""
+"""Scans printed at once."""
 
 
 class TextBoardEmulator(EmulatorThread):
-    """Prints from the moment it is plugged in, whoever listens; it reads nothing."""
+    """Emulated board that prints from the moment it is plugged in. It reads nothing.
+
+    Parameters
+    ----------
+    signal
+        Function (first_scan, n_scans) that returns values in N and m/s^2, one row per sensor.
+    sensitivities
+        Sensitivity of each sensor (V per N or m/s^2).
+    full_scale
+        Full scale of all channels (V).
+    sample_rate
+        Sample rate (Hz).
+    realtime
+        Whether it prints by the clock. False prints as fast as the host reads.
+    tcp
+        Whether it listens on loopback instead of a pseudo-terminal.
+    printing
+        Output format, None for volts in lines.
+    traits
+        Properties and faults, None for the defaults.
+    """
 
     def __init__(
         self,
@@ -42,7 +62,6 @@ class TextBoardEmulator(EmulatorThread):
         printing: OutputFormat | None = None,
         traits: TextBoardTraits | None = None,
     ) -> None:
-        """signal: N or m/s^2, a row a sensor; sensitivities: V per that; full_scale: of all (V); sample_rate (Hz)."""
         super().__init__(tcp)
         self._signal, self._rate, self._realtime, self._printing = (
             signal,
@@ -55,7 +74,6 @@ class TextBoardEmulator(EmulatorThread):
         self._scan, self._begun = 0, time.monotonic()
 
     def serve_once(self) -> bool:
-        """See EmulatorThread."""
         self.wire.exchange(0.002)
         while self._due():
             volts = np.clip(

@@ -6,28 +6,37 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink, find_usb_identity
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.text_boards.decoders import LineDecoder, OutputFormat, ScanCounter, SimpleFrameDecoder
 
 BOARD_LISTEN_TIME = 1.0
-"""Time for which is listened (s)."""
+"""Time to listen for lines (s)."""
 MIN_NUMBER_LINES = 20
-"""Lines of as many numbers without a broken one between them that make a board of it."""
+"""Consecutive good lines with the same count of numbers that identify a board."""
 MAX_NUMBERS_PER_LINE = 5
-"""Numbers in a line: counter, force and three axes of acceleration, or fewer."""
+"""Most numbers in a line: counter, force and three axes of acceleration."""
 
 
 def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
-    """Who prints there, told by listening alone; None where nobody does. It has no serial number of its own."""
+    """Listen for a board that prints lines of numbers. It has no serial number of its own.
+
+    Parameters
+    ----------
+    link
+        Open serial link.
+
+    Returns
+    -------
+    DeviceIdentity or None
+        Identity with the count of numbers, None if no board prints.
+    """
     decoders = {count: LineDecoder((count,)) for count in range(1, MAX_NUMBERS_PER_LINE + 1)}
     lines = dict.fromkeys(decoders, 0)
     deadline = time.monotonic() + BOARD_LISTEN_TIME
@@ -43,31 +52,44 @@ def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
 
 
 BOARD_SILENCE_TIMEOUT = 3.0
-"""A board that prints no samples for so long has failed (s); one that is reset by the opening of its port needs two."""
+"""Time without samples after which a board has failed (s). A board that resets when opened needs two."""
 
 
-class TextBoardSource:
-    """Listens; the board prints by itself and is never written to. A context manager.
+class TextBoardSource(ClosedOnExit):
+    """Board that prints its samples, as a source of scans. A context manager.
 
-    The order is that of the inputs, with a counter before them where one number more comes than there are inputs. The
-    numbers are volts, or, where adc_bits is given, codes of a converter from 0 to 2^adc_bits - 1 whose middle is 0 V.
-    What cannot be known: whole lines that are lost where no counter is printed, and whether both sensors were sampled
-    at once.
+    The board prints by itself and is never written to. Values come in the order of the inputs, with a counter before
+    them if there is one number more than inputs. They are volts, or with `adc_bits` codes of a converter from 0 to
+    2^adc_bits - 1 whose center is 0 V. Two things cannot be known: lost whole lines without a counter, and whether both
+    sensors were sampled at once.
+
+    Parameters
+    ----------
+    port
+        Serial device name or socket://host:port.
+    inputs
+        Sensors, their numbers being the columns after the counter.
+    sample_rate
+        Lines per second that the board was made for (Hz).
+    printing
+        Output format, None for volts in lines.
+
+    Raises
+    ------
+    ValueError
+        The sample rate is missing, or the inputs are no columns.
+    DeviceError
+        There is no port.
     """
 
     follows_clock = True
-    """Its rate is measured against the clock, and known no better than that."""
+    """Whether its scans follow the clock. Its rate is known by measurement only."""
     fault = ""
-    """It tells of no faults."""
+    """Empty: the board reports no faults."""
 
     def __init__(
-        self,
-        port: str,
-        inputs: Sequence[SensorInput],
-        sample_rate: float | None,
-        printing: OutputFormat | None = None,
+        self, port: str, inputs: Sequence[SensorInput], sample_rate: float | None, printing: OutputFormat | None = None
     ) -> None:
-        """Open a port. ValueError without a sample rate (Hz), DeviceError where there is no port."""
         self.sample_rate = check_text_board(inputs, sample_rate)
         self.events: deque[Event] = deque()
         self.loss_detection = "broken lines"
@@ -81,16 +103,6 @@ class TextBoardSource:
         usb = find_usb_identity(port)
         self.identity = DeviceIdentity("lines", usb[1] if usb else port)
 
-    def __enter__(self) -> Self:
-        """The connected source."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        self.close()
-
     def start(self) -> None:
         """Count scans from the next whole line on."""
         while self._link.read(0.0):
@@ -101,16 +113,15 @@ class TextBoardSource:
         self._running = True
 
     def stop(self) -> None:
-        """Listen no more; the board goes on."""
+        """Stop listening. The board goes on."""
         self._running = False
 
     def close(self) -> None:
-        """Give the port back."""
         self._running = False
         self._link.close()
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks as they arrive; DeviceError where the board is unplugged, or prints nothing that it should."""
+        """Yield blocks as they arrive. DeviceError if the board is unplugged or prints no samples."""
         scan, heard, overruns = 0, time.monotonic(), self._link.overruns
         while self._running:
             runs = [
@@ -129,20 +140,38 @@ class TextBoardSource:
                     f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
                 )
 
-    def _codes(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Codes of the converter, one row a channel."""
+    def _codes(self, values: Floats) -> Codes:
+        """Return the codes of the converter, one row per channel."""
         rows = values[self._rows]
         if self._printing.frame is None and self._printing.adc_bits is None:
             volts = zip(self.channels, rows, strict=True)
             return np.array([channel.encode(row / channel.sensitivity) for channel, row in volts], np.int32)
         low, high = self.channels[0].rails
         zero = 0 if self._printing.frame else -low
-        codes: NDArray[np.int32] = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
+        codes: Codes = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
         return codes
 
 
 def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -> float:
-    """The sample rate (Hz); ValueError where it is missing, or inputs are no columns."""
+    """Check inputs and sample rate of a board.
+
+    Parameters
+    ----------
+    inputs
+        Sensors, their numbers being the columns after the counter.
+    sample_rate
+        Lines per second (Hz).
+
+    Returns
+    -------
+    float
+        Sample rate (Hz).
+
+    Raises
+    ------
+    ValueError
+        The sample rate is missing, or the inputs are no columns.
+    """
     if sample_rate is None:
         raise ValueError(
             'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '

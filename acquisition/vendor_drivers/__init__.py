@@ -1,4 +1,4 @@
-"""Devices that a library of their maker reads: USB audio, NI, Measurement Computing, LabJack."""
+"""Devices read through a library of their vendor: USB audio, NI, Measurement Computing, LabJack."""
 
 from acquisition.vendor_drivers.audio import NameCalibration, open_audio, parse_name_calibration, search_audio
 from acquisition.vendor_drivers.labjack import open_ljm, search_ljm

@@ -1,8 +1,8 @@
-"""USB audio devices through PortAudio, with the calibration in a Modal Shop device name.
+"""USB audio: sound interfaces and signal conditioners with two IEPE inputs, through PortAudio.
 
-The name holds model, format, serial number, for each input the counts of a 24-bit converter per volt (format 2; format
-3: 20 times as many) or per m/s^2 (format 1), and the date as yymmdd. Source: The Modal Shop, MAN-0343, USB audio
-interface guide, 2021.
+The name of a Modal Shop device holds its calibration: model, format, serial number, for each input the counts of a
+24-bit converter per volt (format 2, in format 3 20 times as many) or per m/s^2 (format 1), and the date as yymmdd.
+Source: The Modal Shop, MAN-0343, USB audio interface guide, 2021.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
     find_library,
@@ -34,22 +35,33 @@ MODAL_SHOP_NAME_PATTERN = re.compile(
 
 @dataclass(frozen=True)
 class NameCalibration:
-    """What stands in the name of a device of The Modal Shop."""
+    """Calibration in the name of a Modal Shop device."""
 
     model: str
     """Model."""
     serial: str
     """Serial number."""
     date: str
-    """Date of the calibration (ISO 8601)."""
+    """Calibration date (ISO 8601)."""
     full_scales: tuple[float, ...]
-    """Full scale of each input (V; m/s^2 of a device that measures acceleration itself)."""
+    """Full scale of each input (V, or m/s^2 for a device that measures acceleration itself)."""
     is_accelerometer: bool
-    """Whether it measures acceleration itself."""
+    """Whether the device measures acceleration itself."""
 
 
 def parse_name_calibration(name: str) -> NameCalibration | None:
-    """Calibration in the name of a device; None where there is none."""
+    """Parse the calibration in the name of a device.
+
+    Parameters
+    ----------
+    name
+        Name of the sound device.
+
+    Returns
+    -------
+    NameCalibration or None
+        Calibration, None if the name holds none.
+    """
     match = MODAL_SHOP_NAME_PATTERN.search(name)
     if match is None:
         return None
@@ -63,20 +75,26 @@ def parse_name_calibration(name: str) -> NameCalibration | None:
 
 
 AUDIO_DEFAULT_RATE = 48000.0
-"""Sample rate where none is asked for (Hz)."""
+"""Default sample rate (Hz)."""
 AUDIO_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 FULL_SCALE_CODE = 2.0**31
-"""Codes of 32 bits from 0 to full scale; devices of 24 bits fill the upper ones."""
+"""32-bit code of full scale. Devices of 24 bits fill the upper bits."""
 PORTAUDIO_INVALID_RATE = -9997
-"""PortAudio's error for a rate that a device does not have."""
+"""PortAudio error for a rate that a device does not have."""
 MAX_RANGE_DEVIATION = 0.2
-"""Share by which range_v may differ from the calibration in the name; more is a mistake."""
+"""Relative deviation of range_v from the calibration in the name above which it is an error."""
 
 
 def search_audio() -> Sequence[DeviceAddress]:
-    """Sound devices with at least two inputs."""
-    library = find_library("sounddevice", "audio")
+    """List the sound devices with at least two inputs.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_audio` takes, empty if the library is not installed.
+    """
+    library = find_library("sounddevice")
     return (
         [_make_address(entry) for entry in library.query_devices() if entry["max_input_channels"] >= 2]
         if library
@@ -85,8 +103,30 @@ def search_audio() -> Sequence[DeviceAddress]:
 
 
 def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The sound device "audio:NAME", "audio:PART OF ITS NAME" or "audio:NUMBER", sampled by its own clock."""
-    library = load_library("sounddevice", "audio")
+    """Open a sound device, sampled by its own clock.
+
+    Parameters
+    ----------
+    port
+        "audio:NAME", "audio:PART OF ITS NAME" or "audio:NUMBER".
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Sample rate (Hz), None for 48 kHz.
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the device is missing, or the device cannot be opened.
+    ValueError
+        The device does not have an input, range or rate.
+    """
+    library = load_library("sounddevice")
     entry = _find_sound_device(library.query_devices(), port.removeprefix("audio:"))
     numbers = tuple(sensor.number for sensor in inputs)
     check_input_numbers(numbers, entry["max_input_channels"], entry["name"])
@@ -103,13 +143,13 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
 
 
-class AudioReader:
-    """Reads blocks that PortAudio hands over in a thread of its own."""
+class AudioReader(LibraryReader):
+    """Reader of the blocks that PortAudio delivers in a thread of its own."""
 
     def __init__(
         self, library: Any, index: int, numbers: tuple[int, ...], rate: float, full_scales: Sequence[float]
     ) -> None:
-        """The device with this index; numbers: its inputs in order; full_scales: of those (V)."""
+        """Open the device with this index. numbers: its inputs in order. full_scales: of these inputs (V)."""
         self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
         self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
         self._pieces = queue.SimpleQueue[VoltageBlock]()
@@ -125,28 +165,20 @@ class AudioReader:
             )
 
     def start(self) -> None:
-        """See Reader."""
         self._pieces = queue.SimpleQueue()
         self._stream.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
-        """See Reader."""
         try:
             return self._pieces.get(timeout=timeout)
         except queue.Empty:
             return None
 
     def stop(self) -> None:
-        """See Reader."""
         self._stream.stop()
 
     def close(self) -> None:
-        """See Reader."""
         self._stream.close()
-
-    def fault(self) -> str:
-        """Nothing: a sound device does not tell."""
-        return ""
 
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts
@@ -162,7 +194,7 @@ def _make_address(entry: dict[str, Any]) -> DeviceAddress:
 
 
 def _find_sound_device(devices: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
-    """The one sound device with inputs of this name or number, or whose name holds it."""
+    """Find the one sound device with inputs that has this name or number, or contains it in its name."""
     inputs = [entry for entry in devices if entry["max_input_channels"]]
     exact = [entry for entry in inputs if wanted in (entry["name"], str(entry["index"]))]
     listed = exact or [entry for entry in inputs if wanted.casefold() in entry["name"].casefold()]
@@ -174,9 +206,9 @@ def _find_sound_device(devices: Sequence[dict[str, Any]], wanted: str) -> dict[s
 
 
 def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
-    """A channel of 24 bits with the full scale of the calibration where the name has it, else range_v.
+    """Return a 24-bit channel with the full scale of the calibration in the name, else range_v.
 
-    An accelerometer that is a sound device has no volts: those of its sensitivity stand for its m/s^2.
+    An accelerometer that is a sound device has no volts: those of its sensitivity represent its m/s^2.
     """
     if calibration is None:
         return replace(channel, adc_bits=24)

@@ -1,42 +1,52 @@
-"""LabJack T7 and T8 devices through LJM."""
+"""LabJack T7 and T8 devices through LJM.
+
+They do not power IEPE sensors, and sample their inputs one after the other.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
-from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-LJM_EXTRA = "ljm"
 T7_DEFAULT_RATE = 40000.0
-"""Sample rate where none is asked for (Hz): two inputs of a T7, which samples 100 000 values a second."""
+"""Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
 T7_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 SKIPPED_SAMPLE_VALUE = -9999.0
-"""Value that LJM puts in place of a sample that the device had no room for."""
+"""Value that LJM inserts for a sample that the device had no room for."""
 T7_INPUT_COUNT = 14
-"""Of a T7, AIN0 to AIN13."""
+"""Number of analog inputs of a T7, AIN0 to AIN13."""
 T7_RANGES = (10.0, 1.0, 0.1, 0.01)
-"""Of a T7 (V)."""
+"""Ranges of a T7 (V)."""
 
 
 def search_ljm() -> Sequence[DeviceAddress]:
-    """T7 and T8 on USB and in the network."""
-    library = find_library("labjack.ljm", LJM_EXTRA)
+    """List the T7 and T8 devices on USB and in the network.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_ljm` takes, empty if the library is not installed.
+    """
+    library = find_library("labjack.ljm")
     if library is None:
         return []
     constants = library.constants
@@ -47,58 +57,76 @@ def search_ljm() -> Sequence[DeviceAddress]:
 
 
 def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The device "ljm:SERIAL NUMBER" (or its IP address or name); the rate is the nearest that it has."""
-    library = load_library("labjack.ljm", LJM_EXTRA)
+    """Open a LabJack T7 or T8.
+
+    Parameters
+    ----------
+    port
+        "ljm:SERIAL NUMBER", or with its IP address or name.
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz), None for 40 kHz. The nearest one of the device is used.
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the device is missing, or the device cannot be opened.
+    ValueError
+        The device does not have an input or range.
+    """
+    library = load_library("labjack.ljm")
     numbers = [sensor.number for sensor in inputs]
     check_input_numbers(numbers, T7_INPUT_COUNT, "a LabJack T7")
     for sensor in inputs:
         if sensor.channel.full_scale not in T7_RANGES:
             listed = ", ".join(f"{scale:g}" for scale in T7_RANGES)
             raise ValueError(f"range_v={sensor.channel.full_scale:g} is none of {listed}, the ranges of a LabJack T7")
-    handle = None
-    try:
+    with convert_open_errors(port, library.LJMError), ExitStack() as cleanup:
         handle = library.openS("ANY", "ANY", port.removeprefix("ljm:"))
+        cleanup.callback(library.close, handle)
         for sensor in inputs:
             library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
         reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
         serial = library.getHandleInfo(handle)[2]
         firmware = library.eReadName(handle, "FIRMWARE_VERSION")
-    except library.LJMError as error:
-        if handle is not None:
-            library.close(handle)
-        raise DeviceError(f"{port} cannot be opened ({error})", "`lobewatch ports` lists what there is") from error
+        cleanup.pop_all()
     identity = DeviceIdentity("LabJack", str(serial), f"{firmware:.4f}")
     channels = tuple(replace(sensor.channel, adc_bits=16) for sensor in inputs)
     return LibraryDevice(port, reader, identity, channels, reader.rate, "skipped samples")
 
 
-class LjmReader:
-    """Reads a stream."""
+class LjmReader(LibraryReader):
+    """Reader of an LJM stream."""
 
     def __init__(self, library: Any, handle: int, numbers: Sequence[int], rate: float) -> None:
-        """The opened device; its rate is found by starting it once (Hz)."""
+        """Take the opened device. Starting it once tells its true rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.LJMError,)
         self._library, self._handle = library, handle
         self._inputs = library.namesToAddresses(len(numbers), [f"AIN{number}" for number in numbers])[0]
         self.rate = rate
-        """Sample rate that the device has (Hz), known once it was started."""
+        """Sample rate of the device (Hz), known after the first start."""
         self.start()
         self.stop()
 
     def start(self) -> None:
-        """See Reader."""
         self._lost, self._pieces = 0, deque[VoltageBlock]()
         size = round(self.rate * T7_BLOCK_TIME)
         self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
 
     def read(self, _timeout: float) -> VoltageBlock | None:
-        """See Reader; LJM waits by itself, and tells by its error where nothing comes."""
+        """Return the next block. LJM waits by itself, and raises its error if nothing arrives."""
         if not self._pieces:
             self._pieces.extend(self._runs(np.array(self._library.eStreamRead(self._handle)[0])))
         return self._pieces.popleft() if self._pieces else None
 
-    def _runs(self, values: NDArray[np.float64]) -> Iterator[VoltageBlock]:
-        """The runs of scans without a skipped sample."""
+    def _runs(self, values: Floats) -> Iterator[VoltageBlock]:
+        """Yield the runs of scans without a skipped sample."""
         volts = values.reshape(-1, len(self._inputs)).T
         whole = (volts != SKIPPED_SAMPLE_VALUE).all(axis=0)
         for run in np.split(np.arange(whole.size), np.flatnonzero(np.diff(whole)) + 1):
@@ -109,13 +137,7 @@ class LjmReader:
                 self._lost += run.size
 
     def stop(self) -> None:
-        """See Reader."""
         self._library.eStreamStop(self._handle)
 
     def close(self) -> None:
-        """See Reader."""
         self._library.close(self._handle)
-
-    def fault(self) -> str:
-        """Nothing: the device does not tell."""
-        return ""

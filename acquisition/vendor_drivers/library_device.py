@@ -8,144 +8,151 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
-from acquisition.source import DeviceIdentity, Event
+from acquisition.source import ClosedOnExit, DeviceIdentity, Event
+
+EXTRAS = {"daqhats": "mcc172", "labjack": "ljm", "nidaqmx": "nidaqmx", "sounddevice": "audio", "uldaq": "uldaq"}
+"""Extra of lobewatch that installs each vendor library."""
+OPEN_REMEDY = "`acquisition.scan_ports` lists what there is"
+"""Remedy for a device that cannot be opened."""
+LIBRARY_SILENCE_TIMEOUT = 3.0
+"""Time without scans after which a started device has failed (s)."""
+LIBRARY_READ_TIMEOUT = 0.2
+"""Time that a reader may wait for scans (s)."""
 
 
-def load_library(module: str, extra: str) -> Any:  # a module without types
-    """A module of a library; DeviceError with the command that installs it where it cannot be imported.
+def load_library(module: str) -> Any:  # a module without types
+    """Import a module of a vendor library. DeviceError with the install command if that fails.
 
-    OSError is what libraries raise whose own C library is missing.
+    Libraries raise OSError if their own C library is missing.
     """
+    package = module.partition(".")[0]
     try:
         return import_module(module)
     except (ImportError, OSError) as error:
-        package = module.partition(".")[0]
         raise DeviceError(
             f"the library {package} cannot be used ({' '.join(str(error).split())})",
-            f"pip install 'lobewatch[{extra}]', and what its maker says it needs (docs/devices.md)",
+            f"pip install 'lobewatch[{EXTRAS[package]}]', and what its maker says it needs (docs/devices.md)",
         ) from error
 
 
-def find_library(module: str, extra: str) -> Any | None:  # as above
-    """The same for a search; None where it cannot be imported."""
+def find_library(module: str) -> Any | None:  # as above
+    """Import a module of a vendor library for a search. None if that fails."""
     try:
-        return load_library(module, extra)
+        return load_library(module)
     except DeviceError:
         return None
 
 
+@contextmanager
+def convert_open_errors(port: str, errors: type[Exception], remedy: str = OPEN_REMEDY) -> Iterator[None]:
+    """Convert errors of a vendor library on opening a device to DeviceError with its port."""
+    try:
+        yield
+    except errors as error:
+        raise DeviceError(f"{port} cannot be opened ({' '.join(str(error).split())})", remedy) from error
+
+
 def check_input_numbers(numbers: Sequence[int], count: int, device: str) -> None:
-    """ValueError for an input that a device does not have."""
     for number in numbers:
         if number >= count:
             raise ValueError(f"input={number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]")
 
 
-LIBRARY_SILENCE_TIMEOUT = 3.0
-"""A started device that gives no scans for so long has failed (s)."""
-LIBRARY_READ_TIMEOUT = 0.2
-"""Time for which a reader is asked to wait (s)."""
-
-
 @dataclass(frozen=True, eq=False)
 class VoltageBlock:
-    """Consecutive scans as a library gives them."""
+    """Consecutive scans as a library returns them."""
 
-    volts: NDArray[np.float64]
+    volts: Floats
     """Voltages at the inputs (V), shape (n_channels, n_scans)."""
     lost_before: int = 0
-    """Scans lost between the piece before and this one; 1 where the library says that, but not how many."""
+    """Number of scans lost before this block, 1 if the library reports a loss without a number."""
 
 
-class LibraryReader(Protocol):
-    """What a maker's library is asked for; its own errors are those of `errors`."""
+class LibraryReader:
+    """Interface to a vendor library, implemented once per library."""
 
     errors: tuple[type[Exception], ...]
-    """Errors that the library raises."""
+    """Exceptions that the library raises."""
 
     def start(self) -> None:
-        """Begin to sample."""
+        """Start sampling."""
 
     def read(self, timeout: float) -> VoltageBlock | None:
-        """The scans that have come, waiting for at most timeout (s); None where none came."""
+        """Return the scans that have arrived, None if none has arrived in time.
+
+        Parameters
+        ----------
+        timeout
+            Longest time to wait (s).
+        """
+        raise NotImplementedError
 
     def stop(self) -> None:
-        """End sampling; harmless where it has ended."""
+        """End sampling. Harmless if it has ended."""
 
     def close(self) -> None:
-        """Give the device back."""
+        """Release the device."""
 
     def fault(self) -> str:
-        """Sentence on a sensor that is not connected; empty where all is well or the library cannot tell."""
+        """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""
+        return ""
 
 
 @dataclass
-class LibraryDevice:
-    """An `acquisition.Device` made of a reader; codes are the voltages in steps of each channel's converter."""
+class LibraryDevice(ClosedOnExit):
+    """Device read through a vendor library. Codes are the voltages in steps of each channel's converter."""
 
     address: str
-    """Address as [daq] port names it."""
+    """Address, as [daq] port names it."""
     reader: LibraryReader
-    """What reads its scans."""
+    """Reader of its scans."""
     identity: DeviceIdentity
     """Model, serial number and firmware."""
     channels: tuple[Channel, ...]
-    """Its channels, in the order of the reader's rows."""
+    """Channels, in the order of the reader's rows."""
     sample_rate: float
-    """Scans a second (Hz)."""
+    """Sample rate (Hz)."""
     loss_detection: str
-    """How lost scans are found, in two words."""
+    """Method by which lost scans are detected, in two words."""
     follows_clock: bool = True
     """Whether its scans follow the clock."""
     events: deque[Event] = field(default_factory=deque)
-    """What has happened at it: such a device has no button."""
+    """Events at the device. Such a device has no button."""
     _running: bool = False
 
     @property
     def fault(self) -> str:
-        """One sentence on what is wrong with a sensor while that lasts."""
+        """Sentence on a sensor fault while it lasts."""
         with self._named():
             return self.reader.fault()
 
-    def __enter__(self) -> Self:
-        """The device itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close it."""
-        self.close()
-
     def start(self) -> None:
-        """Begin to sample."""
         with self._named():
             self.reader.start()
         self._running = True
 
     def stop(self) -> None:
-        """End the stream; blocks() ends too."""
+        """End the stream. `blocks` ends too."""
         self._running = False
         with self._named():
             self.reader.stop()
 
     def close(self) -> None:
-        """Stop, and give the device back; a device that is gone is no error here."""
+        """Stop and release the device. A device that is gone is no error here."""
         self._running = False
         for end in (self.reader.stop, self.reader.close):
             with suppress(*self.reader.errors):
                 end()
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks as they arrive; DeviceError where the device goes away or falls silent."""
+        """Yield blocks as they arrive. DeviceError if the device goes away or falls silent."""
         scan, heard = 0, time.monotonic()
         while self._running:
             with self._named():
@@ -160,13 +167,13 @@ class LibraryDevice:
                     "unplug it and plug it in again",
                 )
 
-    def _codes(self, volts: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _codes(self, volts: Floats) -> Codes:
         rows = zip(self.channels, volts, strict=True)
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Errors of the library as one of ours, with the address."""
+        """Convert errors of the library to DeviceError with the address."""
         try:
             yield
         except self.reader.errors as error:

@@ -1,40 +1,53 @@
-"""Measurement Computing devices: MCC 172 through daqhats, USB devices through uldaq."""
+"""Measurement Computing devices.
+
+The MCC 172 has two IEPE inputs on a Raspberry Pi, read through daqhats. USB devices such as the USB-1608 series are
+read through uldaq and do not power IEPE sensors.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
+    OPEN_REMEDY,
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-MCC172_EXTRA = "mcc172"
 MCC172_MAX_RATE = 51200.0
-"""Highest rate (Hz); the others are it divided by 2 to 256."""
+"""Highest sample rate (Hz). The others are this rate divided by 2 to 256."""
 MCC172_FULL_SCALE = 5.0
-"""The only range (V)."""
+"""Only range (V)."""
 MCC172_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 MCC172_SYNC_TIMEOUT = 2.0
-"""Time within which its converters are in step (s); 128 clock cycles by its documentation."""
+"""Time limit for synchronizing the converters (s). The documentation says 128 clock cycles."""
 
 
 def search_mcc172() -> Sequence[DeviceAddress]:
-    """Boards on this Raspberry Pi."""
-    library = find_library("daqhats", MCC172_EXTRA)
+    """List the boards on this Raspberry Pi.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_mcc172` takes, empty if the library is not installed.
+    """
+    library = find_library("daqhats")
     if library is None:
         return []
     boards = library.hat_list(filter_by_id=library.HatIDs.MCC_172)
@@ -45,8 +58,30 @@ def search_mcc172() -> Sequence[DeviceAddress]:
 
 
 def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The board "mcc172:ADDRESS", 0 to 7; of its rates the nearest is taken."""
-    library = load_library("daqhats", MCC172_EXTRA)
+    """Open an MCC 172 board.
+
+    Parameters
+    ----------
+    port
+        "mcc172:ADDRESS" with the address of the board, 0 to 7.
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz), None for 51.2 kHz. The nearest one of the board is used.
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the board is missing, or the board cannot be opened.
+    ValueError
+        The address, an input or a range does not exist.
+    """
+    library = load_library("daqhats")
     address = port.removeprefix("mcc172:")
     if not address.isdigit():
         raise ValueError(f"port={port!r}: mcc172: is followed by the address of the board, 0 to 7, as in mcc172:0")
@@ -54,35 +89,31 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     for sensor in inputs:
         if sensor.channel.full_scale != MCC172_FULL_SCALE:
             raise ValueError(f"range_v={sensor.channel.full_scale:g}: an MCC 172 has {MCC172_FULL_SCALE:g} V alone")
-    try:
+    with convert_open_errors(port, library.HatError):
         board = library.mcc172(int(address))
         for sensor in inputs:
             board.iepe_config_write(sensor.number, int(sensor.iepe))
         rate = _set_mcc172_rate(library, board, sample_rate or MCC172_MAX_RATE)
         identity = DeviceIdentity("MCC 172", board.serial(), board.firmware_version().version)
-    except library.HatError as error:
-        words = " ".join(str(error).split())
-        raise DeviceError(f"{port} cannot be opened ({words})", "`lobewatch ports` lists what there is") from error
     channels = tuple(replace(sensor.channel, adc_bits=24) for sensor in inputs)
     reader = Mcc172Reader(library, board, [sensor.number for sensor in inputs], rate)
     return LibraryDevice(port, reader, identity, channels, rate, "buffer overrun")
 
 
-class Mcc172Reader:
-    """Reads a continuous scan of both inputs."""
+class Mcc172Reader(LibraryReader):
+    """Reader of a continuous scan of both inputs."""
 
     def __init__(self, library: Any, board: Any, numbers: Sequence[int], rate: float) -> None:
-        """The opened board; numbers: its inputs in order; rate (Hz)."""
+        """Take the opened board. numbers: its inputs in order. rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.HatError,)
         self._library, self._board, self._numbers = library, board, list(numbers)
         self._size = round(rate * MCC172_BLOCK_TIME)
 
     def start(self) -> None:
-        """See Reader."""
         self._board.a_in_scan_start(0b11, 0, self._library.OptionFlags.CONTINUOUS)
 
     def read(self, timeout: float) -> VoltageBlock | None:
-        """See Reader; a scan that has overrun its buffer has ended: DeviceError."""
+        """Return the next block. A scan that has overrun its buffer has ended: DeviceError."""
         scan = self._board.a_in_scan_read_numpy(self._size, timeout)
         if scan.hardware_overrun or scan.buffer_overrun:
             raise DeviceError("the MCC 172 has lost scans and stopped", "end other programs on this Raspberry Pi")
@@ -90,22 +121,17 @@ class Mcc172Reader:
         return VoltageBlock(volts) if volts.size else None
 
     def stop(self) -> None:
-        """See Reader."""
         self._board.a_in_scan_stop()
         self._board.a_in_scan_cleanup()
 
     def close(self) -> None:
-        """Switch the supply of the sensors off."""
+        """Switch off the sensor supply."""
         for number in self._numbers:
             self._board.iepe_config_write(number, 0)
 
-    def fault(self) -> str:
-        """Nothing: the board does not tell."""
-        return ""
-
 
 def _set_mcc172_rate(library: Any, board: Any, rate: float) -> float:
-    """Set the clock to the rate nearest to this (Hz) and wait until the converters are in step; that rate (Hz)."""
+    """Set the nearest rate, wait until the converters are synchronized, and return the rate (Hz)."""
     board.a_in_clock_config_write(library.SourceType.LOCAL, rate)
     deadline = time.monotonic() + MCC172_SYNC_TIMEOUT
     while not (clock := board.a_in_clock_config_read()).synchronized:
@@ -115,18 +141,23 @@ def _set_mcc172_rate(library: Any, board: Any, rate: float) -> float:
     return float(clock.sample_rate_per_channel)
 
 
-ULDAQ_EXTRA = "uldaq"
 ULDAQ_DEFAULT_RATE = 50000.0
-"""Sample rate where none is asked for (Hz)."""
+"""Default sample rate (Hz)."""
 ULDAQ_RING_TIME = 2.0
-"""Length of the ring of scans (s); whoever reads later than that has lost some."""
+"""Length of the ring buffer (s). A reader later than that has lost scans."""
 ULDAQ_POLL_INTERVAL = 0.01
-"""Time between two looks whether scans have come (s)."""
+"""Time between two checks for new scans (s)."""
 
 
 def search_uldaq() -> Sequence[DeviceAddress]:
-    """Devices on USB."""
-    library = find_library("uldaq", ULDAQ_EXTRA)
+    """List the Measurement Computing devices on USB.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_uldaq` takes, empty if the library is not installed.
+    """
+    library = find_library("uldaq")
     if library is None:
         return []
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
@@ -136,8 +167,30 @@ def search_uldaq() -> Sequence[DeviceAddress]:
 
 
 def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The device "uldaq:SERIAL NUMBER". Both inputs have one range; the rate is the nearest that it has."""
-    library = load_library("uldaq", ULDAQ_EXTRA)
+    """Open a Measurement Computing USB device. All inputs share one range.
+
+    Parameters
+    ----------
+    port
+        "uldaq:SERIAL NUMBER".
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz), None for 50 kHz. The nearest one of the device is used.
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the device is missing, or the device cannot be opened.
+    ValueError
+        The device does not have an input or range.
+    """
+    library = load_library("uldaq")
     wanted = port.removeprefix("uldaq:")
     entries = [
         entry
@@ -145,26 +198,22 @@ def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         if entry.unique_id.casefold() == wanted.casefold()
     ]
     if not entries:
-        raise DeviceError(f"{wanted!r} is not plugged in", "`lobewatch ports` lists what there is")
+        raise DeviceError(f"{wanted!r} is not plugged in", OPEN_REMEDY)
     device = library.DaqDevice(entries[0])
-    try:
+    with convert_open_errors(port, library.ULException, "check that no other program uses it"), ExitStack() as cleanup:
+        cleanup.callback(device.release)
         device.connect()
         reader = UldaqReader(library, device, inputs, sample_rate or ULDAQ_DEFAULT_RATE)
-    except library.ULException as error:
-        device.release()
-        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
-    except BaseException:
-        device.release()
-        raise
+        cleanup.pop_all()
     channels = tuple(replace(sensor.channel, adc_bits=reader.bits) for sensor in inputs)
     return LibraryDevice(port, reader, _read_uldaq_identity(entries[0]), channels, reader.rate, "scan count")
 
 
-class UldaqReader:
-    """Reads the ring that a continuous scan fills."""
+class UldaqReader(LibraryReader):
+    """Reader of the ring buffer that a continuous scan fills."""
 
     def __init__(self, library: Any, device: Any, inputs: Sequence[SensorInput], rate: float) -> None:
-        """The connected device; ValueError for inputs or ranges that it does not have."""
+        """Take the connected device. ValueError for inputs or ranges that it does not have."""
         self.errors: tuple[type[Exception], ...] = (library.ULException,)
         self._library, self._device, self._inputs = library, device, device.get_ai_device()
         info = self._inputs.get_info()
@@ -177,24 +226,22 @@ class UldaqReader:
         self._first, self._last = min(numbers), max(numbers)
         self._rows = [number - self._first for number in numbers]
         self.bits = int(info.get_resolution())
-        """Resolution of the converter."""
+        """Resolution of the converter (bits)."""
         self._size = round(rate * ULDAQ_RING_TIME)
         self._ring = library.create_float_buffer(self._last - self._first + 1, self._size)
         self._read = 0
         self.rate = rate
-        """Sample rate that the device has (Hz), known once it was started."""
+        """Sample rate of the device (Hz), known after the first start."""
         self.start()
         self.stop()
 
     def start(self) -> None:
-        """See Reader."""
         self._read = 0
         options = self._library.ScanOption.CONTINUOUS, self._library.AInScanFlag.DEFAULT
         place = self._first, self._last, self._mode, self._range
         self.rate = float(self._inputs.a_in_scan(*place, self._size, self.rate, *options, self._ring))
 
     def read(self, timeout: float) -> VoltageBlock | None:
-        """See Reader."""
         deadline = time.monotonic() + timeout
         while (come := self._inputs.get_scan_status()[1].current_scan_count) == self._read:
             if time.monotonic() > deadline:
@@ -203,21 +250,15 @@ class UldaqReader:
         lost = max(come - self._read - self._size // 2, 0)  # half of the ring: the rest may be written meanwhile
         places = np.arange(self._read + lost, come) % self._size
         self._read = come
-        volts: NDArray[np.float64] = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
+        volts: Floats = np.frombuffer(self._ring).reshape(self._size, -1)[places].T[self._rows]
         return VoltageBlock(volts, lost)
 
     def stop(self) -> None:
-        """See Reader."""
         self._inputs.scan_stop()
 
     def close(self) -> None:
-        """See Reader."""
         self._device.disconnect()
         self._device.release()
-
-    def fault(self) -> str:
-        """Nothing: the device does not tell."""
-        return ""
 
 
 def _read_uldaq_identity(entry: Any) -> DeviceIdentity:
@@ -225,7 +266,7 @@ def _read_uldaq_identity(entry: Any) -> DeviceIdentity:
 
 
 def _find_uldaq_range(library: Any, ranges: Sequence[Any], wanted: set[float]) -> Any:
-    """The range of the device with this full scale (V); ValueError for two, or for one it does not have."""
+    """Find the range with this full scale (V). ValueError for two, or for one the device does not have."""
     volts = {scale: f"BIP{scale:g}VOLTS" for scale in wanted}
     names = {entry.name for entry in ranges}
     if len(wanted) == 1 and names.issuperset(volts.values()):

@@ -3,39 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from acquisition.channel import Channel, SensorInput
-from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers.library_device import (
     LibraryDevice,
+    LibraryReader,
     VoltageBlock,
     check_input_numbers,
+    convert_open_errors,
     find_library,
     load_library,
 )
 
-NIDAQMX_EXTRA = "nidaqmx"
 NIDAQMX_BLOCK_TIME = 0.02
 """Length of a block (s)."""
 NIDAQMX_BUFFER_TIME = 10.0
-"""Length of the buffer of NI-DAQmx (s): scans that are not read in time are an error there, never a gap."""
+"""Length of the NI-DAQmx buffer (s). A late reader gets an error there, never a gap."""
 SAMPLES_NOT_AVAILABLE_ERROR = -200284
-"""NI-DAQmx's error for samples that have not come in time."""
+"""NI-DAQmx error for samples that have not arrived in time."""
 
 
 def search_nidaqmx() -> Sequence[DeviceAddress]:
-    """Devices and modules with at least two analog inputs."""
-    if find_library("nidaqmx", NIDAQMX_EXTRA) is None:
+    """List the NI devices and modules with at least two analog inputs.
+
+    Returns
+    -------
+    Sequence of DeviceAddress
+        Addresses that `open_nidaqmx` takes, empty if the library or NI's driver is not installed.
+    """
+    if find_library("nidaqmx") is None:
         return []
     try:
-        devices = [*load_library("nidaqmx.system", NIDAQMX_EXTRA).System.local().devices]
+        devices = [*load_library("nidaqmx.system").System.local().devices]
         listed = [(device, len(device.ai_physical_chans)) for device in devices]
-    except load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error:  # NI's own driver is not installed
+    except load_library("nidaqmx.errors").Error:  # NI's own driver is not installed
         return []
     return [
         DeviceAddress(f"nidaqmx:{device.name}", _read_identity(device), f"{count} inputs")
@@ -45,46 +52,58 @@ def search_nidaqmx() -> Sequence[DeviceAddress]:
 
 
 def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
-    """The device or module "nidaqmx:NAME", by the name that NI's software shows, e.g. "nidaqmx:cDAQ1Mod1".
+    """Open an NI device or module.
 
-    Of its rates the nearest above the one asked for is taken (NI 9234: 51.2 kHz / n), its highest where none is. An
-    input that feeds its sensor is AC-coupled. The ranges are those that the device really has.
+    An input that powers its sensor is AC-coupled. The ranges of the channels are those that the device really has.
+
+    Parameters
+    ----------
+    port
+        "nidaqmx:NAME" with the name that NI's software shows, e.g. "nidaqmx:cDAQ1Mod1".
+    inputs
+        Sensors with the numbers of their inputs.
+    sample_rate
+        Requested sample rate (Hz), None for the highest. The device uses its next higher one (NI 9234: 51.2 kHz / n).
+
+    Returns
+    -------
+    LibraryDevice
+        Connected device.
+
+    Raises
+    ------
+    DeviceError
+        The library or the device is missing, or the device cannot be opened.
+    ValueError
+        The device does not have an input.
     """
-    library = load_library("nidaqmx", NIDAQMX_EXTRA)
-    task = None
-    try:
-        device = load_library("nidaqmx.system", NIDAQMX_EXTRA).Device(port.removeprefix("nidaqmx:"))
+    library = load_library("nidaqmx")
+    with convert_open_errors(port, load_library("nidaqmx.errors").Error), ExitStack() as cleanup:
+        device = load_library("nidaqmx.system").Device(port.removeprefix("nidaqmx:"))
         check_input_numbers([sensor.number for sensor in inputs], len(device.ai_physical_chans), device.product_type)
         task = library.Task()
+        cleanup.callback(task.close)
         channels = tuple(_add_input(task, device, sensor) for sensor in inputs)
         rate = _set_rate(task, sample_rate or device.ai_max_multi_chan_rate)
         reader = NidaqmxReader(task, len(inputs), rate)
+        cleanup.pop_all()
         return LibraryDevice(port, reader, _read_identity(device), channels, rate, "buffer overrun")
-    except BaseException as error:
-        if task is not None:
-            task.close()
-        if not isinstance(error, load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error):
-            raise
-        words = " ".join(str(error).split())
-        raise DeviceError(f"{port} cannot be opened ({words})", "`lobewatch ports` lists what there is") from error
 
 
-class NidaqmxReader:
-    """Reads a task that samples continuously."""
+class NidaqmxReader(LibraryReader):
+    """Reader of a task that samples continuously."""
 
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:
-        """The task with its inputs and its rate (Hz)."""
-        self.errors: tuple[type[Exception], ...] = (load_library("nidaqmx.errors", NIDAQMX_EXTRA).Error,)
+        """Take the task with its inputs and its rate (Hz)."""
+        self.errors: tuple[type[Exception], ...] = (load_library("nidaqmx.errors").Error,)
         self._task = task
-        self._reader = load_library("nidaqmx.stream_readers", NIDAQMX_EXTRA).AnalogMultiChannelReader(task.in_stream)
+        self._reader = load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
         self._shape = n_channels, round(rate * NIDAQMX_BLOCK_TIME)
 
     def start(self) -> None:
-        """See Reader."""
         self._task.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
-        """See Reader."""
         volts = np.empty(self._shape)
         try:
             self._reader.read_many_sample(volts, self._shape[1], timeout)
@@ -95,15 +114,13 @@ class NidaqmxReader:
         return VoltageBlock(volts)
 
     def stop(self) -> None:
-        """See Reader."""
         self._task.stop()
 
     def close(self) -> None:
-        """See Reader."""
         self._task.close()
 
     def fault(self) -> str:
-        """Sentence on inputs whose IEPE loop is open."""
+        """Describe inputs whose IEPE loop is open."""
         stream = self._task.in_stream
         if not stream.open_current_loop_chans_exist:
             return ""
@@ -115,8 +132,8 @@ def _read_identity(device: Any) -> DeviceIdentity:
 
 
 def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
-    """An input of the task, its supply on where it feeds its sensor; the channel with the range that it has."""
-    constants = load_library("nidaqmx.constants", NIDAQMX_EXTRA)
+    """Add an input to the task, powered if it feeds its sensor. Return the channel with its real range."""
+    constants = load_library("nidaqmx.constants")
     scale = sensor.channel.full_scale
     entry = task.ai_channels.add_ai_voltage_chan(f"{device.name}/ai{sensor.number}", min_val=-scale, max_val=scale)
     currents = device.ai_current_int_excit_discrete_vals
@@ -128,7 +145,7 @@ def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
 
 
 def _set_rate(task: Any, rate: float) -> float:
-    """Set the clock of a task to a rate (Hz); the rate that the device really has (Hz)."""
-    continuous = load_library("nidaqmx.constants", NIDAQMX_EXTRA).AcquisitionType.CONTINUOUS
+    """Set the clock of a task and return the real sample rate (Hz)."""
+    continuous = load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
     task.timing.cfg_samp_clk_timing(rate, sample_mode=continuous, samps_per_chan=round(rate * NIDAQMX_BUFFER_TIME))
     return float(task.timing.samp_clk_rate)

@@ -9,8 +9,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats, Indices
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness, scale_parts
 from dsm.matrix.assemble import assemble
@@ -18,9 +19,6 @@ from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies, co
 from dsm.modes.find_modes import MAX_MODES
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
-
-_Float = NDArray[np.float64]
-
 
 DOFS_ACROSS_JOINT = 4
 """Dofs from one side of a joint to the other, with force and moment between them."""
@@ -33,9 +31,9 @@ class CalibratedSprings(NamedTuple):
     """Places in (*bearings, *joints) of what the springs belong to; a joint has two."""
     model: DynamicStiffness
     """The shaft without these springs."""
-    forces: _Float
+    forces: Floats
     """Pairs of forces across the springs, times the roots of their stiffness and the model's scale, (n_dofs, m)."""
-    housing: _Float
+    housing: Floats
     """Compliance of the housings with the same weights, shape (m, m), diagonal."""
 
 
@@ -49,18 +47,18 @@ class BearingEigenproblem:
 
     springs: CalibratedSprings
     """The calibrated springs."""
-    w2: _Float
+    w2: Floats
     """Square of the angular frequency ((rad/s)^2), shape (n,)."""
-    below: NDArray[np.int_]
+    below: Indices
     """Number of modes of the shaft without these springs below each frequency, shape (n,)."""
-    response: _Float
+    response: Floats
     """K^-1 B with the weights, over the scale of the model: response of all dofs, shape (n, n_dofs, n_springs)."""
-    values: _Float
+    values: Floats
     """Eigenvalues, rising, shape (n, n_springs)."""
-    vectors: _Float
+    vectors: Floats
     """Eigenvectors in columns, shape (n, n_springs, n_springs)."""
 
-    def pick(self, mode: int) -> NDArray[np.int_]:
+    def pick(self, mode: int) -> Indices:
         """Index of the eigenvalue that belongs to a mode (1 is the lowest), shape (n,); -1 where there is none.
 
         Of the eigenvalues in rising order it is number N - mode (0 is the first), N the number of modes of the shaft
@@ -80,7 +78,7 @@ class BearingEigenproblem:
         return float(self.values[0, index] / (2 * self.w2[0] * slope[0]))
 
 
-def bearing_eigenproblem(spindle: Spindle, frequency: _Float, group: str | None = None) -> BearingEigenproblem:
+def bearing_eigenproblem(spindle: Spindle, frequency: Floats, group: str | None = None) -> BearingEigenproblem:
     """The eigenproblem of the parts of a group (see calibrated_parts) at frequencies (Hz, (n,), > 0).
 
     One factor of K a frequency gives the response and, by its negative pivots, the count of modes. Raises ValueError
@@ -116,9 +114,7 @@ def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | Non
     return CalibratedSprings(tuple(chosen), model, forces * model.scale[:, np.newaxis], np.diag(softness))
 
 
-def stiffness_factor(
-    spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None
-) -> NDArray[np.float64]:
+def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
     """Factor on the bearing stiffnesses that puts a mode (1 is the lowest) at each frequency; NaN where none does.
 
     frequency: (n,) Hz, > 0; shape of the result (n,). group: the bearings that the factor is for; None: all that have
@@ -133,9 +129,7 @@ def stiffness_factor(
     return np.where(index < 0, np.nan, -1 / value)
 
 
-def stiffness_curve(
-    spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None
-) -> NDArray[np.float64]:
+def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
     """Bearing stiffness (N/m) for which each frequency is that mode, shape (n,); NaN where it cannot be.
 
     frequency: (n,) Hz, > 0. The stiffnesses keep their given ratios; what is returned is their mean over the group
@@ -159,11 +153,7 @@ STANDARD_ERRORS_95_PERCENT = 1.96
 
 
 def calibrate(
-    spindle: Spindle,
-    frequency: float,
-    frequency_std: float | None = None,
-    mode: int = 1,
-    group: str | None = None,
+    spindle: Spindle, frequency: float, frequency_std: float | None = None, mode: int = 1, group: str | None = None
 ) -> Calibration:
     """Scale bearing stiffnesses by one factor, so that a mode (1 is the lowest) has its measured frequency (Hz).
 
@@ -221,7 +211,7 @@ def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -
         raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
 
 
-def _with_interval_ends(frequency: float, frequency_std: float | None) -> NDArray[np.float64]:
+def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats:
     """The frequency, and the ends of its 95 % interval (Hz)."""
     if frequency_std is None:
         return np.array([frequency])

@@ -9,15 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats
 from dsm.calibration.report_text import format_with_error
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.modes.damped_modes import DampedMode, DampedShaft
 from dsm.spindle.attachments import Damping, damping_of_bearings
 from dsm.spindle.spindle import Spindle
-
-_Float = NDArray[np.float64]
 
 FIRST_DAMPER_STEP = 0.3
 """Longest first step: the damper's share in the force of its spring (-), far from holding the bearing still."""
@@ -96,7 +94,7 @@ class _Dampers(NamedTuple):
     shaft: DampedShaft
     number: int
     fixed: Damping
-    ratio: _Float
+    ratio: Floats
     """Dampers (N s/m) of all bearings at amount 1, shape (n_bearings,)."""
 
     def at(self, amount: float) -> Damping:
@@ -177,7 +175,7 @@ def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: 
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
 
 
-def _start_dampers(spindle: Spindle, chosen: list[int]) -> _Float:
+def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
     """Dampers to start from: those given, or such that damper over stiffness is 1 us in each bearing."""
     ratio = np.zeros(len(spindle.bearings))
     damped = [index for index in chosen if spindle.bearings[index].damping > 0]

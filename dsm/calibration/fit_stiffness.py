@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats
 from dsm.calibration.calibration import UnreachableFrequencyError
 from dsm.calibration.identifiability import (
     IDENTIFIABILITY_REMEDY,
@@ -25,8 +26,6 @@ from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
-
-_Float = NDArray[np.float64]
 
 EXTRA_STARTS = 8
 """Further starts, about a factor of e around the given one, where that leads to no minimum or to a poor one."""
@@ -111,7 +110,7 @@ def fit_stiffness(
     return result
 
 
-def _search(problem: StiffnessProblem, begin: _Float | None) -> tuple[Iterate, bool]:
+def _search(problem: StiffnessProblem, begin: Floats | None) -> tuple[Iterate, bool]:
     """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
     size = len(problem.names)
     state, found = minimize(problem, np.zeros(size) if begin is None else begin)
@@ -186,7 +185,7 @@ def _build_result(
     )
 
 
-def _covariance(problem: StiffnessProblem, state: Iterate) -> _Float | None:
+def _covariance(problem: StiffnessProblem, state: Iterate) -> Floats | None:
     """(J^T J)^-1, times the variance of the residuals where no standard errors were given.
 
     A group that is not felt, known to a factor of 30 at best, counts as known to that and independent of all others.
@@ -205,7 +204,7 @@ def _covariance(problem: StiffnessProblem, state: Iterate) -> _Float | None:
     return limited
 
 
-def _inverse_normal_matrix(slope: _Float) -> _Float:
+def _inverse_normal_matrix(slope: Floats) -> Floats:
     """(J^T J)^-1, large where J is singular."""
     _, values, vectors = np.linalg.svd(slope, full_matrices=False)
     root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])

@@ -10,12 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats
 from dsm.calibration.least_squares import Iterate, StiffnessProblem, minimize
 from dsm.calibration.report_text import FitRemark
-
-_Float = NDArray[np.float64]
 
 PROFILE_CONFIDENCE = 0.95
 """Of the intervals that are compared."""
@@ -99,7 +97,7 @@ class ProfileScan(NamedTuple):
     """Other minima to which these ways lead, the lowest first; they may be lower than the fit."""
 
 
-def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: _Float) -> ProfileScan:
+def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
     """Along each factor: its interval, and up to a factor of 30 beyond and through the given stiffness.
 
     Beyond it is looked at of a group that has little energy in all measured modes at what was found, at what was given,
@@ -122,7 +120,7 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: _Flo
     return ProfileScan(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
 
 
-def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> _Float:
+def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> Floats:
     """Least share, of what was found, what was given and half-way, of each group in the mode that has most of it."""
     states = [best]
     for share in (0.0, 0.5):
@@ -131,7 +129,7 @@ def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> _Float:
     return np.asarray(np.min([np.max(state.share, axis=0) for state in states], axis=0))
 
 
-def _weakest_direction_starts(best: Iterate, log_covariance: _Float) -> list[_Float]:
+def _weakest_direction_starts(best: Iterate, log_covariance: Floats) -> list[Floats]:
     """Starts in the direction that is known least, where several factors are sought."""
     direction = np.linalg.eigh(log_covariance)[1][:, -1]
     direction /= np.max(np.abs(direction))
@@ -139,7 +137,7 @@ def _weakest_direction_starts(best: Iterate, log_covariance: _Float) -> list[_Fl
 
 
 def identifiability_remarks(
-    problem: StiffnessProblem, best: Iterate, log_covariance: _Float | None, around: ProfileScan | None
+    problem: StiffnessProblem, best: Iterate, log_covariance: Floats | None, around: ProfileScan | None
 ) -> list[FitRemark]:
     """Remarks on groups whose factor the frequencies leave open.
 
@@ -177,7 +175,7 @@ def identifiability_remarks(
     return remarks
 
 
-def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: _Float, rivals: Sequence[Iterate]) -> str:
+def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: Floats, rivals: Sequence[Iterate]) -> str:
     """Factors of all solutions that fit as well, far off in one that is not open."""
     error, highest = np.sqrt(np.diag(log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
     far = np.where(error < MAX_LOG_INTERVAL, MIN_RIVAL_DISTANCE * error + MIN_PROFILE_WIDTH, math.inf)
@@ -189,7 +187,7 @@ def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: _Float
 
 
 def _likelihood_profile(
-    problem: StiffnessProblem, best: Iterate, log_covariance: _Float, index: int, far: bool
+    problem: StiffnessProblem, best: Iterate, log_covariance: Floats, index: int, far: bool
 ) -> Profile | None:
     allowed = AllowedExcess.of(problem, best)
     half = math.sqrt(allowed.rise * float(log_covariance[index, index]))

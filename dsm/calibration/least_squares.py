@@ -9,16 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats, Indices
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.matrix.dynamic_stiffness import check_frequencies
 from dsm.modes.find_modes import find_modes
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle
-
-_Float = NDArray[np.float64]
 
 DIAMETER_STEP = 1e-3
 """Relative change of a diameter by which its effect is worked out, either way."""
@@ -48,7 +47,7 @@ def diameter_keys(spindles: Sequence[Spindle]) -> list[list[DiameterKey]]:
     return names
 
 
-def diameter_effects(spindle: Spindle, values: Callable[[Spindle], _Float], names: Sequence[DiameterKey]) -> _Float:
+def diameter_effects(spindle: Spindle, values: Callable[[Spindle], Floats], names: Sequence[DiameterKey]) -> Floats:
     """d ln value / d ln diameter, outside and inside alike, of each of the names, shape (n_values, n_names).
 
     Of all diameters of a tool together it is TOGETHER times as much.
@@ -62,8 +61,8 @@ def diameter_effects(spindle: Spindle, values: Callable[[Spindle], _Float], name
 
 
 def frequency_effects(
-    spindles: Sequence[Spindle], mode: NDArray[np.int_], shaft: NDArray[np.int_], names: Sequence[Sequence[DiameterKey]]
-) -> _Float:
+    spindles: Sequence[Spindle], mode: Indices, shaft: Indices, names: Sequence[Sequence[DiameterKey]]
+) -> Floats:
     """Effects on modes of several spindles, shape (n_modes, n_diameters), diameters by name in order of appearance."""
     order = diameter_columns(names)
     found = np.zeros((mode.size, len(order)))
@@ -74,7 +73,7 @@ def frequency_effects(
     return found
 
 
-def _frequency_function(mode: NDArray[np.int_]) -> Callable[[Spindle], _Float]:
+def _frequency_function(mode: Indices) -> Callable[[Spindle], Floats]:
     """What gives the frequencies of these modes (Hz)."""
     return lambda spindle: np.asarray(natural_frequencies(spindle, int(np.max(mode)))[mode - 1])
 
@@ -107,17 +106,17 @@ def _scale_segment(segment: Segment, factor: float) -> Segment:
 class MeasuredModes(NamedTuple):
     """What was measured."""
 
-    mode: NDArray[np.int_]
+    mode: Indices
     """Numbers of the modes, shape (n,); 1 is the lowest."""
-    frequency: _Float
+    frequency: Floats
     """Frequencies (Hz), shape (n,)."""
-    std: _Float | None
+    std: Floats | None
     """Standard errors (Hz), shape (n,); None where not given."""
-    shaft: NDArray[np.int_]
+    shaft: Indices
     """Number of the spindle that each belongs to, shape (n,); 0 is the first."""
 
     @property
-    def scale(self) -> _Float:
+    def scale(self) -> Floats:
         """What residuals are divided by: standard errors (Hz); where there are none, the frequencies."""
         return self.frequency if self.std is None else self.std
 
@@ -151,7 +150,7 @@ def check_measured_modes(
     return MeasuredModes(numbers, f, std, where)
 
 
-def _check_mode_numbers(f: _Float, numbers: NDArray[np.int_], mode: Sequence[int] | None) -> None:
+def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None) -> None:
     """Of one spindle."""
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
     if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
@@ -180,19 +179,19 @@ MIN_CHI_SQUARE_PROBABILITY = 1e-3
 class Iterate(NamedTuple):
     """The model at one choice of factors."""
 
-    log_factor: _Float
+    log_factor: Floats
     """Logarithms of the factors (-), shape (g,)."""
     spindles: tuple[Spindle, ...]
     """The spindles scaled by them."""
-    frequency: tuple[_Float, ...]
+    frequency: tuple[Floats, ...]
     """Frequencies of all modes of each spindle up to the one beyond the highest measured (Hz)."""
-    fitted: _Float
+    fitted: Floats
     """Frequencies that the model gives the measured modes (Hz), (n,)."""
-    share: _Float
+    share: Floats
     """Energy shares (n, g) of the measured modes."""
-    residual: _Float
+    residual: Floats
     """Fitted less measured frequency, scaled and weighted, (n,)."""
-    slope: _Float
+    slope: Floats
     """Derivative of the residual by log_factor, (n, g)."""
 
     @property
@@ -210,7 +209,7 @@ class StiffnessProblem(NamedTuple):
     """Groups, each with a factor."""
     measured: MeasuredModes
     """The frequencies."""
-    weight: _Float | None = None
+    weight: Floats | None = None
     """What scaled residuals are multiplied by (n, n), where their errors depend on each other."""
 
     def with_drawing(self, state: Iterate, tolerance: float) -> StiffnessProblem:
@@ -226,7 +225,7 @@ class StiffnessProblem(NamedTuple):
         """Modes less factors."""
         return self.measured.frequency.size - len(self.names)
 
-    def evaluate(self, log_factor: _Float) -> Iterate:
+    def evaluate(self, log_factor: Floats) -> Iterate:
         """The model with these factors; certified modes."""
         measured, factors = self.measured, dict(zip(self.names, np.exp(log_factor).tolist(), strict=True))
         scaled = tuple(scale_groups(spindle, factors) for spindle in self.spindles)
@@ -253,7 +252,7 @@ class StiffnessProblem(NamedTuple):
 
 
 def minimize(
-    problem: StiffnessProblem, start: _Float, fixed: int | Sequence[int] = (), converged: float = FACTOR_STEP_TOLERANCE
+    problem: StiffnessProblem, start: Floats, fixed: int | Sequence[int] = (), converged: float = FACTOR_STEP_TOLERANCE
 ) -> tuple[Iterate, bool]:
     """The last state on the way down from a start by Levenberg and Marquardt, and whether it is a minimum.
 
@@ -284,14 +283,14 @@ def minimize(
     return state, False
 
 
-def _is_hidden_by_rounding(problem: StiffnessProblem, state: Iterate, free: NDArray[np.int_]) -> bool:
+def _is_hidden_by_rounding(problem: StiffnessProblem, state: Iterate, free: Indices) -> bool:
     """Whether the sum of squares falls, by the step of Gauss and Newton, by no more than rounding changes it."""
     left = state.residual + state.slope @ _damped_step(state, free, 0.0)
     blur = FREQUENCY_ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
     return state.cost - float(left @ left) <= 2 * math.sqrt(state.cost) * blur + blur**2
 
 
-def _damped_step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
+def _damped_step(state: Iterate, free: Indices, damping: float) -> Floats:
     """Step of Levenberg and Marquardt; with damping 0 that of Gauss and Newton."""
     slope = state.slope[:, free]
     weight = math.sqrt(damping) * np.linalg.norm(slope, 2)

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Complexes, Floats
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.matrix.assemble import assemble
 from dsm.matrix.condense import damped_blocks
 from dsm.matrix.dynamic_stiffness import check_frequencies, full_matrices
 from dsm.spindle.attachments import Bearing, damping_of_bearings, supports
 from dsm.spindle.spindle import Spindle, require_support
-
-_Float = NDArray[np.float64]
-_Complex = NDArray[np.complex128]
 
 RECEPTANCE_MAP_CHUNK = 50
 """Frequencies whose full matrices are in memory at a time."""
@@ -29,7 +27,7 @@ def receptance_map(
     position: float = 0.0,
     loss_factor: float = 0.0,
     group: str | None = None,
-) -> _Complex:
+) -> Complexes:
     """Deflection over force (m/N) with bearing stiffnesses times each factor, shape (n_factors, n_frequencies).
 
     frequency: (n_frequencies,) Hz; factor: (n_factors,) > 0. position, loss_factor eta: as for receptance, which each
@@ -69,7 +67,7 @@ def receptance_map(
     return receptances
 
 
-def _check_factors(factor: ArrayLike) -> _Float:
+def _check_factors(factor: ArrayLike) -> Floats:
     factors = np.atleast_1d(np.asarray(factor, dtype=np.float64))
     if factors.ndim != 1 or factors.size == 0:
         raise ValueError(f"factor has shape {factors.shape}; a 1-D array of at least one factor is needed")
@@ -79,7 +77,7 @@ def _check_factors(factor: ArrayLike) -> _Float:
     return factors
 
 
-def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_factor: float) -> _Complex:
+def _compliance(spindle: Spindle, w: Complexes, places: Sequence[float], loss_factor: float) -> Complexes:
     """Deflections under forces, both at `order_taps` (m), shape (n, n_places, n_places)."""
     damping = damping_of_bearings(spindle.bearings, loss_factor)
     model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
@@ -95,8 +93,8 @@ def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_fac
 
 
 def _spring_terms(
-    bearings: Sequence[Bearing], compliance: _Complex, w: _Complex, loss_factor: float
-) -> tuple[_Complex, _Complex]:
+    bearings: Sequence[Bearing], compliance: Complexes, w: Complexes, loss_factor: float
+) -> tuple[Complexes, Complexes]:
     """s and p of the formula above, shape (n, n_bearings) each."""
     held = supports(bearings, w, damping_of_bearings(bearings, loss_factor))
     root = np.sqrt([bearing.stiffness for bearing in bearings])

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats, Indices
 from dsm.calibration.least_squares import diameter_columns, diameter_effects, diameter_keys, frequency_effects
 from dsm.calibration.report_text import FitRemark, format_with_error
 from dsm.calibration.stiffness_groups import group_stiffness, is_tilting, scale_groups
 from dsm.modes.natural_frequencies import modes_at
 from dsm.spindle.spindle import Spindle
-
-_Float = NDArray[np.float64]
 
 OPEN_REMARK_CODES = ("group-not-felt", "stiffness-ambiguous")
 """Codes of the remarks that leave a stiffness open."""
@@ -32,27 +30,27 @@ class StiffnessFit:
 
     groups: tuple[str, ...]
     """Names of the groups."""
-    mode: NDArray[np.int_]
+    mode: Indices
     """Numbers of the measured modes, shape (n,); 1 is the lowest."""
-    frequency: _Float
+    frequency: Floats
     """Measured frequencies (Hz), shape (n,)."""
-    frequency_std: _Float | None
+    frequency_std: Floats | None
     """Their standard errors (Hz), shape (n,); None where they were not given."""
-    fitted_frequency: _Float
+    fitted_frequency: Floats
     """Frequencies of the fitted spindle (Hz), shape (n,)."""
-    factor: _Float
+    factor: Floats
     """Stiffness after over before (-), shape (g,)."""
-    log_covariance: _Float | None
+    log_covariance: Floats | None
     """Covariance of the logarithms of the factors (-), shape (g, g); None: no errors given, and no mode to spare.
 
     Propagated from the standard errors of the frequencies, whatever the residuals are. Where none were given, from
     the scatter of the residuals, taken as errors of equal size in relation to the frequency.
     """
-    energy_share: _Float
+    energy_share: Floats
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
     remarks: tuple[FitRemark, ...]
     """Remarks on what makes the result doubtful, and what to do about it."""
-    shaft: NDArray[np.int_]
+    shaft: Indices
     """Number of the spindle that each mode was measured on, shape (n,); 0 is the first."""
     given: tuple[Spindle, ...]
     """The spindles as given."""
@@ -84,19 +82,19 @@ class StiffnessFit:
         return any(remark.code == "frequencies-misfit" for remark in self.remarks)
 
     @property
-    def residual(self) -> _Float:
+    def residual(self) -> Floats:
         """Fitted less measured frequency (Hz), shape (n,)."""
         return np.asarray(self.fitted_frequency - self.frequency)
 
     @property
-    def factor_std(self) -> _Float | None:
+    def factor_std(self) -> Floats | None:
         """Standard error of the factors (-), shape (g,); None where there is no covariance."""
         if self.log_covariance is None:
             return None
         return np.asarray(self.factor * np.sqrt(np.diag(self.log_covariance)))
 
     @property
-    def stiffness(self) -> _Float:
+    def stiffness(self) -> Floats:
         """Mean radial stiffness of the parts of each group after the fit (N/m), shape (g,).
 
         Of a group of stiffnesses against tilting alone it is their mean (N m/rad).
@@ -106,13 +104,13 @@ class StiffnessFit:
         return np.array([group_stiffness(self.spindles, group) for group in self.groups])
 
     @property
-    def stiffness_std(self) -> _Float | None:
+    def stiffness_std(self) -> Floats | None:
         """Its standard error (N/m), shape (g,); None where there is no covariance."""
         std = self.factor_std
         return None if std is None else np.asarray(self.stiffness * std / self.factor)
 
     @property
-    def correlation(self) -> _Float | None:
+    def correlation(self) -> Floats | None:
         """Correlations of the factors (-), shape (g, g); None where there is no covariance."""
         if self.log_covariance is None:
             return None
@@ -229,11 +227,11 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
     '921 +- 2 Hz, K = 33.2 N/um'
     """
 
-    def of(shaft: Spindle) -> _Float:
+    def of(shaft: Spindle) -> Floats:
         frequency, stiffness = modes_at(shaft, mode, position)
         return np.array([frequency[-1], stiffness[-1]])
 
-    def at(log_factor: _Float) -> _Float:
+    def at(log_factor: Floats) -> Floats:
         return of(scale_groups(spindle, dict(zip(fit.groups, np.exp(log_factor).tolist(), strict=True))))
 
     best = np.log(fit.factor)
@@ -254,8 +252,8 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
 
 
 def _joint_diameter_effects(
-    fit: StiffnessFit, spindle: Spindle, values: Callable[[Spindle], _Float]
-) -> tuple[_Float, _Float]:
+    fit: StiffnessFit, spindle: Spindle, values: Callable[[Spindle], Floats]
+) -> tuple[Floats, Floats]:
     """Effects of all diameters on the modes of the fit (n, d), and on two values of another spindle (2, d)."""
     names = diameter_keys([*fit.spindles, spindle])
     order = diameter_columns(names)
@@ -265,7 +263,7 @@ def _joint_diameter_effects(
     return fitted, own
 
 
-def _diameter_variance(fit: StiffnessFit, effect: tuple[_Float, _Float], slope: _Float) -> _Float:
+def _diameter_variance(fit: StiffnessFit, effect: tuple[Floats, Floats], slope: Floats) -> Floats:
     """What the drawing adds to the relative variances (2,), whose part by the factors holds its effect on the fit.
 
     slope: d ln value / d ln factor, shape (g, 2).

@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats
 from dsm.modes.energy_shares import spring_energy
 from dsm.modes.modes import Modes
 from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.spindle import Spindle
 
-_Float = NDArray[np.float64]
 _StiffPart = Bearing | Joint
 
 
@@ -114,7 +113,7 @@ def is_tilting(spindles: Sequence[Spindle], group: str) -> bool:
     return all(part.group != group for spindle in spindles for part in _parts(spindle))
 
 
-def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
+def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
     """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor."""
     energy = spring_energy(modes)
     shares = np.zeros((modes.frequency.size, len(groups)))

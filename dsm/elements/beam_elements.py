@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Flags, Floats, Indices
 from dsm.elements import matrix_series
 from dsm.elements.element_series import (
     FIRST_SERIES_POLE,
@@ -21,13 +21,10 @@ from dsm.spindle.sections import Sections
 from dsm.spindle.segment import SAME_PLACE
 from dsm.spindle.spindle import Theory
 
-_Float = NDArray[np.float64]
-_Indices = NDArray[np.int_]
-
 
 def stiffness_elements(
-    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, apart: bool = False
-) -> _Float:
+    shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
+) -> Floats:
     """Dynamic stiffness of elements as series, shape (10, n, n_terms); arguments as for transfer_series.
 
     With u, t of both ends the rows are k(u1,u1), k(u1,t1), k(t1,t1); k(u2,u2), k(u2,t2), k(t2,t2); k(u1,u2), k(u1,t2),
@@ -49,8 +46,8 @@ def stiffness_elements(
 
 
 def link_elements(
-    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, apart: bool = False
-) -> _Float:
+    shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
+) -> Floats:
     """Short elements as series that lose nothing however short they are, shape (10, n, n_terms); arguments as above.
 
     Unknown beside q1 = (u1, t1) are the force and the moment p at end 2: [f1; 0; f2] = [[S, -H^T, 0], [-H, -F, I],
@@ -67,7 +64,7 @@ def link_elements(
     return np.stack([*_upper_triangle(inertia), *_upper_triangle(-flexibility), *_matrix_entries(-lever)])
 
 
-def _stiffness_from_transfer(transfer: _Float) -> _Float:
+def _stiffness_from_transfer(transfer: Floats) -> Floats:
     """Of f1 = -(Q1, M1) and f2 = (Q2, M2) with q2 = A q1 + B (Q1, M1): K11 = B^-1 A, K12 = -B^-1, K22 = D B^-1."""
     a, b, _, d = _split_quarters(transfer)
     across = matrix_series.inverse(b)
@@ -75,15 +72,15 @@ def _stiffness_from_transfer(transfer: _Float) -> _Float:
     return np.stack([*_upper_triangle(near), *_upper_triangle(far), *_matrix_entries(-across)])
 
 
-def _split_quarters(transfer: _Float) -> tuple[_Float, _Float, _Float, _Float]:
+def _split_quarters(transfer: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return transfer[:, :2, :2], transfer[:, :2, 2:], transfer[:, 2:, :2], transfer[:, 2:, 2:]
 
 
-def _matrix_entries(matrix: _Float) -> tuple[_Float, _Float, _Float, _Float]:
+def _matrix_entries(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 1]
 
 
-def _upper_triangle(matrix: _Float) -> tuple[_Float, _Float, _Float]:
+def _upper_triangle(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     """The upper half of a symmetric matrix, the mean of the two halves."""
     return matrix[:, 0, 0], (matrix[:, 0, 1] + matrix[:, 1, 0]) / 2, matrix[:, 1, 1]
 
@@ -101,11 +98,11 @@ MAX_LINK_SHARE = 0.4
 class Nodes(NamedTuple):
     """Nodes along a shaft and the elements between them."""
 
-    position: _Float
+    position: Floats
     """Places of the nodes (m), rising, shape (n,)."""
-    segment: _Indices
+    segment: Indices
     """Index of the segment that each element is part of, shape (n - 1,)."""
-    short: NDArray[np.bool_]
+    short: Flags
     """Whether an element is so short that stiffness alone would drown all else in rounding, shape (n - 1,)."""
 
 
@@ -138,7 +135,7 @@ def place_nodes(
     return Nodes(nodes, np.repeat(segment, parts), np.repeat(links | (size < SHORT_ELEMENT_SHARE), parts))
 
 
-def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> _Float:
+def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> Floats:
     """Nodes at ends of segments, inside steep cones and at the wanted places; places that are the same count once."""
     ends = shaft.ends
     slack = SAME_PLACE * ends[-1]
@@ -151,7 +148,7 @@ def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> _Float:
     return np.sort(np.append(nodes, places[apart]))
 
 
-def _cone_nodes(shaft: Sections) -> _Float:
+def _cone_nodes(shaft: Sections) -> Floats:
     """Places (m) that divide each cone into parts of equal ratio of what changes most, outer diameter or wall."""
     places = [np.zeros(0)]
     for index in np.flatnonzero(shaft.is_cone):
@@ -165,8 +162,8 @@ def _cone_nodes(shaft: Sections) -> _Float:
 
 
 def _element_size(
-    shaft: Sections, segment: _Indices, nodes: _Float, theory: Theory, top_frequency: float, spin: float | None
-) -> _Float:
+    shaft: Sections, segment: Indices, nodes: Floats, theory: Theory, top_frequency: float, spin: float | None
+) -> Floats:
     """Length of each element over the longest for which w stays as far below its clamped frequencies as x = MAX_X.
 
     Dunkerley: 1/w_clamped^2 <= sum of those of bending, of shear and of rotary inertia alone; in a cone each with the

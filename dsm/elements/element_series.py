@@ -7,8 +7,8 @@ from functools import cache
 from math import comb, factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats, Indices
 from dsm.spindle.sections import Sections
 from dsm.spindle.spindle import Theory
 
@@ -22,9 +22,7 @@ MAX_ELEMENT_X = 2.0
 _FractionSeries = list[Fraction]
 
 
-def element_series(
-    bending_stiffness: NDArray[np.float64], mass_per_length: NDArray[np.float64], length: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def element_series(bending_stiffness: Floats, mass_per_length: Floats, length: Floats) -> Floats:
     """Coefficients of the element matrices in powers of w^2, shape (6, n_elements, TERMS).
 
     bending_stiffness EI (N m^2), mass_per_length m (kg/m), length L (m): shape (n_elements,). With u the deflection
@@ -41,7 +39,7 @@ def element_series(
 
 
 @cache
-def _unit_series() -> NDArray[np.float64]:
+def _unit_series() -> Floats:
     """The six series in z = m w^2 L^4/EI for EI = L = 1, shape (6, TERMS), rounded once from exact fractions.
 
     The solutions of u'''' = z u with one unit derivative at s = 0 are c_j(s) = sum z^n s^(4n+j)/(4n+j)!, and at
@@ -77,15 +75,12 @@ def _divide_series(a: _FractionSeries, b: _FractionSeries) -> _FractionSeries:
     return quotient
 
 
-_Float = NDArray[np.float64]
-
-
 def count_series_terms(apart: bool) -> int:
     """Terms kept of each series."""
     return SERIES_TERMS * SERIES_TERMS if apart else SERIES_TERMS
 
 
-def combine_rotary_terms(series: _Float, spin: float) -> _Float:
+def combine_rotary_terms(series: Floats, spin: float) -> Floats:
     """A series with rotary inertia apart as one in powers of w, at a speed of rotation W = `spin` (rad/s).
 
     Term TERMS n + j of the series (..., TERMS^2) belongs to w^2 to the power n - j times r to the power j <= n, r what
@@ -99,7 +94,7 @@ def combine_rotary_terms(series: _Float, spin: float) -> _Float:
 
 
 @cache
-def _rotary_terms() -> tuple[NDArray[np.int_], NDArray[np.int_], _Float]:
+def _rotary_terms() -> tuple[Indices, Indices, Floats]:
     """Terms that are not 0, and how (w^2 - 2 W w)^j w^(2n - 2j) is made of powers of w: exponents of -2 W, factors."""
     pairs = [(n, j) for n in range(SERIES_TERMS) for j in range(n + 1)]
     lowered = np.zeros((len(pairs), 2 * SERIES_TERMS - 1), dtype=int)
@@ -110,15 +105,13 @@ def _rotary_terms() -> tuple[NDArray[np.int_], NDArray[np.int_], _Float]:
     return np.array([SERIES_TERMS * n + j for n, j in pairs]), lowered, binomial
 
 
-_Indices = NDArray[np.int_]
-
 GAUSS_POINTS = 16
 """Gauss points of an element: cross-sections that change by MOST_TAPER are integrated to rounding."""
 
 
 def transfer_series(
-    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, apart: bool = False
-) -> _Float:
+    shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
+) -> Floats:
     """State (u, t, Q, M) at `end` from that at `start`, in powers of w^2: (n, 4, 4, number_of_terms(apart)).
 
     segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of
@@ -158,7 +151,7 @@ def transfer_series(
 
 
 @cache
-def _quadrature() -> tuple[_Float, _Float, _Float]:
+def _quadrature() -> tuple[Floats, Floats, Floats]:
     """Gauss points and weights on 0 to 1, and the matrix that integrates from 0 to each point."""
     point, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     order = np.arange(GAUSS_POINTS)

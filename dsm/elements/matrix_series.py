@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Float = NDArray[np.float64]
+from dsm.arrays import Floats, Indices
 
 
-def product(a: _Float, b: _Float) -> _Float:
+def product(a: Floats, b: Floats) -> Floats:
     """A B."""
     near, far = _terms_outside(a), _terms_outside(b)
     series = np.zeros_like(far)
@@ -17,7 +16,7 @@ def product(a: _Float, b: _Float) -> _Float:
     return _terms_last(series)
 
 
-def inverse(a: _Float) -> _Float:
+def inverse(a: Floats) -> Floats:
     """A^-1, where term 0 has an inverse."""
     given = _terms_outside(a)
     (p, q), (r, s) = given[:, :, :1]
@@ -33,19 +32,19 @@ def inverse(a: _Float) -> _Float:
     return _terms_last(series)
 
 
-def _times(a: _Float, b: _Float) -> _Float:
+def _times(a: Floats, b: Floats) -> Floats:
     """Products of matrices, shape (2, 2, ...)."""
     return np.asarray(a[:, :1] * b[:1] + a[:, 1:] * b[1:])
 
 
-def _present(terms: _Float) -> NDArray[np.int_]:
+def _present(terms: Floats) -> Indices:
     return np.flatnonzero(terms.any(axis=(0, 1, 3)))
 
 
-def _terms_outside(series: _Float) -> _Float:
+def _terms_outside(series: Floats) -> Floats:
     """Shape (2, 2, n_terms, n)."""
     return np.ascontiguousarray(series.transpose(1, 2, 3, 0))
 
 
-def _terms_last(terms: _Float) -> _Float:
+def _terms_last(terms: Floats) -> Floats:
     return np.ascontiguousarray(terms.transpose(3, 0, 1, 2))

@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Flags, Floats, Indices
 from dsm.elements.beam_elements import link_elements, place_nodes, stiffness_elements
 from dsm.elements.element_series import combine_rotary_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
@@ -18,7 +18,6 @@ from dsm.spindle.sections import Sections, sections_of_segments
 from dsm.spindle.segment import Material, Segment, nearest_index
 from dsm.spindle.spindle import Spindle, Theory
 
-_Float = NDArray[np.float64]
 SLOW_SPIN_SHARE = 0.25
 """Speeds below this part of the highest w divide the shaft alike: gyroscopic moments are small beside its inertia."""
 HeldDof = tuple[float, int]
@@ -135,13 +134,8 @@ def _part_positions(spindle: Spindle) -> list[float]:
 
 
 def _element_series(
-    theory: Theory,
-    shaft: Sections,
-    position: _Float,
-    segment: NDArray[np.int_],
-    short: NDArray[np.bool_],
-    apart: bool,
-) -> _Float:
+    theory: Theory, shaft: Sections, position: Floats, segment: Indices, short: Flags, apart: bool
+) -> Floats:
     """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
     blocks = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
@@ -152,8 +146,8 @@ def _element_series(
 
 
 def _insert_joints(
-    joints: Sequence[Joint], position: _Float, series: _Float, short: NDArray[np.bool_]
-) -> tuple[_Float, _Float, NDArray[np.bool_]]:
+    joints: Sequence[Joint], position: Floats, series: Floats, short: Flags
+) -> tuple[Floats, Floats, Flags]:
     """Nodes and elements with a link of no length at each joint."""
     for joint in joints:
         node = nearest_index(position, joint.position)
@@ -167,11 +161,7 @@ def _insert_joints(
 
 
 def _join_elements(
-    position: _Float,
-    series: _Float,
-    short: NDArray[np.bool_],
-    top_frequency: float,
-    least: tuple[float, float],
+    position: Floats, series: Floats, short: Flags, top_frequency: float, least: tuple[float, float]
 ) -> DynamicStiffness:
     """Elements put together, with a node of force and moment inside each link; its scale is that of `least` only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
@@ -198,7 +188,7 @@ def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
     return rigidity / length**3, rigidity / length
 
 
-def _dof_scale(model: DynamicStiffness) -> _Float:
+def _dof_scale(model: DynamicStiffness) -> Floats:
     """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
     sizes = np.maximum(model.diagonal[::2, :, 0], model.scale[:2, np.newaxis] ** -2)
     link = np.flatnonzero(model.is_link)

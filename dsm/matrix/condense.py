@@ -6,41 +6,39 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Complexes, Flags, Floats
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Damping, damping_of_bearings, supports
 from dsm.spindle.spindle import Spindle
-
-_Complex = NDArray[np.complex128]
 
 
 class CondensedStiffness(NamedTuple):
     """What a whole shaft opposes to deflection u and slope t of one node; (n,) each, n frequencies."""
 
-    uu: _Complex
+    uu: Complexes
     """Force over deflection (N/m)."""
-    ut: _Complex
+    ut: Complexes
     """Force over slope (N), and moment over deflection."""
-    tt: _Complex
+    tt: Complexes
     """Moment over slope (N m)."""
-    share_u: _Complex
+    share_u: Complexes
     """Deflection of the node `start` over u (-)."""
-    share_t: _Complex
+    share_t: Complexes
     """Deflection of the node `start` over t (m)."""
 
 
 class _Elimination(NamedTuple):
     """What the nodes before one do to it: stiffness to be added, and how the node before it follows its motion."""
 
-    lost: tuple[_Complex, _Complex, _Complex]
+    lost: tuple[Complexes, Complexes, Complexes]
     """uu, ut, tt to be taken from the stiffness of the node."""
-    follow: tuple[_Complex, _Complex, _Complex, _Complex]
+    follow: tuple[Complexes, Complexes, Complexes, Complexes]
     """Motion of the node before over that of this one, with changed sign: u/u, u/t, t/u, t/t."""
 
 
 def condense_to_node(
-    diagonal: _Complex, coupling: _Complex, is_link: NDArray[np.bool_], node: int, start: int | None = None
+    diagonal: Complexes, coupling: Complexes, is_link: Flags, node: int, start: int | None = None
 ) -> CondensedStiffness:
     """Eliminate all nodes but one, from both ends, all frequencies at once.
 
@@ -61,8 +59,8 @@ def condense_to_node(
 
 
 def _eliminate(
-    diagonal: _Complex, coupling: _Complex, is_link: NDArray[np.bool_], start: int
-) -> tuple[tuple[_Complex, _Complex, _Complex], _Complex, _Complex]:
+    diagonal: Complexes, coupling: Complexes, is_link: Flags, start: int
+) -> tuple[tuple[Complexes, Complexes, Complexes], Complexes, Complexes]:
     """What the last of the nodes takes from the stiffness of the next; with it, the deflection of node `start`."""
     nothing = np.zeros(1, dtype=np.complex128)
     lost = nothing, nothing, nothing
@@ -79,7 +77,7 @@ def _eliminate(
     return lost, share_u, share_t
 
 
-def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Elimination:
+def _across_element(pivot: tuple[Complexes, ...], coupling: Complexes) -> _Elimination:
     a, b, d = pivot
     c_uu, c_ut, c_tu, c_tt = coupling
     determinant = a * d - b * b
@@ -89,7 +87,7 @@ def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Elimina
     return _Elimination(lost, (u_u, u_t, t_u, t_t))
 
 
-def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, far: _Complex) -> _Elimination:
+def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes, far: Complexes) -> _Elimination:
     """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a tip that nothing holds."""
     shape = near[0].shape
     a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
@@ -110,8 +108,8 @@ def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, f
 
 
 def damped_blocks(
-    model: DynamicStiffness, spindle: Spindle, w: _Complex, damping: Damping, derivative: bool = False
-) -> tuple[_Complex, _Complex]:
+    model: DynamicStiffness, spindle: Spindle, w: Complexes, damping: Damping, derivative: bool = False
+) -> tuple[Complexes, Complexes]:
     """Blocks of K(w) as in DynamicStiffness.blocks, for a shaft that does not spin, at w (rad/s), shape (n,), complex.
 
     Shaft, bearings, housing and joints have the complex stiffness k (1 + i eta). Beside it each bearing has its viscous
@@ -141,11 +139,11 @@ CONDENSATION_CHUNK = 1024
 def condense_damped(
     model: DynamicStiffness,
     spindle: Spindle,
-    frequency: NDArray[np.float64],
+    frequency: Floats,
     loss_factor: float,
     node: int,
     start: int | None = None,
-    extra: NDArray[np.complex128] | None = None,
+    extra: Complexes | None = None,
 ) -> CondensedStiffness:
     """All of a shaft that does not spin condensed to one node, dynamically, exact at each frequency (Hz), shape (n,).
 

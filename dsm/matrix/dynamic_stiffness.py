@@ -11,10 +11,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from dsm.arrays import Flags, Floats, Indices
 from dsm.spindle.segment import nearest_index, nearest_indices
 
 
-def check_frequencies(frequency: ArrayLike) -> NDArray[np.float64]:
+def check_frequencies(frequency: ArrayLike) -> Floats:
     """The frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
     f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
     if f.ndim != 1:
@@ -25,13 +26,10 @@ def check_frequencies(frequency: ArrayLike) -> NDArray[np.float64]:
     return f
 
 
-_Float = NDArray[np.float64]
-
-
 class SymmetricFactor(NamedTuple):
     """L D L^T by the pivoting of Bunch and Kaufman, as LAPACK keeps it."""
 
-    values: _Float
+    values: Floats
     """L, and D of 1 x 1 and 2 x 2 blocks."""
     pivots: NDArray[np.int32]
     """Rows exchanged; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
@@ -43,12 +41,12 @@ class SymmetricFactor(NamedTuple):
         pairs = (self.pivots.size - np.count_nonzero(single)) // 2
         return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs)
 
-    def solve(self, right: _Float) -> _Float:
+    def solve(self, right: Floats) -> Floats:
         """Solutions of matrix times y = right, shape (n, m)."""
         return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
 
 
-def symmetric_factor(matrix: _Float) -> SymmetricFactor:
+def symmetric_factor(matrix: Floats) -> SymmetricFactor:
     """The factor of a matrix (n, n) in Fortran's order, its lower half alone looked at; the matrix is overwritten."""
     values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
     return SymmetricFactor(values, pivots)
@@ -79,15 +77,15 @@ class DynamicStiffness:
     Wittrick and Williams).
     """
 
-    position: NDArray[np.float64]
+    position: Floats
     """Nodes from the tool tip on (m), shape (n_nodes,); inf for those of force and moment."""
-    diagonal: NDArray[np.float64]
+    diagonal: Floats
     """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of the eigenvalue, (3, n_nodes, n_terms)."""
-    coupling: NDArray[np.float64]
+    coupling: Floats
     """The same of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, shape (4, n_nodes - 1, n_terms)."""
-    held: NDArray[np.bool_]
+    held: Flags
     """Dofs that cannot move, shape (n_nodes, 2)."""
-    scale: NDArray[np.float64]
+    scale: Floats
     """Factors on rows and columns of a full matrix that make them of one size, shape (2 n_nodes,)."""
     top_frequency: float
     """Highest frequency of interest (Hz)."""
@@ -95,7 +93,7 @@ class DynamicStiffness:
     """Speed of rotation (rad/s); forward whirl turns with it. None: the polynomial is one in w^2."""
 
     @property
-    def is_link(self) -> NDArray[np.bool_]:
+    def is_link(self) -> Flags:
         """Which nodes are those of force and moment, shape (n_nodes,)."""
         return np.isinf(self.position)
 
@@ -104,12 +102,12 @@ class DynamicStiffness:
         """Negative pivots that belong to links: two each, but for forces that are held at zero."""
         return int(np.count_nonzero(~self.held[self.is_link]))
 
-    def to_eigenvalue(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_eigenvalue(self, frequency: Floats) -> Floats:
         """The variable of the polynomial at frequencies (Hz), any shape."""
         w = 2 * np.pi * frequency
         return np.asarray(w if self.spin is not None else w * w)
 
-    def to_frequency(self, eigenvalue: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_frequency(self, eigenvalue: Floats) -> Floats:
         """Frequencies (Hz) at values of the variable, any shape."""
         return np.asarray((eigenvalue if self.spin is not None else np.sqrt(eigenvalue)) / (2 * np.pi))
 
@@ -117,7 +115,7 @@ class DynamicStiffness:
         """Index of the node nearest to a position (m)."""
         return nearest_index(self.position, position)
 
-    def dofs(self, parts: Sequence[_PositionedPart]) -> NDArray[np.int_]:
+    def dofs(self, parts: Sequence[_PositionedPart]) -> Indices:
         """Indices of the deflections of the nodes of parts in a full matrix, shape (n,)."""
         if not parts:
             return np.zeros(0, dtype=int)
@@ -135,14 +133,14 @@ class DynamicStiffness:
         """K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
         return full_matrices(*self.blocks(eigenvalue, derivative))
 
-    def scaled(self, eigenvalue: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def scaled(self, eigenvalue: Floats) -> list[Floats]:
         """K at each eigenvalue, rows and columns times `scale`, in Fortran's order; the lower half, 0 above it."""
         place, coefficients = self._lower
         matrices = np.zeros((eigenvalue.size, self.scale.size**2))
         matrices[:, place] = (coefficients @ self._powers(eigenvalue)).T
         return [matrix.reshape(self.scale.size, -1).T for matrix in matrices]
 
-    def slope_of(self, eigenvalue: NDArray[np.float64], shape: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope_of(self, eigenvalue: Floats, shape: Floats) -> Floats:
         """phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
         place, coefficients = self._lower
         column, row = np.divmod(place, self.scale.size)
@@ -150,7 +148,7 @@ class DynamicStiffness:
         return np.asarray((twice @ coefficients) @ self._powers(eigenvalue, derivative=True))
 
     @cached_property
-    def _lower(self) -> tuple[NDArray[np.int_], NDArray[np.float64]]:
+    def _lower(self) -> tuple[Indices, Floats]:
         """Places in the flattened matrix, columns one after the other, and scaled coefficients of its lower half."""
         rows, columns = _lower_half(self.position.size)
         terms = self.diagonal.shape[2]
@@ -185,7 +183,7 @@ class DynamicStiffness:
             rounding = np.diag(np.finfo(np.float64).eps / self.scale**2)
             return self.solve(np.asarray(matrices + rounding, dtype=matrices.dtype), right)
 
-    def term(self, power: int) -> NDArray[np.float64]:
+    def term(self, power: int) -> Floats:
         """Coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
         return np.asarray(
             full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
@@ -202,7 +200,7 @@ def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArr
 
 
 @lru_cache(maxsize=32)
-def _lower_half(n_nodes: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+def _lower_half(n_nodes: int) -> tuple[Indices, Indices]:
     """Rows and columns of the blocks on and below the diagonal, in the order of diagonal and coupling."""
     u = 2 * np.arange(n_nodes)
     left, right = u[:-1], u[1:]
@@ -213,7 +211,7 @@ def _lower_half(n_nodes: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
 
 
 @lru_cache(maxsize=32)
-def _block_indices(n_nodes: int) -> NDArray[np.int_]:
+def _block_indices(n_nodes: int) -> Indices:
     """Where the blocks stand in a flattened matrix: diagonal ones, those above and those below them."""
     u = 2 * np.arange(n_nodes)
     left, right = u[:-1], u[1:]
@@ -222,7 +220,7 @@ def _block_indices(n_nodes: int) -> NDArray[np.int_]:
     return np.concatenate([2 * n_nodes * row + column for row, column in pairs])
 
 
-def count_modes_below(model: DynamicStiffness, eigenvalue: NDArray[np.float64]) -> NDArray[np.int_]:
+def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
     """Number of natural frequencies below w, shape (n,), for w^2 (w where it spins): the negative pivots of K(w).
 
     None is missed and double ones count twice. Source: W. H. Wittrick and F. W. Williams, A general algorithm for

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Complexes, Floats
 from dsm.matrix.assemble import assemble
 from dsm.matrix.condense import damped_blocks
 from dsm.matrix.dynamic_stiffness import DynamicStiffness, full_matrices
@@ -15,9 +15,6 @@ from dsm.modes.eigensolvers import newton_step
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.attachments import Damping, damping_of_bearings, supports
 from dsm.spindle.spindle import Spindle, require_support
-
-_Float = NDArray[np.float64]
-_Complex = NDArray[np.complex128]
 
 INVERSE_ITERATION_OFFSET = 1e-10
 """Relative distance from the frequency at which K is inverted: it is singular at the frequency itself."""
@@ -38,7 +35,7 @@ class DampedMode(NamedTuple):
 
     w: complex
     """Complex angular frequency (rad/s), in the first quadrant."""
-    shape: _Complex
+    shape: Complexes
     """phi, shape (n_dofs,), scaled to phi^T (dK/dw) phi = 1."""
 
     @property
@@ -55,7 +52,7 @@ class DampedShaft:
     """Shaft, springs and masses; its dampers are not looked at."""
     model: DynamicStiffness
     """The matrix without damping."""
-    undamped: _Float
+    undamped: Floats
     """Frequencies of its modes (Hz), shape (n_modes,)."""
 
     @classmethod
@@ -81,14 +78,16 @@ class DampedShaft:
             _, shape = self._step(w, stiffness, by_w, shape)
         return DampedMode(complex(w), shape)
 
-    def _step(self, trial: complex, stiffness: _Complex, by_w: _Complex, shape: _Complex) -> tuple[complex, _Complex]:
+    def _step(
+        self, trial: complex, stiffness: Complexes, by_w: Complexes, shape: Complexes
+    ) -> tuple[complex, Complexes]:
         at = np.array([trial], dtype=np.complex128)
         w, moved, energy = newton_step(
             at, stiffness[np.newaxis], by_w[np.newaxis], shape[np.newaxis], self.model.solve_singular
         )
         return complex(w[0]), moved[0] / np.sqrt(energy[0])
 
-    def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:
+    def matrices(self, damping: Damping, w: complex) -> tuple[Complexes, Complexes]:
         """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
         at = np.array([w], dtype=np.complex128)
         stiffness, by_w = (
@@ -97,7 +96,7 @@ class DampedShaft:
         )
         return stiffness, by_w
 
-    def damper_sensitivity(self, damping: Damping, mode: DampedMode) -> _Complex:
+    def damper_sensitivity(self, damping: Damping, mode: DampedMode) -> Complexes:
         """dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
         bearings = self.spindle.bearings
         movable = [index for index, bearing in enumerate(bearings) if np.isfinite(bearing.stiffness)]
@@ -155,9 +154,9 @@ class DampedShaft:
 class DampedModes:
     """Modes that die away as exp(s t), each in the place of the undamped mode from which it comes."""
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """|s|/2 pi (Hz), shape (n_modes,); where damping is uneven they need not rise."""
-    damping_ratio: NDArray[np.float64]
+    damping_ratio: Floats
     """zeta = -Re s/|s| (-), shape (n_modes,)."""
 
 

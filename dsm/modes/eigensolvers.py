@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from dsm.arrays import Floats
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 
 Number = TypeVar("Number", np.float64, np.complex128)
@@ -37,13 +38,11 @@ def quadratic_form(matrix: NDArray[Number], shape: NDArray[Number]) -> NDArray[N
     return np.asarray(np.sum(shape * (matrix @ shape[..., np.newaxis])[..., 0], axis=1))
 
 
-_Float = NDArray[np.float64]
-
 LINK_SUPPORT_RATIO = 1e6
 """A dof held beside a link: stiffness of the spring that stands for it here, over the largest of the shaft."""
 
 
-def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
+def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, Floats]:
     """w^2 (count,) of the lowest modes at rest and their shapes phi (count, 2 n_nodes), phi^T M phi = 1: upper bounds.
 
     Solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no exception. Raises ArithmeticError
@@ -61,7 +60,7 @@ def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _
     return np.maximum(1 / inverse[::-1] - shift, 0.0), shape
 
 
-def whirling_modes(model: DynamicStiffness, w2: _Float, shape: _Float, count: int) -> tuple[_Float, _Float]:
+def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: int) -> tuple[Floats, Floats]:
     """w (count,) of the lowest modes of forward whirl of a shaft that spins and shapes phi, -phi^T K' phi = 1: a start.
 
     Made of the modes at rest above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
@@ -82,7 +81,7 @@ def whirling_modes(model: DynamicStiffness, w2: _Float, shape: _Float, count: in
     return w, shapes / np.sqrt(size)[:, np.newaxis]
 
 
-def _independent_motions(model: DynamicStiffness) -> tuple[_Float, _Float]:
+def _independent_motions(model: DynamicStiffness) -> tuple[Floats, Floats]:
     """Motions (2 n_nodes, n) that are independent, and the stiffness to add for them, diagonal: (n, n).
 
     Beyond a link it is the motion against the rigid lever that the link is but for its flexibility: the stiffness of
@@ -111,7 +110,7 @@ def _independent_motions(model: DynamicStiffness) -> tuple[_Float, _Float]:
     return basis[:, free], springs[np.ix_(free, free)]
 
 
-def _reduced_term(model: DynamicStiffness, basis: _Float, power: int) -> _Float:
+def _reduced_term(model: DynamicStiffness, basis: Floats, power: int) -> Floats:
     """A term of K for the independent motions; forces of links do no work here."""
     moving = np.repeat(~model.is_link, 2)
     return np.asarray(basis[moving].T @ model.term(power)[np.ix_(moving, moving)] @ basis[moving])

@@ -7,29 +7,27 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats
 from dsm.elements import GAUSS_POINTS
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes, evaluate_between_nodes
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle, require_support
 
-_Float = NDArray[np.float64]
-
 
 class SpringEnergy(NamedTuple):
     """Twice the strain energy of each spring in each mode; of a mode of unit modal mass all parts together have w^2."""
 
-    radial: _Float
+    radial: Floats
     """Radial springs of the bearings, shape (n_modes, n_bearings); 0 where rigid."""
-    tilting: _Float
+    tilting: Floats
     """Their stiffness against tilting, shape (n_modes, n_bearings)."""
-    housings: _Float
+    housings: Floats
     """Housings behind them, shape (n_modes, n_bearings); 0 where rigid."""
-    shifts: _Float
+    shifts: Floats
     """Radial springs of the joints, shape (n_modes, n_joints)."""
-    kinks: _Float
+    kinks: Floats
     """Their stiffness against tilting, shape (n_modes, n_joints)."""
 
 
@@ -47,7 +45,7 @@ def spring_energy(modes: Modes) -> SpringEnergy:
     return SpringEnergy(radial, tilting, housings, *_joint_energy(modes))
 
 
-def _joint_energy(modes: Modes) -> tuple[_Float, _Float]:
+def _joint_energy(modes: Modes) -> tuple[Floats, Floats]:
     """A joint stands between two nodes at one place."""
     shifts, kinks = np.zeros((2, modes.frequency.size, len(modes.spindle.joints)))
     for index, joint in enumerate(modes.spindle.joints):
@@ -66,15 +64,15 @@ class EnergyShares:
     percent.
     """
 
-    frequency: _Float
+    frequency: Floats
     """Natural frequencies (Hz), shape (n_modes,)."""
-    segments: _Float
+    segments: Floats
     """Bending (and shear) of the segments, shape (n_modes, n_segments)."""
-    bearings: _Float
+    bearings: Floats
     """Bearings, radial spring and stiffness against tilting together, shape (n_modes, n_bearings); 0 where rigid."""
-    housings: _Float
+    housings: Floats
     """Housing behind each bearing, in series with its radial spring, shape (n_modes, n_bearings); 0 where rigid."""
-    joints: _Float
+    joints: Floats
     """Joints, both their springs together, shape (n_modes, n_joints)."""
 
 
@@ -101,7 +99,7 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     return EnergyShares(modes.frequency, *(energy / w2[:, np.newaxis] for energy in parts))
 
 
-def _segment_energy(spindle: Spindle, modes: Modes) -> _Float:
+def _segment_energy(spindle: Spindle, modes: Modes) -> Floats:
     """Twice the integral of M^2/EI + Q^2/(kappa G A) along each segment, by Gauss points in each element."""
     shaft = sections(spindle)
     element = np.flatnonzero(np.diff(modes.position) > 0)

@@ -8,16 +8,14 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Flags, Floats, Indices
 from dsm.matrix.assemble import HeldDof, assemble, shared_spin_limit
 from dsm.matrix.dynamic_stiffness import DynamicStiffness, count_modes_below
 from dsm.modes.eigensolvers import finite_element_modes, newton_step, quadratic_form, whirling_modes
 from dsm.modes.modes import Modes
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
-
-_Float = NDArray[np.float64]
 
 MODE_INTERVAL_WIDTH = 2e-10
 """Relative half-width, in w^2 (w where it spins), of the interval in which each mode is proved to lie."""
@@ -44,11 +42,7 @@ ROUNDING_MESSAGE = (
 
 
 def find_modes(
-    spindle: Spindle,
-    count: int,
-    places: Sequence[float] = (),
-    held: Sequence[HeldDof] = (),
-    spin: float | None = None,
+    spindle: Spindle, count: int, places: Sequence[float] = (), held: Sequence[HeldDof] = (), spin: float | None = None
 ) -> Modes:
     """The `count` lowest modes, with nodes also at `order_taps` (m) and the dofs `held` fixed (see assemble).
 
@@ -104,7 +98,7 @@ def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
     )
 
 
-def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, _Float, _Float]:
+def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, Floats, Floats]:
     """A matrix exact up to the last mode, and the modes of its finite elements."""
     spindle, count, places, held, spin = wanted
     top = _first_guess(spindle, np.pi * (count + 2))
@@ -120,7 +114,7 @@ def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, 
 
 def _finite_element_start(
     model: DynamicStiffness, wanted: _ModeRequest, top: float, links: bool
-) -> tuple[_Float, _Float]:
+) -> tuple[Floats, Floats]:
     spindle, count, places, held, spin = wanted
     if spin is None:
         return finite_element_modes(model, count)
@@ -139,7 +133,7 @@ def _modes_at_rest(
     held: tuple[HeldDof, ...],
     spin: float,
     links: bool,
-) -> tuple[_Float, _Float]:
+) -> tuple[Floats, Floats]:
     """What starts the search at all speeds that share nodes with `spin`."""
     model = assemble(spindle, top, places, held, spin=spin, links=links)
     return finite_element_modes(model, min(count, int(np.count_nonzero(~model.held[~model.is_link]))))
@@ -159,7 +153,7 @@ def _first_guess(spindle: Spindle, phase: float) -> float:
     return 1 / (2 * np.pi * float(np.sqrt(bending**4 + shear**2 + rotary**2)))
 
 
-def _refine_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _refine_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
     """Inverse iteration with a Newton step each, all modes at once; sorted."""
     for _ in range(8):
         previous = eigenvalue
@@ -170,7 +164,7 @@ def _refine_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, wi
     return eigenvalue[order], shape[order]
 
 
-def _iterate_once(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _iterate_once(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
     """One step from beside each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
     trial = eigenvalue + width
     stiffness, slope = model.dense(trial), model.dense(trial, derivative=True)
@@ -178,7 +172,7 @@ def _iterate_once(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, wi
     return improved, moved / np.sqrt(-energy)[:, np.newaxis]
 
 
-def _require_small_rounding(wanted: _ModeRequest, eigenvalue: _Float, width: _Float, widest: float) -> None:
+def _require_small_rounding(wanted: _ModeRequest, eigenvalue: Floats, width: Floats, widest: float) -> None:
     """Raise _SpoiltError where rounding leaves modes in doubt, or takes them for motions without bending."""
     moving = eigenvalue > width
     still = int(np.sum(~moving))
@@ -198,7 +192,7 @@ def _count_rigid_motions(spindle: Spindle, held: Sequence[HeldDof], width: float
     return 2 - int(np.linalg.matrix_rank(hindered) if hindered else 0)
 
 
-def _verify_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _verify_modes(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, width: Floats) -> tuple[Floats, Floats]:
     """The same modes where each is the one it should be; the others found anew by counting."""
     eigenvalue = np.where(eigenvalue > width, eigenvalue, 0.0)
     missed = ~_are_certified(model, eigenvalue, width)
@@ -210,14 +204,14 @@ def _verify_modes(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, wi
     return eigenvalue, shape
 
 
-def _are_certified(model: DynamicStiffness, eigenvalue: _Float, width: _Float) -> NDArray[np.bool_]:
+def _are_certified(model: DynamicStiffness, eigenvalue: Floats, width: Floats) -> Flags:
     """For mode n: whether fewer than n modes lie below eigenvalue - width, and n or more below eigenvalue + width."""
     below, up_to = count_modes_below(model, np.concatenate([eigenvalue - width, eigenvalue + width])).reshape(2, -1)
     order = np.arange(1, eigenvalue.size + 1)
     return np.asarray((below < order) & (order <= up_to))
 
 
-def _bisect_modes(model: DynamicStiffness, order: NDArray[np.int_], width: _Float) -> _Float:
+def _bisect_modes(model: DynamicStiffness, order: Indices, width: Floats) -> Floats:
     """eigenvalue of the modes with these numbers (1 is the first), each within its width, by counting alone."""
     low = -width
     high = np.full(order.size, float(model.to_eigenvalue(np.array(model.top_frequency))))

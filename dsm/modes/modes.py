@@ -6,37 +6,35 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Floats, Indices
 from dsm.elements import count_series_terms, transfer_series
 from dsm.spindle.sections import Sections, sections
 from dsm.spindle.segment import SAME_PLACE, nearest_index
 from dsm.spindle.spindle import Spindle, Theory
 
-_Float = NDArray[np.float64]
-
 
 class StateVectors(NamedTuple):
     """Motion and internal forces of modes at places, shape (n_modes, n_places) each."""
 
-    deflection: _Float
+    deflection: Floats
     """u, of the modes' own scale."""
-    slope: _Float
+    slope: Floats
     """t, rotation of the cross-section."""
-    force: _Float
+    force: Floats
     """Shear force Q."""
-    moment: _Float
+    moment: Floats
     """Bending moment M."""
 
 
 def evaluate_between_nodes(
     shaft: Sections,
     theory: Theory,
-    frequency: _Float,
-    position: _Float,
-    shape: tuple[_Float, _Float],
-    places: _Float,
-    left: NDArray[np.int_],
+    frequency: Floats,
+    position: Floats,
+    shape: tuple[Floats, Floats],
+    places: Floats,
+    left: Indices,
 ) -> StateVectors:
     """The modes of a shaft at rest inside its elements, exact.
 
@@ -66,13 +64,13 @@ class Modes:
     [50.2, 401.7]
     """
 
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Natural frequencies (Hz), shape (n_modes,)."""
-    position: NDArray[np.float64]
+    position: Floats
     """Places along the shaft from the tool tip (m), shape (n_nodes,)."""
-    deflection: NDArray[np.float64]
+    deflection: Floats
     """Deflection (kg^-1/2), shape (n_modes, n_nodes)."""
-    slope: NDArray[np.float64]
+    slope: Floats
     """Slope of the deflection (kg^-1/2 m^-1), shape (n_modes, n_nodes)."""
     spindle: Spindle
     """The shaft they belong to."""
@@ -83,7 +81,7 @@ class Modes:
         """Index of the place of these modes nearest to a position (m); at a joint that of the side of the tool tip."""
         return nearest_index(self.position, position)
 
-    def at(self, places: NDArray[np.float64]) -> Modes:
+    def at(self, places: Floats) -> Modes:
         """The same modes at other places on the shaft (m, shape (n,)), exact; a place next to a node has its values.
 
         Raises ValueError for a shaft that spins: its modes have no modal mass of 1 kg.
@@ -112,11 +110,11 @@ class Modes:
             deflection[:, inside], slope[:, inside] = state.deflection, state.slope
         return replace(self, position=places, deflection=deflection, slope=slope)
 
-    def deflection_at(self, position: float) -> NDArray[np.float64]:
+    def deflection_at(self, position: float) -> Floats:
         """Deflection at a place on the shaft (m), shape (n_modes,), exact; see at."""
         return self.at(np.array([position])).deflection[:, 0]
 
-    def stiffness_at(self, position: float) -> NDArray[np.float64]:
+    def stiffness_at(self, position: float) -> Floats:
         """Modal stiffness w^2/deflection^2 there (N/m), shape (n_modes,); inf where the mode is at rest.
 
         The driving-point receptance is the sum over modes of 1/K/(1 - (f/f_n)^2).

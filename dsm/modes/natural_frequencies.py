@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes
 from dsm.spindle.segment import SAME_PLACE
 from dsm.spindle.spindle import Spindle
 
 
-def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = False) -> NDArray[np.float64]:
+def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = False) -> Floats:
     """The `count` lowest bending frequencies (Hz), shape (count,), rising, none missed; 0 for motions without bending.
 
     rigid_bearings: the exact limit of infinitely stiff bearings, which hold the deflection and leave the slope free.
@@ -31,7 +32,7 @@ def natural_frequencies(spindle: Spindle, count: int, rigid_bearings: bool = Fal
     return find_modes(spindle, count, held=held).frequency
 
 
-def modes_at(spindle: Spindle, count: int, position: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def modes_at(spindle: Spindle, count: int, position: float = 0.0) -> tuple[Floats, Floats]:
     """Natural frequencies (Hz) and modal stiffness at one place (N/m) of the lowest modes, shape (count,) each.
 
     position: distance from the tool tip (m). The receptance there is the sum over all modes of 1/K/(1 - (f/f_n)^2).
@@ -83,7 +84,7 @@ def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -
     return modes if places is None else modes.at(_check_places(spindle, places))
 
 
-def _check_places(spindle: Spindle, places: ArrayLike) -> NDArray[np.float64]:
+def _check_places(spindle: Spindle, places: ArrayLike) -> Floats:
     position = np.asarray(places, dtype=np.float64)
     if position.ndim != 1:
         raise ValueError(f"places has shape {position.shape}; a 1-D array (m) is needed")

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -55,29 +56,26 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     return float(scipy.optimize.brentq(lead, low, high, xtol=1e-12 * at_rest, rtol=1e-13)) * 30 / math.pi
 
 
-_Float = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class WhirlMap:
     """Whirl frequencies of a spindle over speed, in the frame that stands still and in the one that turns with it."""
 
-    speed_rpm: _Float
+    speed_rpm: Floats
     """Speeds (rpm), shape (m,)."""
-    forward: _Float
+    forward: Floats
     """Forward whirl seen from the housing (Hz), lowest first, shape (count, m)."""
-    backward: _Float
+    backward: Floats
     """Backward whirl seen from the housing (Hz), lowest first, shape (count, m)."""
-    critical_rpm: _Float
+    critical_rpm: Floats
     """Speeds at which one of these forward whirls runs as fast as the shaft (rpm), rising, within `speed_rpm`."""
 
     @property
-    def rotating_forward(self) -> _Float:
+    def rotating_forward(self) -> Floats:
         """Forward whirl seen from the shaft (Hz): |forward - speed|, 0 at a critical speed; shape (count, m)."""
         return np.abs(self.forward - self.speed_rpm / 60)
 
     @property
-    def rotating_backward(self) -> _Float:
+    def rotating_backward(self) -> Floats:
         """Backward whirl seen from the shaft (Hz): backward + speed; shape (count, m)."""
         return self.backward + self.speed_rpm / 60
 
@@ -109,7 +107,7 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     return WhirlMap(speed, forward, backward, _critical_speeds(spindle, speed, forward))
 
 
-def _check_speeds(speed_rpm: ArrayLike) -> _Float:
+def _check_speeds(speed_rpm: ArrayLike) -> Floats:
     speed = np.asarray(speed_rpm, dtype=np.float64)
     if speed.ndim != 1 or speed.size == 0:
         raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
@@ -119,7 +117,7 @@ def _check_speeds(speed_rpm: ArrayLike) -> _Float:
     return speed
 
 
-def _critical_speeds(spindle: Spindle, speed: _Float, forward: _Float) -> _Float:
+def _critical_speeds(spindle: Spindle, speed: Floats, forward: Floats) -> Floats:
     """Each mode that is ahead of the slowest speed and behind the fastest has its critical speed between them."""
     slowest, fastest = np.argmin(speed), np.argmax(speed)
     ahead = forward[:, slowest] >= speed[slowest] / 60

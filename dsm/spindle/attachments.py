@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Complexes, Floats
 from dsm.spindle.segment import require_not_negative, require_positive
 
-Stiffness = TypeVar("Stiffness", float, NDArray[np.complex128])
+Stiffness = TypeVar("Stiffness", float, Complexes)
 RollingElements = Literal["balls", "rollers"]
 
 
@@ -124,13 +124,10 @@ class Joint:
         require_positive(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
 
 
-_Complex = NDArray[np.complex128]
-
-
 class Damping(NamedTuple):
     """Damping of a spindle, apart from its stiffness."""
 
-    viscous: NDArray[np.float64]
+    viscous: Floats
     """Dampers of the bearings (N s/m), shape (n_bearings,)."""
     loss_factor: float
     """Loss factor eta of shaft, bearings, housing and joints (-): stiffness k becomes k (1 + i eta)."""
@@ -144,27 +141,27 @@ class Damping(NamedTuple):
 class Supports(NamedTuple):
     """Radial springs with dampers, each before the spring of its housing; n frequencies, m bearings."""
 
-    spring: _Complex
+    spring: Complexes
     """Stiffness of the bearings alone, dampers included (N/m), shape (n, m)."""
-    housing_compliance: _Complex
+    housing_compliance: Complexes
     """Compliance of the housings (m/N), shape (m,)."""
 
     @property
-    def motion_share(self) -> _Complex:
+    def motion_share(self) -> Complexes:
         """Part of the motion of the shaft that goes into the bearing and not into its housing (-), shape (n, m)."""
         return np.asarray(bearing_motion_share(self.spring, self.housing_compliance))
 
     @property
-    def stiffness(self) -> _Complex:
+    def stiffness(self) -> Complexes:
         """Stiffness that the shaft feels (N/m), shape (n, m)."""
         return self.spring * self.motion_share
 
     @property
-    def stiffness_slope(self) -> _Complex:
+    def stiffness_slope(self) -> Complexes:
         """Derivative of what the shaft feels by the stiffness of the bearing (-), shape (n, m)."""
         return self.motion_share**2
 
-    def across(self, compliance: _Complex) -> _Complex:
+    def across(self, compliance: Complexes) -> Complexes:
         """Compliance across the springs of the bearings, (n, m, m), from that of the shaft on them (m/N).
 
         A pair of forces across a spring moves the shaft with the share a of it, and the housing by a times its
@@ -176,7 +173,7 @@ class Supports(NamedTuple):
         return matrices
 
 
-def supports(bearings: Sequence[Bearing], w: _Complex, damping: Damping) -> Supports:
+def supports(bearings: Sequence[Bearing], w: Complexes, damping: Damping) -> Supports:
     """The supports of bearings at angular frequencies w (rad/s), shape (n,); `damping` has one damper for each."""
     stiffness = np.array([bearing.stiffness for bearing in bearings])
     softness = np.array([1 / bearing.housing_stiffness for bearing in bearings])

@@ -7,45 +7,42 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dsm.arrays import Flags, Floats, Indices
 from dsm.spindle.segment import Material, Segment, ring_area, ring_second_moment, shear_coefficient
 from dsm.spindle.spindle import Spindle
-
-_Float = NDArray[np.float64]
-_Indices = NDArray[np.int_]
 
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
     """What a beam is made of at some places; all of one shape, worked out when asked for."""
 
-    outer: _Float
+    outer: Floats
     """Outer diameter (m)."""
-    bore: _Float
+    bore: Floats
     """Diameter of the bore (m)."""
-    heavy: _Float
+    heavy: Floats
     """Outer diameter of the mass (m)."""
-    material: _Float
+    material: Floats
     """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, ...)."""
 
     @property
-    def rigidity(self) -> _Float:
+    def rigidity(self) -> Floats:
         """Bending stiffness EI (N m^2)."""
         return np.asarray(self.material[0] * ring_second_moment(self.outer, self.bore))
 
     @property
-    def mass(self) -> _Float:
+    def mass(self) -> Floats:
         """Mass per length (kg/m)."""
         return np.asarray(self.material[1] * ring_area(self.heavy, self.bore))
 
     @property
-    def rotary(self) -> _Float:
+    def rotary(self) -> Floats:
         """Moment of inertia about a diameter per length, rho I (kg m)."""
         return np.asarray(self.material[1] * ring_second_moment(self.heavy, self.bore))
 
     @property
-    def shear(self) -> _Float:
+    def shear(self) -> Floats:
         """Shear stiffness kappa G A (N)."""
         coefficient = shear_coefficient(self.material[3], self.bore / self.outer)
         return np.asarray(coefficient * self.material[2] * ring_area(self.outer, self.bore))
@@ -55,23 +52,23 @@ class CrossSection:
 class Sections:
     """The segments of a shaft as arrays, from the tool tip on."""
 
-    ends: _Float
+    ends: Floats
     """Places where segments begin and end (m), shape (n_segments + 1,)."""
-    diameters: _Float
+    diameters: Floats
     """Outer at both ends, bore at both ends, outer of the mass at both ends (m), shape (6, n_segments)."""
-    material: _Float
+    material: Floats
     """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, n_segments)."""
 
     @cached_property
-    def is_cone(self) -> NDArray[np.bool_]:
+    def is_cone(self) -> Flags:
         """Which segments have a diameter that changes, shape (n_segments,)."""
         return np.asarray((self.diameters[::2] != self.diameters[1::2]).any(axis=0))
 
-    def segment_at(self, position: _Float) -> _Indices:
+    def segment_at(self, position: Floats) -> Indices:
         """Index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
         return np.asarray(np.searchsorted(self.ends[1:-1], position))
 
-    def at(self, segment: _Indices, position: _Float) -> CrossSection:
+    def at(self, segment: Indices, position: Floats) -> CrossSection:
         """The cross-sections of segments at positions (m), in the shape of these."""
         segment = np.broadcast_to(segment, position.shape)
         outer, bore, heavy = self.diameters[::2, segment]

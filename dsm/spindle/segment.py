@@ -9,7 +9,8 @@ from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dsm.arrays import Floats, Indices
 
 
 def require_positive(where: str, name: str, value: float, unit: str, infinite: bool = False) -> None:
@@ -29,17 +30,17 @@ SAME_PLACE = 1e-9
 """Places on the shaft nearer to each other than this part of its length, as by rounding, count as one."""
 
 
-def nearest_index(positions: NDArray[np.float64], place: float) -> int:
+def nearest_index(positions: Floats, place: float) -> int:
     """Index of the position nearest to a place, the first of several."""
     return int(nearest_indices(positions, [place])[0])
 
 
-def nearest_indices(positions: NDArray[np.float64], places: Sequence[float]) -> NDArray[np.int_]:
+def nearest_indices(positions: Floats, places: Sequence[float]) -> Indices:
     """The same for each of several places, shape (n,)."""
     return np.asarray(np.abs(np.array(places)[:, np.newaxis] - positions).argmin(axis=1))
 
 
-FloatOrArray = TypeVar("FloatOrArray", float, NDArray[np.float64])
+FloatOrArray = TypeVar("FloatOrArray", float, Floats)
 
 
 @dataclass(frozen=True)

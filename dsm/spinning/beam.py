@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dsm.arrays import Floats, Indices
 from dsm.elements.element_series import MAX_ELEMENT_X, SERIES_TERMS, element_series
 
 SpinningDof = Literal["u", "v", "u'", "v'"]
@@ -133,9 +134,6 @@ def check_positive(name: str, value: float) -> None:
         raise ValueError(f"{name}={value} is not a finite number > 0")
 
 
-_Float = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class SpinningChain:
     """Stiffness matrix K(w) of uniform elements in a row, on springs, in the frame that turns with them at W (rad/s).
@@ -147,18 +145,18 @@ class SpinningChain:
     and as all its entries are >= 0 nothing cancels. It holds up to x = L (m (w + W)^2 / min EI)^(1/4) = MAX_X.
     """
 
-    length: _Float
+    length: Floats
     """Length of the elements (m), shape (n,)."""
-    rigidity: _Float
+    rigidity: Floats
     """EIyy, which resists u, and EIxx, which resists v, of each element (N m^2), shape (n, 2)."""
-    mass_per_length: _Float
+    mass_per_length: Floats
     """Mass per length (kg/m), shape (n,)."""
-    spring: _Float
+    spring: Floats
     """Stiffness of the springs against each dof (N/m), shape (4 n + 4,)."""
-    free: NDArray[np.int_]
+    free: Indices
     """Indices of the dofs that are not held, shape (n_free,)."""
 
-    def matrices(self, w: _Float, spin: float) -> tuple[_Float, _Float]:
+    def matrices(self, w: Floats, spin: float) -> tuple[Floats, Floats]:
         """K and dK/dw at w and W = spin (rad/s), both >= 0, shape (n_w, n_free, n_free) each."""
         mass = self.mass_per_length[:, np.newaxis, np.newaxis] / self.rigidity[..., np.newaxis]
         constant = np.full_like(w, spin)
@@ -173,7 +171,7 @@ class SpinningChain:
             power, changed = power @ step, changed @ step + power @ slope
         return self._joined(value) + self._springs, self._joined(derivative)
 
-    def count(self, w: _Float, spin: float) -> NDArray[np.int_]:
+    def count(self, w: Floats, spin: float) -> Indices:
         """Number of negative eigenvalues of K at w and W = spin (rad/s), shape (n_w,)."""
         scale = 1 / np.sqrt(np.diagonal(self.hermite()[0]))
         scaled = self.matrices(w, spin)[0] * np.outer(scale, scale)
@@ -183,7 +181,7 @@ class SpinningChain:
         """The same that moves along u (0) or v (1) only."""
         return replace(self, free=self.free[self.free % 2 == axis])
 
-    def hermite(self) -> tuple[_Float, _Float, _Float]:
+    def hermite(self) -> tuple[Floats, Floats, Floats]:
         """Static stiffness S, consistent mass M and coupling C: K is nearly S - (w^2 + W^2) M - 2 w W C."""
         mass = self.mass_per_length[:, np.newaxis, np.newaxis]
         inner = (
@@ -197,22 +195,22 @@ class SpinningChain:
         return stiffness + self._springs, inertia, coupling
 
     @cached_property
-    def _springs(self) -> _Float:
+    def _springs(self) -> Floats:
         return np.diag(self.spring[self.free])
 
     @cached_property
-    def _rigidity_matrix(self) -> _Float:
+    def _rigidity_matrix(self) -> Floats:
         return np.asarray(self.rigidity[:, np.newaxis] * np.eye(2))
 
     @cached_property
-    def _planar(self) -> _Float:
+    def _planar(self) -> Floats:
         """Coefficients of q^n of the planar elements of EI = 1, dofs u, u' at both ends, shape (TERMS, n, 4, 4)."""
         one = np.ones_like(self.length)
         a, b, c, d, e, f = element_series(one, one, self.length)
         rows = np.array([[a, b, d, e], [b, c, -e, f], [d, -e, a, -b], [e, f, -b, c]])
         return np.asarray(rows.transpose(3, 2, 0, 1)).reshape(SERIES_TERMS, -1, 4, 4)
 
-    def _joined(self, elements: _Float) -> _Float:
+    def _joined(self, elements: Floats) -> Floats:
         """The matrix of the chain from those of its elements, shape (n_w, n, 4, 2, 4, 2): planar dof, axis."""
         n_w, n = elements.shape[:2]
         matrix = np.zeros((n_w, 4 * n + 4, 4 * n + 4))
@@ -229,7 +227,7 @@ def spinning_element(
     length: float,
     frequency: ArrayLike,
     speed_rpm: float,
-) -> _Float:
+) -> Floats:
     """Stiffness matrix of a uniform beam spinning about its axis z, in the frame that turns with it, (n, 8, 8).
 
     rigidity_xx: EIxx, against v (N m^2); rigidity_yy: EIyy, against u (N m^2); mass_per_length (kg/m); length (m);
@@ -278,7 +276,7 @@ def angular_speed(speed_rpm: float) -> float:
     return speed_rpm * math.pi / 30
 
 
-def _condense_inner_nodes(matrix: _Float) -> _Float:
+def _condense_inner_nodes(matrix: Floats) -> Floats:
     """Eliminate all nodes but the first and the last."""
     ends = np.r_[0:4, -4:0]
     outer, across, inner = matrix[:, ends[:, np.newaxis], ends], matrix[:, 4:-4, ends], matrix[:, 4:-4, 4:-4]

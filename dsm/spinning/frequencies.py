@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eig, eigh
 
+from dsm.arrays import Floats
 from dsm.elements.element_series import MAX_ELEMENT_X
 from dsm.modes.eigensolvers import newton_step, quadratic_form
 from dsm.spindle.segment import nearest_index
 from dsm.spinning.beam import SpinningBeam, SpinningChain, SpinningDof, angular_speed
-
-_Float = NDArray[np.float64]
 
 SPINNING_INTERVAL_WIDTH = 1e-10
 """Relative half-width, in w, of the interval in which each mode is proved to lie."""
@@ -26,7 +24,7 @@ SAME_BEAM_PLACE = 1e-6
 DOF_OFFSETS: dict[SpinningDof, int] = {"u": 0, "v": 1, "u'": 2, "v'": 3}
 
 
-def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[_Float, int, int]:
+def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats, int, int]:
     """The `count` lowest w (rad/s) that last, seen in the frame turning at `spin` (rad/s), ascending.
 
     With them how many other modes grow instead: surely, and all in all. Where the two numbers are equal, no mode is
@@ -62,7 +60,7 @@ def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[_Float,
     return modes
 
 
-def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) -> tuple[SpinningChain, _Float, _Float]:
+def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) -> tuple[SpinningChain, Floats, Floats]:
     """A matrix exact up to the last mode wanted, and the modes of its Hermite elements."""
     waves = sum(s.length * (s.mass_per_length / max(s.rigidity_xx, s.rigidity_yy)) ** 0.25 for s in beam.segments)
     top = (np.pi * (count / 2 + 1) / waves) ** 2
@@ -97,11 +95,11 @@ def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> Spinning
     return SpinningChain(length, np.repeat(rigidity, parts, axis=0), np.repeat(mass, parts), spring, free)
 
 
-def _dof_index(position: _Float, place: float, dof: SpinningDof) -> int:
+def _dof_index(position: Floats, place: float, dof: SpinningDof) -> int:
     return 4 * nearest_index(position, place) + DOF_OFFSETS[dof]
 
 
-def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[_Float, _Float]:
+def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[Floats, Floats]:
     """w and shapes of (S - (w^2 + W^2) M - 2 w W C) phi = 0: the lowest, and all that may have negative energy.
 
     With y = (phi, w phi / T), T = `top`: [[2 W T C, T^2 M], [T^2 M, 0]] y = (T/w) [[S - W^2 M, 0], [0, T^2 M]] y.
@@ -137,7 +135,7 @@ def _count_planar_below(chain: SpinningChain, spin: float) -> tuple[int, int]:
     return below[0], below[1]
 
 
-def _refine_modes(chain: SpinningChain, w: _Float, shape: _Float, spin: float) -> tuple[_Float, _Float, _Float]:
+def _refine_modes(chain: SpinningChain, w: Floats, shape: Floats, spin: float) -> tuple[Floats, Floats, Floats]:
     """Inverse iteration with a Newton step each, all modes at once: w, sign of the energy, and half-width; sorted."""
     width = SPINNING_INTERVAL_WIDTH * w
     for _ in range(8):
@@ -153,7 +151,7 @@ def _refine_modes(chain: SpinningChain, w: _Float, shape: _Float, spin: float) -
     return w[order], sign[order], width[order]
 
 
-def _has_expected_counts(chain: SpinningChain, w: _Float, sign: _Float, width: _Float, spin: float, at_0: int) -> bool:
+def _has_expected_counts(chain: SpinningChain, w: Floats, sign: Floats, width: Floats, spin: float, at_0: int) -> bool:
     """Whether the count steps by the sign of each mode in its own interval and nowhere else."""
     close = np.abs(np.subtract.outer(w, w)) <= width + width[:, np.newaxis]
     if np.any(close & (np.multiply.outer(sign, sign) < 0)) or np.any(width > MAX_SPINNING_INTERVAL * (w + spin)):
@@ -176,7 +174,7 @@ class UnstableSpinError(ArithmeticError):
     dsm.spinning.frequencies.UnstableSpinError: at speed_rpm=11749.8 1 mode(s) grow instead of lasting ...
     """
 
-    def __init__(self, message: str, frequency: NDArray[np.float64], unstable: int, proved: int) -> None:
+    def __init__(self, message: str, frequency: Floats, unstable: int, proved: int) -> None:
         """Keep what is known beside the message."""
         super().__init__(message)
         self.frequency = frequency
@@ -187,7 +185,7 @@ class UnstableSpinError(ArithmeticError):
         """How many of them are proved to. Each frequency is proved; that none is missed only if all these are."""
 
 
-def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> NDArray[np.float64]:
+def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Floats:
     """The `count` lowest natural frequencies (Hz) seen in the frame that turns with the beam, (count,), ascending.
 
     speed_rpm: speed of spin (rpm), >= 0. Euler-Bernoulli theory: no rotary inertia, no gyroscopic moments. A round
@@ -228,7 +226,7 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> ND
     return frequency
 
 
-def _round_beam_frequencies(beam: SpinningBeam, count: int, spin: float) -> NDArray[np.float64]:
+def _round_beam_frequencies(beam: SpinningBeam, count: int, spin: float) -> Floats:
     """|w_n - W| and w_n + W (rad/s) of so many planar modes that no later one can come lower."""
     n = count
     while True:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, count_pieces
 from lobes.floquet.multipliers import growth_rate, largest_multipliers
 
@@ -25,9 +25,7 @@ CROSSING_ACCURACY = 1e-6
 """Relative accuracy of a crossing."""
 MAX_CROSSING_STEPS = 60
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
-GrowthFunction = Callable[[Rows, Floats, float], Floats]
+GrowthFunction = Callable[[Indices, Floats, float], Floats]
 """From rows (s,), depths (s, d) and an accuracy to a value (s, d) that is negative where the cut is stable."""
 
 
@@ -47,7 +45,7 @@ def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Float
     return _pad_rows(brackets.row, _refine_crossings(growth, brackets), n_rows)
 
 
-def _pad_rows(row: Rows, crossing: Floats, n_rows: int) -> Floats:
+def _pad_rows(row: Indices, crossing: Floats, n_rows: int) -> Floats:
     order = np.lexsort((crossing, row))
     row, crossing = row[order], crossing[order]
     counts = np.bincount(row, minlength=n_rows)
@@ -60,7 +58,7 @@ def _pad_rows(row: Rows, crossing: Floats, n_rows: int) -> Floats:
 class _DepthSteps:
     """Steps between two depths, arrays of one shape (n,)."""
 
-    row: Rows
+    row: Indices
     low: Floats
     high: Floats
     at_low: Floats
@@ -70,15 +68,15 @@ class _DepthSteps:
     after: Floats
     """Steepness of growth in the step after."""
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> _DepthSteps:
+    def __getitem__(self, which: Flags) -> _DepthSteps:
         return _DepthSteps(*(getattr(self, field.name)[which] for field in fields(self)))
 
     @property
-    def crosses(self) -> NDArray[np.bool_]:
+    def crosses(self) -> Flags:
         return np.asarray((self.at_low < 0) != (self.at_high < 0))
 
     @property
-    def may_hide(self) -> NDArray[np.bool_]:
+    def may_hide(self) -> Flags:
         """Whether growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
@@ -153,10 +151,8 @@ LIMIT_TOLERANCE = 0.0025
 MAX_PIECE_DOUBLINGS = 4
 """Of the pieces, at most. A kind that is open then stays so: at crawling speeds multipliers of all angles crowd."""
 
-Numbers = NDArray[np.int64]
 
-
-def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Numbers]:
+def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Integers]:
     """All crossings up to max_depth (m), rising, filled up with inf, shape (r, k), and the pieces (r,) of each row.
 
     Raises ArithmeticError where a limit does not settle.
@@ -180,7 +176,7 @@ def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Nu
     raise ArithmeticError(f"the limit at {speed:g} rpm has not settled; leave this speed out")
 
 
-def _has_converged(rows: MillingRows, depth: Floats, number: Numbers) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _has_converged(rows: MillingRows, depth: Floats, number: Integers) -> tuple[Flags, Flags]:
     """Whether twice as many pieces leave the limit where it is, and its kind, each of shape (r,)."""
     limit, kind = np.ones((2, depth.size), dtype=bool)
     limited = np.flatnonzero(np.isfinite(depth))
@@ -197,10 +193,10 @@ def _pad_columns(table: Floats, width: int) -> Floats:
     return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=np.inf)
 
 
-def is_flip(multiplier: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def is_flip(multiplier: Complexes) -> Flags:
     """Whether each is -1 in its direction: period two."""
     return np.asarray(np.abs(np.abs(np.angle(multiplier)) - np.pi) < REAL_MULTIPLIER_ANGLE)
 
 
-def _growth_function(rows: MillingRows, number: Numbers) -> GrowthFunction:
+def _growth_function(rows: MillingRows, number: Integers) -> GrowthFunction:
     return lambda row, depth, tolerance: growth_rate(rows[row], depth, number[row], tolerance)

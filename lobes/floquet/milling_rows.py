@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobes.arrays import Flags, Floats, Integers
 from lobes.cut import Cut
 from lobes.milling_system import MillingSystem, tip_participation
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +18,9 @@ class MillingRows:
 
     cut: Cut
     """Teeth, immersion, direction of milling and helix of all rows; its coefficients and feed angle do not count."""
-    direction: NDArray[np.int64]
+    direction: Integers
     """Row of `axes` in which each mode was tapped, shape (n,)."""
-    axes: NDArray[np.int64]
+    axes: Integers
     """Directions that give way, 0 for x and 1 for y, shape (p,)."""
     frequency: Floats
     """Natural frequencies (rad/s), shape (r, n)."""
@@ -156,14 +154,14 @@ def segment_ends(cut: Cut, depth: Floats) -> Floats:
     return np.hstack((edge, np.sort(inside, axis=1), edge + turn))
 
 
-def is_out_of_cut(cut: Cut, ends: Floats, depth: Floats) -> NDArray[np.bool_]:
+def is_out_of_cut(cut: Cut, ends: Floats, depth: Floats) -> Flags:
     """Whether no tooth cuts in the segments between these ends (c, k + 1), shape (c, k)."""
     reach = cut.exit_angle - cut.entry_angle + cut.helix_lag * depth[:, np.newaxis, np.newaxis]
     middle = (ends[:, :-1, np.newaxis] + ends[:, 1:, np.newaxis]) / 2
     return np.asarray(np.all(np.mod(middle + cut.lead_angles, 2 * np.pi) > reach, axis=-1))
 
 
-def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER_PIECE) -> NDArray[np.int64]:
+def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER_PIECE) -> Integers:
     """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,).
 
     most: cycles of the fastest mode that counts in one.
@@ -182,7 +180,7 @@ def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER
     return np.asarray(np.ceil(np.maximum(cycles / most, 1.0)), dtype=np.int64)
 
 
-def divide_segments(cut: Cut, number: NDArray[np.int64], ends: Floats) -> NDArray[np.int64]:
+def divide_segments(cut: Cut, number: Integers, ends: Floats) -> Integers:
     """Pieces of each segment (c, k) where the whole pattern is to have these numbers (c,); 0 for an empty one.
 
     None is longer than the shortest delay: what was cut before must be known.

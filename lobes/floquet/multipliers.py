@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, divide_segments, is_out_of_cut, segment_ends
 from lobes.floquet.period_map import PeriodMap, UnevenMap, build_period_map
 from lobes.floquet.piece_response import gauss_nodes
@@ -32,8 +32,6 @@ SQUARINGS_PER_SCALING = 4
 MAX_BATCH_NUMBERS = 800_000
 """Numbers in the matrices of the cases that are solved at once: as much as a processor keeps near."""
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 RitzFunction = Callable[[Floats], tuple[Complexes, Floats]]
 """From Hessenberg matrices (..., k + 1, k) to what is wanted of the largest Ritz value, and its residual over its size:
 that of any that may be larger by as much, since two that are nearly one look smaller until they part. A period that
@@ -41,7 +39,7 @@ grows beyond what a number can hold has the multiplier inf."""
 
 
 def largest_multipliers(
-    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], tolerance: float = MULTIPLIER_TOLERANCE
+    rows: MillingRows, depth: Floats, numbers: Integers, tolerance: float = MULTIPLIER_TOLERANCE
 ) -> Complexes:
     """Multiplier of largest magnitude over one tooth period, of uneven teeth over their pattern, shape (r, d).
 
@@ -54,7 +52,7 @@ def largest_multipliers(
 def spectral_radii(
     rows: MillingRows,
     depth: Floats,
-    numbers: NDArray[np.int64],
+    numbers: Integers,
     tolerance: float = MULTIPLIER_TOLERANCE,
     kind: type[np.floating[Any]] = np.float64,
 ) -> Floats:
@@ -72,7 +70,7 @@ def spectral_radii(
 def _largest_in_batches(
     rows: MillingRows,
     depth: Floats,
-    numbers: NDArray[np.int64],
+    numbers: Integers,
     tolerance: float,
     kind: type[np.floating[Any]],
     ritz: RitzFunction,
@@ -89,9 +87,7 @@ def _largest_in_batches(
     return multipliers
 
 
-def _equal_division_groups(
-    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.int64]]]:
+def _equal_division_groups(rows: MillingRows, depth: Floats, numbers: Integers) -> Iterator[tuple[Indices, Integers]]:
     """Rows that are divided alike, few enough to be solved at once, and the pieces of each segment (k,)."""
     ends = segment_ends(rows.cut, depth[:, 0])
     pieces = divide_segments(rows.cut, numbers, ends)
@@ -153,7 +149,7 @@ class _KrylovSpace:
                 state = state / np.linalg.norm(state, axis=-1, keepdims=True)
         return cls(over_period, state[..., np.newaxis, :], np.zeros((*shape, 1, 0), start.dtype))
 
-    def __getitem__(self, which: tuple[NDArray[np.intp], ...]) -> _KrylovSpace:
+    def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
         """Some of the cases, c of them, as (c, 1)."""
         row, column = which
         return _KrylovSpace(
@@ -220,7 +216,7 @@ def _ritz_radius(matrices: Floats, squarings: int) -> tuple[Complexes, Floats]:
     )
 
 
-def _zero_non_finite(matrices: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _zero_non_finite(matrices: Floats) -> tuple[Floats, Flags]:
     """The matrices with 0 for those that are not finite, and which are."""
     finite = np.all(np.isfinite(matrices), axis=(-1, -2))
     return np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0), finite
@@ -238,9 +234,7 @@ RESIDUAL_PER_ACCURACY = 0.1
 """Residual of a multiplier over the accuracy that is asked for: that of a map that is not normal is off by several."""
 
 
-def growth_rate(
-    rows: MillingRows, depth: NDArray[np.float64], numbers: NDArray[np.int64], tolerance: float = 1e-4
-) -> NDArray[np.float64]:
+def growth_rate(rows: MillingRows, depth: Floats, numbers: Integers, tolerance: float = 1e-4) -> Floats:
     """Logarithm of the largest multiplier's magnitude at depths (r, d) in m, shape (r, d); negative where stable.
 
     numbers (r,): pieces of the tooth period (`count_pieces`); tolerance: accuracy of the result near zero. With 1e-4

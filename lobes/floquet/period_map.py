@@ -30,13 +30,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobes.arrays import Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, is_out_of_cut, segment_ends
 from lobes.floquet.piece_response import PieceResponse, free_response, gauss_nodes, interpolation_weights
 from lobes.tooth_force import feed_rotation, force_shares
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ class RegeneratedSurface:
             left = (met.reshape(-1, pieces * nodes) @ self.weights[0, 0]).reshape(*cases, -1)
         return np.asarray((self.force * left[:, :, np.newaxis]).sum(axis=3))
 
-    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> RegeneratedSurface:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> RegeneratedSurface:
         """For some of the cases, c of them, as rows of one depth each."""
         weights = self.weights[which[0]] if len(self.weights) > 1 else self.weights
         return RegeneratedSurface(self.first, self.last, weights, self.force[which][:, np.newaxis])
@@ -76,7 +74,7 @@ class UnevenPiece:
     """From z and the forces of what was left to z and the displacements, shape (r, d, m, m); without of z alone."""
     surfaces: tuple[RegeneratedSurface, ...] = ()
 
-    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> UnevenPiece:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenPiece:
         """For some of the cases, c of them, as rows of one depth each."""
         row, column = which
         matrix = self.matrix[row, column if self.matrix.shape[1] > 1 else 0][:, np.newaxis]
@@ -108,7 +106,7 @@ class UnevenMap:
         """Numbers in a state."""
         return 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
 
-    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> UnevenMap:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenMap:
         """Some of the cases, c of them, as rows of one depth each."""
         return UnevenMap(tuple(piece[which] for piece in self.pieces), self.modes, self.directions)
 
@@ -159,7 +157,7 @@ def _locate_angles(angle: Floats, starts: Floats, lengths: Floats) -> list[tuple
     ]
 
 
-def _spread_weights(own: Floats, piece: NDArray[np.intp], number: int) -> Floats:
+def _spread_weights(own: Floats, piece: Indices, number: int) -> Floats:
     """Weights (r, m, s) of the nodes of one piece for each of s angles, among those of `number` pieces (r, 1, ., s)."""
     is_own = np.arange(number)[:, np.newaxis, np.newaxis] == piece[:, np.newaxis, np.newaxis]
     return np.where(is_own, own[:, np.newaxis], 0.0).reshape(len(own), 1, -1, piece.shape[1])
@@ -186,7 +184,7 @@ class PeriodMap:
         """Numbers in a state."""
         return 2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces)
 
-    def __getitem__(self, which: tuple[NDArray[np.intp], NDArray[np.intp]]) -> PeriodMap:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> PeriodMap:
         """Some of the cases, c of them, as rows of one depth each."""
         row, column = which
         pieces = ((cuts, matrix[row, column if cuts else 0][:, np.newaxis]) for cuts, matrix in self.pieces)
@@ -207,7 +205,7 @@ class PeriodMap:
 
 
 def build_period_map(
-    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], kind: type[np.floating[Any]] = np.float64
+    rows: MillingRows, depth: Floats, numbers: Integers, kind: type[np.floating[Any]] = np.float64
 ) -> PeriodMap | UnevenMap:
     """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
 

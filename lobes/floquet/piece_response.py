@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
 
+from lobes.arrays import Complexes, Floats
 from lobes.floquet.milling_rows import MillingRows
 
 NODES_PER_PIECE = 8
@@ -20,19 +21,19 @@ NODES_PER_PIECE = 8
 class GaussNodes(NamedTuple):
     """For s nodes in a piece of length 1."""
 
-    node: NDArray[np.float64]
+    node: Floats
     """Places of the nodes, shape (s,)."""
-    weight: NDArray[np.float64]
+    weight: Floats
     """Integral over the whole piece, shape (s,)."""
-    integral: NDArray[np.float64]
+    integral: Floats
     """Integrals from the begin to each node, shape (s, s)."""
-    root: NDArray[np.complex128]
+    root: Complexes
     """Eigenvalues of the integrals, those above the real axis of each pair, shape (s/2,)."""
-    share: NDArray[np.complex128]
+    share: Complexes
     """What each adds: f(integral) is twice the real part of the sum of f(root) times these, shape (s/2, s, s)."""
 
 
-def interpolation_weights(place: NDArray[np.float64]) -> NDArray[np.float64]:
+def interpolation_weights(place: Floats) -> Floats:
     """Weights of the values at the nodes in the polynomial through them at places (...) in 0 to 1, shape (..., s)."""
     node = gauss_nodes().node
     apart = place[..., np.newaxis, np.newaxis] - node
@@ -58,9 +59,6 @@ def gauss_nodes(count: int = NODES_PER_PIECE) -> GaussNodes:
     return GaussNodes((x + 1) / 2, weight / 2, integral, root[root.imag > 0], share[root.imag > 0])
 
 
-Floats = NDArray[np.float64]
-
-
 def invert_matrices(matrices: NDArray[np.floating[Any]]) -> Floats:
     """Inverses of matrices (m, m, ...) whose leading parts are far from singular: no rows are exchanged.
 
@@ -80,9 +78,6 @@ def invert_matrices(matrices: NDArray[np.floating[Any]]) -> Floats:
             left[i] *= pivot
             left -= column[:, np.newaxis] * left[i]
     return left
-
-
-Complexes = NDArray[np.complex128]
 
 
 def free_response(rows: MillingRows, time: Floats) -> Floats:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lobes.arrays import Flags, Integers
 from lobes.cut import CHECKED_DEPTH_SHARES, Cut, DirectionModes, Program
 from lobes.floquet.crossings import converged_crossings
 from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
@@ -110,7 +111,7 @@ def _program_rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) 
     return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
 
 
-def _is_unstable(rows: MillingRows, program: Program, number: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _is_unstable(rows: MillingRows, program: Program, number: Integers) -> Flags:
     """Whether the program is unstable at its depth or a share of it, shape (r,)."""
     depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
     return np.asarray(np.any(growth_rate(rows, depths, number) >= 0, axis=1))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.arrays import Complexes, Floats, Integers
 from lobes.cut import Cut
 from lobes.floquet.crossings import converged_crossings, is_flip
 from lobes.floquet.milling_rows import MillingRows, count_pieces, rows_at_speeds
@@ -23,11 +24,9 @@ BALANCE_HARMONICS = 4
 FORCE_HARMONIC_SAMPLES = 128
 """Intervals of a tooth period from which the harmonics of the cutting force are taken."""
 
-Floats = NDArray[np.float64]
-
 
 def loudest_chatter_frequency(
-    system: MillingSystem, cut: Cut, multiplier: NDArray[np.complex128], depth: Floats, base: Floats
+    system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
 ) -> Floats:
     """The loudest frequency (Hz) at limits with these multipliers (|mu| = 1) and depths (m), each of shape (n,).
 
@@ -53,7 +52,7 @@ def loudest_chatter_frequency(
 
 
 def _nearest_to_mean_force_loop(
-    system: MillingSystem, cut: Cut, multiplier: NDArray[np.complex128], depth: Floats, base: Floats
+    system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
 ) -> Floats:
     """Multiple of base with the least |det(I + b s H0 G(w))|, s the mean of 1 - exp(-i w tau), shape (n,)."""
     part = np.abs(np.angle(multiplier))[:, np.newaxis] / (2 * np.pi)
@@ -73,7 +72,7 @@ def _relative_delays(cut: Cut) -> Floats:
     return np.array(cut.delays) / sum(cut.pitch_pattern)
 
 
-def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> NDArray[np.complex128]:
+def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
     """Harmonics H_(k-l) of the force matrix of the teeth of each delay, shape (delays, number, number, p, p)."""
     samples = FORCE_HARMONIC_SAMPLES * len(cut.pitch_pattern)
     forces = interval_forces(cut, samples)[..., system.axes[:, np.newaxis], system.axes]
@@ -82,7 +81,7 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> NDArray[np
     return np.asarray(harmonics[:, order[:, np.newaxis] - order])
 
 
-def check_depths(depth: ArrayLike) -> NDArray[np.float64]:
+def check_depths(depth: ArrayLike) -> Floats:
     """Axial depths (m) as a 1-D array; ValueError unless there is one at least and all are finite and >= 0."""
     depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
     if depths.ndim != 1 or depths.size == 0:
@@ -100,7 +99,7 @@ def spectral_radius(
     speed_rpm: ArrayLike,
     depth: ArrayLike,
     vectors: ArrayLike | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Largest magnitude of the Floquet multipliers over a tooth period at each speed (rpm) and depth (m); < 1: stable.
 
     x and y are directions of the machine (`Cut.feed_angle` says how the feed lies in them); None stands for one that
@@ -179,7 +178,7 @@ def stability_boundary(
 
 
 def chatter_at_limits(
-    system: MillingSystem, rows: MillingRows, depth: Floats, number: NDArray[np.int64]
+    system: MillingSystem, rows: MillingRows, depth: Floats, number: Integers
 ) -> tuple[Floats, NDArray[np.str_]]:
     """Chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
     multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]

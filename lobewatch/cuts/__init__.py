@@ -1,1 +1,1 @@
-"""What test cuts say: what a recording sounds like, what is learnt of the turning spindle, the next cut."""
+"""Test cuts: chatter detection in recordings, and learning of the rotating spindle."""

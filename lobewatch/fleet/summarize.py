@@ -34,6 +34,7 @@ from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_an
 from lobewatch.machine import BusyError
 from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.machine.journal.entries import FleetScatter
+from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.machine_status import SeriesStatus
@@ -104,7 +105,7 @@ def _make_summary_content(task: _SummaryTask) -> bytes:
 def summarize_with_rows(path: Path, now: datetime) -> tuple[MachineSummary, list[bytes]]:
     """The summary of a machine folder, and each row of its history as history.rows holds it."""
     logbook = Logbook.open(path)
-    summary, hashes = summarize_machine(logbook, now), logbook.machine.program_hashes
+    summary, hashes = summarize_machine(logbook, now), hash_programs(logbook.machine)
     return summary, [encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)]
 
 

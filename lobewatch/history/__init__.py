@@ -1,4 +1,4 @@
-"""The history of a machine: a row for each tap test, its place on the disk, what still holds, damage met once."""
+"""History of a machine: a row for each tap test, its cache on the disk, and its export."""
 
 import lazy_loader
 

@@ -1,8 +1,5 @@
-"""The history of a machine: a row for each tap test, its place on the disk, what still holds, damage met once."""
+"""History of a machine: a row for each tap test, its cache on the disk, and its export."""
 
 from .history import History, HistoryRow
 
-__all__ = [
-    "History",
-    "HistoryRow",
-]
+__all__ = ["History", "HistoryRow"]

@@ -28,12 +28,12 @@ from modal import Mode
 TEXT_COLUMNS = ("tap_id", "tool", "direction", "series", "operator")
 MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
 CONDITION_UNITS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN", "hours": "h"}
-"""Numbers among the conditions, with their units; NaN where nobody said."""
+"""Numeric conditions with their units; NaN if unknown."""
 CONDITION_TEXT_COLUMNS = ("state", "note")
 
 
 def make_export_columns(history: History, machine: Machine) -> SldHistory:
-    """What `lobes.write_history` writes."""
+    """Make the columns for `lobes.write_history`."""
     rows, programs = history.rows, [program.name for program in machine.program]
     columns: dict[str, Any] = {name: _text_column(getattr(row, name) for row in rows) for name in TEXT_COLUMNS}
     columns["time"] = _text_column(row.time.isoformat() for row in rows)
@@ -65,10 +65,7 @@ def make_export_columns(history: History, machine: Machine) -> SldHistory:
 def compute_row_lobes(
     row: HistoryRow, machine: Machine, names: Collection[str] | None = None
 ) -> dict[str, StabilityLobes]:
-    """The diagrams of a row, as `compute_lobes` of the assembly as it was then; names: of these cuts alone.
-
-    They are worked out where they are asked for, not stored.
-    """
+    """Compute the lobes of a row as of its time; names: selected cuts."""
     return compute_tip_lobes(row.tool, _to_modes(row.x), _to_modes(row.y), machine, names)
 
 
@@ -79,7 +76,7 @@ def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
 def _lobe_depths(
     rows: Sequence[HistoryRow], machine: Machine, speeds: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Limits of each row over speeds (m), by name of the cut; NaN where there is no diagram of it."""
+    """Return the limits of each row over speeds (m) by name of the cut; NaN without lobes."""
     nowhere = np.full(speeds.size, np.nan)
     diagrams = [compute_row_lobes(row, machine) for row in rows]
     return {
@@ -101,12 +98,12 @@ def _condition_columns(conditions: Sequence[Conditions]) -> dict[str, NDArray[An
 
 
 def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:
-    """Limit of each program (m); NaN where nobody has asked yet."""
+    """Return the limit of each program (m); NaN without a stored verdict."""
     return [rulings[name].limit if rulings and name in rulings else np.nan for name in programs]
 
 
 def _program_verdicts(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> str:
-    """One word a program, a line each; empty where nobody has asked yet."""
+    """Return the verdict on each program, one per line; empty without stored verdicts."""
     return "\n".join(rulings[name].stability if name in rulings else "" for name in programs) if rulings else ""
 
 

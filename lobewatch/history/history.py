@@ -1,7 +1,4 @@
-"""History of a machine: one row per tap test, with rows of older versions.
-
-In its place where the analysis refuses a tap test now, beside the history where its file cannot be used.
-"""
+"""History of a machine: one row per tap test, with rows of older versions."""
 
 from __future__ import annotations
 
@@ -26,28 +23,23 @@ from lobewatch.verdicts.verdict import StoredVerdict
 from modal import Mode
 
 MAX_STORED_MODES = 12
-"""Modes kept of one measurement."""
-ESTIMATE_UNITS = {
-    "frequency": "Hz",
-    "damping_ratio": "",
-    "stiffness": "N/m",
-    "phase_deg": "deg",
-    "bearing_stiffness": "N/m",
-}
-"""Values with a standard error and their units, by name of the field and the column."""
+"""Largest number of stored modes of one tap test."""
+ESTIMATE_UNITS = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg"}
+ESTIMATE_UNITS |= {"bearing_stiffness": "N/m"}
+"""Units of the values with a standard error, by name of field and column."""
 WATCHED_VALUES = ("frequency", "damping_ratio", "stiffness", "bearing_stiffness")
-"""Those of them whose series are watched."""
+"""Values whose series are monitored."""
 MODEL_VALUE_UNITS = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
-"""Values of the model."""
+"""Units of the values of the model."""
 ModeValues = tuple[float, float, float, float]
 """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of a mode."""
 WatchedEstimates = Sequence[tuple[float, float]]
-"""Those of `WATCHED`, each with its standard error."""
+"""Monitored values with their standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class HistoryRow:
-    """One measurement of the history: what was measured, and what was said of the programs where that was asked."""
+    """Row of the history: results of one tap test, and stored verdicts."""
 
     tap_id: str
     """Identity of the tap test."""
@@ -58,68 +50,68 @@ class HistoryRow:
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     frequency: Estimate = UNKNOWN_ESTIMATE
-    """Natural frequency of the mode followed (Hz)."""
+    """Natural frequency of the followed mode (Hz)."""
     damping_ratio: Estimate = UNKNOWN_ESTIMATE
-    """Damping ratio of the mode followed (-)."""
+    """Damping ratio of the followed mode (-)."""
     stiffness: Estimate = UNKNOWN_ESTIMATE
-    """Modal stiffness of the mode followed, where it was tapped (N/m)."""
+    """Modal stiffness of the followed mode at the tapped place (N/m)."""
     phase_deg: Estimate = UNKNOWN_ESTIMATE
-    """Phase of the modal constant of the mode followed (degrees)."""
+    """Phase of the modal constant of the followed mode (degrees)."""
     bearing_stiffness: Estimate = UNKNOWN_ESTIMATE
-    """Mean of the bearings of the recalibrated model (N/m)."""
+    """Mean bearing stiffness of the calibrated model (N/m)."""
     static_tip_stiffness: float = np.nan
-    """Static stiffness of the recalibrated model at the tool tip (N/m)."""
+    """Static stiffness of the calibrated model at the tool tip (N/m)."""
     modal_tip_stiffness: float = np.nan
-    """Modal stiffness of the recalibrated model at the tool tip (N/m)."""
+    """Modal stiffness of the calibrated model at the tool tip (N/m)."""
     modes: tuple[ModeValues, ...] = ()
-    """All modes found."""
+    """All modes."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what could not be done, and what is in doubt."""
+    """Remarks on missing and doubtful results."""
     x: tuple[ModeValues, ...] = ()
-    """Modes at the tool tip in x of the assembly as it was then; empty where no direction was known."""
+    """Modes at the tool tip in x of the assembly at that time; empty if no direction was known."""
     y: tuple[ModeValues, ...] = ()
-    """The same in y."""
+    """Modes at the tool tip in y."""
     verdicts: Mapping[str, StoredVerdict] | None = None
-    """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
+    """Stored verdict on each program after this tap test; None if never evaluated."""
     baseline: datetime | None = None
-    """The event before it from which on all comparing begins anew."""
+    """Newest baseline before it."""
     series: str = ""
-    """The first tap test of those that it is compared with: of one tool with one stick-out in one state."""
+    """First tap test of its series."""
     conditions: Conditions = UNKNOWN_CONDITIONS
-    """Conditions that it was taken under."""
+    """Conditions of the tap test."""
     operator: str = ""
-    """Who held the hammer; empty where nobody said so."""
+    """Name of the operator; empty if unknown."""
     software: str = ""
-    """Name and version of the program that made the row."""
+    """Version of the program that made the row."""
 
     @cached_property
     def questions(self) -> tuple[Remark, ...]:
-        """What nobody has answered yet; until then it is no reference for other tests."""
+        """Open questions; with one the test is no reference for others."""
         return find_open_questions(self.remarks)
 
     @cached_property
     def accepted(self) -> frozenset[str]:
-        """Codes of the questions that were answered."""
+        """Codes of the accepted questions."""
         return find_accepted_codes(self.remarks)
 
     @cached_property
     def by_hand(self) -> str:
-        """What a person said of its modes, in the words of `ModeEdits`; empty where nobody did."""
+        """Mode edits in words; empty without any."""
         return next((remark.about for remark in self.remarks if remark.code in MODE_EDIT_CODES), "")
 
     @property
     def followed(self) -> ModeValues:
-        """The mode followed; NaN where it was not found."""
+        """Followed mode; NaN without one."""
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
 
     @property
     def watched(self) -> WatchedEstimates:
-        """Values whose series are watched."""
+        """Monitored values."""
         return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
 
     @property
     def mode(self) -> Mode | None:
-        """The mode followed, without its errors; None where it was not found."""
+        """Followed mode without its errors; None without one."""
         if not self.frequency.is_known:
             return None
         frequency, damping_ratio, stiffness, phase = self.followed
@@ -129,60 +121,76 @@ class HistoryRow:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """All measurements of a machine, in order of time."""
+    """All tap tests of a machine in order of time."""
 
     settings_hash: str
-    """Hash of the settings that it was made with."""
+    """Hash of the settings behind the rows."""
     software: str
-    """Name and version of the program that made it."""
+    """Version of the program that made the rows."""
     rows: tuple[HistoryRow, ...]
-    """One a measurement."""
+    """Rows, one per tap test."""
     baseline: datetime | None = None
-    """The newest event from which on all comparing begins anew."""
+    """Newest baseline."""
     kept: tuple[HistoryRow, ...] = ()
-    """Rows of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
+    """Earlier rows of tap tests with unusable files; they do not count."""
 
     @cached_property
     def current(self) -> list[HistoryRow]:
-        """Those since the baseline, of each tool with the stick-out and in the state of its newest."""
+        """Rows since the baseline, of each tool with its newest mounting."""
         since = [row for row in self.rows if row.baseline == self.baseline]
         newest = {row.tool: row.series for row in since}
         return [row for row in since if row.series == newest[row.tool]]
 
     @property
     def newest_calibrated(self) -> HistoryRow | None:
-        """The newest that the bearings of the model were found from, without open questions."""
+        """Newest row with a calibrated bearing stiffness and without open questions."""
         rows = reversed(self.current)
         return next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
 
     @property
     def questions(self) -> dict[str, tuple[str, ...]]:
-        """Codes of what is asked and not answered, by tap test."""
+        """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
 
-    def with_verdicts(self, number: int, rulings: Mapping[str, StoredVerdict]) -> History:
-        """The same with the word on every program after one of its rows."""
-        row = replace(self.rows[number], verdicts=rulings)
+    def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict]) -> History:
+        """Return the history with the verdicts after one of its rows.
+
+        Parameters
+        ----------
+        number
+            Index of the row.
+        verdicts
+            Stored verdicts by name of the program.
+        """
+        row = replace(self.rows[number], verdicts=verdicts)
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
 
     def series(self, tool: str, direction: str) -> list[HistoryRow]:
-        """Those of one tool and direction, oldest first."""
+        """Return the current rows of one tool and direction, oldest first.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        direction
+            Direction, "x" or "y".
+        """
         return [row for row in self.current if (row.tool, row.direction) == (tool, direction)]
 
 
 def make_empty_history(machine: Machine) -> History:
-    """The history of a machine that was never tapped."""
+    """Return the history of a machine without tap tests."""
     return History(machine.settings_hash, f"lobewatch {CURRENT_SOFTWARE.lobewatch}", ())
 
 
 def clear_newest_verdicts(history: History) -> History:
-    """The same as if nobody had asked for the programs after the newest tap test yet."""
+    """Return the history without the verdicts after the newest tap test."""
     *before, last = history.rows
     return replace(history, rows=(*before, replace(last, verdicts=None)))
 
 
 def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
-    """A measurement as a row, with the tip and the remarks of the assembly as it was then."""
+    """Make the row of a measurement, with tip modes and remarks of its assembly."""
     frequency, damping_ratio, stiffness, phase = _mode_estimates(m.followed)
     calibration = m.calibration
     return HistoryRow(
@@ -211,14 +219,9 @@ def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
 def _mode_estimates(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate, Estimate]:
     if mode is None:
         return UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE
-    f_std, zeta_std, k_std = mode.standard_error.tolist()
-    phase = Estimate(mode.phase_deg, mode.phase_deg_std)
-    return (
-        Estimate(mode.frequency, f_std),
-        Estimate(mode.damping_ratio, zeta_std),
-        Estimate(mode.stiffness, k_std),
-        phase,
-    )
+    values = mode.frequency, mode.damping_ratio, mode.stiffness
+    frequency, damping_ratio, stiffness = map(Estimate, values, mode.standard_error.tolist())
+    return frequency, damping_ratio, stiffness, Estimate(mode.phase_deg, mode.phase_deg_std)
 
 
 def _bearing_estimate(calibration: Calibration | None) -> Estimate:
@@ -233,11 +236,11 @@ def _mode_values(modes: Sequence[Mode]) -> tuple[ModeValues, ...]:
 
 
 OLDER_VERSION_CODE, KEPT_ROW_CODE = "row-of-older-version", "row-kept"
-"""Codes of the remarks on them."""
+"""Codes of the remarks on kept rows."""
 
 
 def keep_older_row(row: HistoryRow, place: TapPlace, error: Exception) -> HistoryRow:
-    """The row of an older version of a tap test whose analysis now ends in an error."""
+    """Return the row of an older version if this version cannot analyse the tap test."""
     text = f"as {row.software} worked it out: this version cannot ({error})"
     others = [remark for remark in row.remarks if remark.code != OLDER_VERSION_CODE]
     remarks = (
@@ -249,7 +252,7 @@ def keep_older_row(row: HistoryRow, place: TapPlace, error: Exception) -> Histor
 
 
 def keep_unusable_row(row: HistoryRow, software: str) -> HistoryRow:
-    """The row of a tap test whose file cannot be used; software: that made it, where the row does not say."""
+    """Return the row of a tap test with an unusable file; software: default version of the row."""
     software_then = row.software or software
     text = f"its file cannot be used: as {software_then} worked it out, and counts for nothing"
     others = [remark for remark in row.remarks if remark.code != KEPT_ROW_CODE]
@@ -258,6 +261,6 @@ def keep_unusable_row(row: HistoryRow, software: str) -> HistoryRow:
 
 
 def find_older_version_remarks(history: History | None) -> list[Remark]:
-    """The remarks on rows that count though they could not be worked out anew."""
+    """Return the remarks on rows of older versions that count."""
     rows = [] if history is None else [row for row in history.rows if row.software]
     return [remark for row in rows for remark in row.remarks if remark.code == OLDER_VERSION_CODE]

@@ -1,4 +1,4 @@
-"""history.rows: what it still holds, and its place on the disk."""
+"""Cache of the history in history.rows."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
+from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
-"""Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
+"""Size of obsolete rows, besides that of the valid ones, above which the file is rewritten."""
 UNPLACED_ROW_NUMBER = -1
-"""Number of rows that are kept beside the history."""
+"""Number of rows outside of the history."""
 
 
 class HistoryCache:
-    """The file of one machine; it knows what is on the disk, and adds to it."""
+    """Cache file of one machine, read and appended to."""
 
     def __init__(self, folder: MachineFolder) -> None:
-        """Nothing is read yet."""
         self._folder = folder
         self._rows: list[HistoryRow] = []
         self._contents: list[bytes] = []
@@ -45,13 +45,13 @@ class HistoryCache:
 
     @property
     def other_rows(self) -> Mapping[str, HistoryRow]:
-        """Rows that were read beside those of these settings and this version, by tap test."""
+        """Rows of other settings or versions by tap test."""
         return self._others
 
     def read(self, files: UsableTaps) -> History:
-        """The rows of the oldest taps on, as far as they were made with these settings and this version.
+        """Read the oldest rows that are valid for these settings and this version.
 
-        Rows of tap tests whose files cannot be used are kept aside.
+        Rows of tap tests with unusable files are kept aside.
         """
         empty, lost_ids = make_empty_history(self._folder.machine), {entry.id for entry in files.lost}
         hashes = _hash_programs(self._folder.machine, files.cuts)
@@ -66,7 +66,7 @@ class HistoryCache:
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def _count_fitting(self, places: Sequence[TapPlace]) -> int:
-        """Rows that are those of these tap tests; places: those that were compared before are not looked at again."""
+        """Count the rows that belong to these places; those compared before are not compared again."""
         compared, count = self._fitting
         count = min(count, len(self._rows)) if compared is places else 0
         for row, place in zip(self._rows[count:], places[count:], strict=False):
@@ -77,7 +77,7 @@ class HistoryCache:
         return count
 
     def store(self, history: History) -> None:
-        """Write what is new of it, under the lock where that can be had at once; else a remark says so."""
+        """Write new rows if the lock is free at once, else add a remark."""
         try:
             with self._folder.locked(patience=0):
                 self._store(history)
@@ -88,7 +88,7 @@ class HistoryCache:
 
     @property
     def _stamp_now(self) -> tuple[int, ...] | None:
-        """Another one where somebody else has written the file; None where there is none."""
+        """Stamp of the file, which another program changes; None without a file."""
         try:
             status = self._folder.history_path.stat()
         except OSError:
@@ -117,7 +117,7 @@ class HistoryCache:
             self._size, self._length = stored.sound_bytes if is_current else 0, stored.file_bytes
 
     def _store(self, history: History) -> None:
-        path, hashes = self._folder.history_path, self._hashes or self._folder.machine.program_hashes
+        path, hashes = self._folder.history_path, self._hashes or hash_programs(self._folder.machine)
         if self._stamp_now != self._stamp and self._stamp_now is not None:
             self._read(_cache_header(history))  # another program has written
         same = [*map(is_, history.rows, self._rows), False].index(False)
@@ -147,12 +147,12 @@ class HistoryCache:
 
 
 def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
-    """Hash of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
+    """Return the hash of all that decides the verdict on each program, test cuts of its tool included."""
     taught = {
         program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
         for program in machine.program
     }
-    return {name: text + taught[name] for name, text in machine.program_hashes.items()}
+    return {name: text + taught[name] for name, text in hash_programs(machine).items()}
 
 
 def _cache_header(history: History) -> bytes:

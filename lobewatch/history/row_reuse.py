@@ -1,8 +1,7 @@
 """Find stored history rows that stay valid after a change.
 
-What a tap test says follows from its own file, from the mode followed before it, and of the other direction from the
-test that it takes that from. So after a tap test of long ago, or one that is taken out, only the few tests next to it
-are analysed anew.
+A result depends on its own file, on the followed mode before it, and in the other direction on the test that it is
+taken from. So after an old tap test is added or excluded, only its neighbours are analysed again.
 """
 
 from __future__ import annotations
@@ -23,16 +22,15 @@ from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier, o
 
 
 class FollowedModeIndex:
-    """Modes of the rows that were shown, each row looked at once."""
+    """Index of the followed modes of rows, each row read once."""
 
     def __init__(self) -> None:
-        """No row yet."""
         self._modes: dict[str, dict[str, list[FollowedMode]]] = {}
         self._numbers: dict[str, dict[str, list[int]]] = {}
         self._rows = 0
 
     def before(self, place: TapPlace, rows: Sequence[HistoryRow]) -> dict[str, list[FollowedMode]]:
-        """Modes of the same series before a tap test, by direction; rows: the history before it at least."""
+        """Return the earlier modes of the series of a tap test by direction; rows: at least the history before it."""
         for number in range(self._rows, len(rows)):
             self._add(number, rows[number])
         self._rows = max(self._rows, len(rows))
@@ -52,29 +50,29 @@ class FollowedModeIndex:
 
 
 def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
-    """Whether a row was made of this tap test, with all that a person said of it, since the same baseline."""
+    """Tell whether a row is of this tap test with the same baseline, answers and mode edits."""
     tap = place.entry
     ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand
     return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted), str(tap.by_hand))
 
 
 class _RowBasis(NamedTuple):
-    """What a tap test builds on, but for its own file."""
+    """Inputs of a result besides its own file."""
 
     mounting_remarks: tuple[Remark, ...]
     """Remarks on its mounting."""
     previous_mode: ModeValues | None
-    """The mode followed before it."""
+    """Followed mode before it."""
     other_tap: str
-    """Tap test that the other direction is taken from; empty without any."""
+    """Tap test of the other direction; empty without one."""
     cross_tap: str
-    """Cross tap that its axes are taken from; empty without any."""
+    """Cross FRF of its principal directions; empty without one."""
     nearby_modes: tuple[FollowedMode, ...]
-    """Modes that it is moved by where it is that old."""
+    """Modes that shift an older direction."""
 
 
 class _RowArchive:
-    """Tap tests in an order, with their rows."""
+    """Ordered tap tests with their rows."""
 
     def __init__(self, ordered: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> None:
         self.places, self.rows = ordered, rows
@@ -98,10 +96,9 @@ class _RowArchive:
 
 
 class ReusableRows:
-    """The stored rows of an archive as it was; what is said of them is asked in the order of time."""
+    """Stored rows of a former order, queried in order of time."""
 
     def __init__(self, rows: Sequence[HistoryRow], taps: Mapping[str, TapEntry], baselines: Sequence[datetime]) -> None:
-        """rows: stored, of settings and version of now; taps: all of the journal; baselines: of now."""
         entries = [taps[row.tap_id] for row in rows if row.tap_id in taps]
         then = order_taps(entries, baselines) if len(entries) == len(rows) else []
         known = then and all(
@@ -113,9 +110,9 @@ class ReusableRows:
         self._now: _RowArchive | None = None
 
     def find(self, place: TapPlace, ordered: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> HistoryRow | None:
-        """The row of a tap test among these, if it holds; without the words on programs, which rest on all before it.
+        """Return the row of a tap test if it stays valid, without verdicts, which depend on all rows before it.
 
-        rows: of the tap tests before it, of which `note` was told.
+        rows: of the tap tests before it, all passed to `note` if new.
         """
         number = self._numbers.get(place.entry.id)
         if number is None:
@@ -134,13 +131,13 @@ class ReusableRows:
         return replace(row, verdicts=None)
 
     def note(self, row: HistoryRow) -> None:
-        """A tap test was analysed anew, with this row."""
+        """Note the row of a tap test that was analysed again."""
         number = self._numbers.get(row.tap_id)
         if number is not None and _encode_content(row) == _encode_content(self._then.rows[number]):
             self._alike.add(row.tap_id)
 
     def _is_alike(self, tap_id: str, rows: Sequence[HistoryRow], place: TapPlace) -> bool:
-        """Whether the row of an earlier tap test is as it was."""
+        """Tell whether the row of an earlier tap test is unchanged."""
         if tap_id in self._alike:
             return True
         number = self._numbers.get(tap_id)

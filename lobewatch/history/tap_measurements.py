@@ -18,23 +18,22 @@ from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier
 from modal import Mode
 
 MAX_MEASUREMENTS_IN_MEMORY = 500
-"""Measurements kept in memory, those asked for last."""
+"""Largest number of measurements in memory, those used last."""
 
 
 class TapMeasurements:
-    """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least.
+    """Measurements and assemblies of a machine; rows: at least the history before a place.
 
-    DamagedTapError for a file that turns out to be damaged.
+    Raises DamagedTapError for a damaged file.
     """
 
     def __init__(self, folder: MachineFolder, places: Sequence[TapPlace], fits: Mapping[str, TapFit]) -> None:
-        """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is read yet."""
         self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
         self._followed = FollowedModeIndex()
 
     def measurement(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Measurement:
-        """What one tap test says."""
+        """Return the measurement of one tap test."""
         measurement = self._measurements.pop(place.entry.id, None)
         if measurement is None:
             before = (rows[number] for number in iterate_earlier(place, self._places))
@@ -54,7 +53,7 @@ class TapMeasurements:
         return measure(self._folder.read(place.entry), self._folder.machine, last, place.entry.by_hand)
 
     def assembly_after(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Assembly:
-        """The tool of one tap test as it was known then."""
+        """Return the tool as known after one tap test."""
         cross = None if place.cross is None else self.measurement(self._places[place.cross], rows)
         if place.entry.direction == CROSS_TAP and place.other_direction is not None:
             place = self._places[place.other_direction]
@@ -66,9 +65,9 @@ class TapMeasurements:
         return assemble(newest, other, series, cross)
 
     def assembly_of(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
-        """A tool as the newest of these tap tests with it tells, predicted where none is of it.
+        """Return the tool as known after the newest of these tap tests, or its prediction.
 
-        NotTappedError where it cannot be predicted.
+        Raises NotTappedError if it cannot be predicted.
         """
         newest = next((place for place in reversed(places) if place.entry.tool == tool), None)
         return self._prediction(tool, places, rows) if newest is None else self.assembly_after(newest, rows)
@@ -91,10 +90,10 @@ class TapMeasurements:
     def all_rows(
         self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows | None = None
     ) -> tuple[HistoryRow, ...]:
-        """These rows, and those of all tap tests after them.
+        """Return these rows and those of all later tap tests.
 
-        others: rows of older versions by tap test, for those that cannot be worked out anew; behind: of those that may
-        not have to be.
+        older_rows: rows of older versions by tap test, for tests that cannot be analysed; behind: rows that may stay
+        valid.
         """
         rows = list(rows)
         for place in self._places[len(rows) :]:
@@ -126,9 +125,9 @@ def _to_followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:
 def measure_excluded_taps(
     folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence[HistoryRow]
 ) -> list[HistoryRow]:
-    """Excluded tap tests of the series of these rows as rows of their own, without diagrams; damaged ones are skipped.
+    """Measure the excluded tap tests of a series as rows without lobes; damaged ones are skipped.
 
-    rows: one series, oldest first, at least one. A tap test before its baseline is none of it.
+    rows: rows of the series, at least one. A tap test before its baseline is left out.
     """
     rows_out = []
     for entry in excluded:

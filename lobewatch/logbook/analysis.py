@@ -150,18 +150,18 @@ class Analysis:
         return verdicts
 
     def stored_verdicts(
-        self, tap_id: str, falls: bool = False, verdicts: Mapping[str, Verdict] | None = None
+        self, tap_id: str, drops: bool = False, verdicts: Mapping[str, Verdict] | None = None
     ) -> Mapping[str, StoredVerdict]:
-        """Word, limit and critical `falls` of every program after a tap test; the history keeps what was asked for.
+        """Word, limit and critical `drops` of every program after a tap test; the history keeps what was asked for.
 
         verdicts: by program, where others have worked them out.
         """
         stored = self.history.rows[number := self.files.place(tap_id).number].verdicts
         rulings = dict(stored or {})
-        names = [table.name for table in self.machine.program if is_verdict_missing(rulings.get(table.name), falls)]
+        names = [table.name for table in self.machine.program if is_verdict_missing(rulings.get(table.name), drops)]
         if names or stored is None:
             judged = [verdicts[name] for name in names] if verdicts else self.verdicts(tap_id, names)
-            rulings |= {verdict.program.name: build_stored_verdict(verdict, falls) for verdict in judged}
+            rulings |= {verdict.program.name: build_stored_verdict(verdict, drops) for verdict in judged}
             rulings = {table.name: rulings[table.name] for table in self.machine.program}
             self._history = self.history.with_verdicts(number, rulings)
             self._cache.store(

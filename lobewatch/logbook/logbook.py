@@ -141,9 +141,9 @@ class Logbook:
         """See `Analysis.verdict_on`."""
         return self.query(Analysis.verdict_for, table)
 
-    def stored_verdicts(self, tap_id: str, falls: bool = False) -> Mapping[str, StoredVerdict]:
+    def stored_verdicts(self, tap_id: str, drops: bool = False) -> Mapping[str, StoredVerdict]:
         """See `Analysis.rulings`."""
-        return self.query(Analysis.stored_verdicts, tap_id, falls)
+        return self.query(Analysis.stored_verdicts, tap_id, drops)
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """See `Analysis.first_assembly`."""

@@ -80,7 +80,7 @@ def _stored_verdicts(analysis: Analysis, standing: MachineStatus) -> Mapping[str
     if not standing.series:
         return {}
     can_foretell = any(series.trend is not None and series.trend.has_forecast for series in standing.series)
-    return analysis.stored_verdicts(analysis.history.rows[-1].tap_id, falls=can_foretell)
+    return analysis.stored_verdicts(analysis.history.rows[-1].tap_id, drops=can_foretell)
 
 
 def _forecast_limit(standing: MachineStatus, percent: float) -> ThresholdDates:

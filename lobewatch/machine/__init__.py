@@ -1,4 +1,4 @@
-"""What is known of one machine: machine.toml, its folder, its journal, its devices."""
+"""Data of one machine: machine.toml, its folder, its journal and its DAQ."""
 
 import lazy_loader
 

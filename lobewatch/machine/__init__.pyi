@@ -1,4 +1,4 @@
-"""What is known of one machine: machine.toml, its folder, its journal, its devices."""
+"""Data of one machine: machine.toml, its folder, its journal and its DAQ."""
 
 from .daq_rates import apply_measured_rate, check_device_rate, find_stored_rate, has_clock
 from .folder import MachineFolder

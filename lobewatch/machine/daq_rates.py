@@ -24,11 +24,11 @@ from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder import MachineFolder
 
 MAX_RATE_MEASUREMENTS = 3
-"""Measurements of a rate at most, where the computer is too busy for a sure one."""
+"""Largest number of measurements of a rate until one is certain."""
 
 
 class StoredDevice(msgspec.Struct, frozen=True):
-    """One device at one rate, as it stands in daq.json."""
+    """Measured rate of a device in daq.json."""
 
     model: str
     serial: str
@@ -44,12 +44,12 @@ class StoredDevice(msgspec.Struct, frozen=True):
 
     @property
     def is_altered(self) -> bool:
-        """Whether it is not as it was written."""
+        """Whether the CRC is wrong."""
         return self.crc not in (0, self.computed_crc)
 
     @property
     def computed_crc(self) -> int:
-        """CRC-32 of all but the CRC."""
+        """CRC-32 of all other fields."""
         return zlib.crc32(msgspec.json.encode(msgspec.structs.replace(self, crc=0)))
 
 
@@ -60,16 +60,37 @@ def check_device_rate(
     clock: Callable[[], float] = time.monotonic,
     remarks: list[Remark] | None = None,
 ) -> float:
-    """Rate of a connected device that is not started (Hz), measured where this machine does not know it yet.
+    """Return the sample rate of a device, measured once per device and machine.
 
-    Call it once after every connect, before device.start(), with the folder locked. The first time, for a model,
-    serial number and nominal rate that are not in daq.json, it starts the device, listens for `seconds` and stops it
-    again; later it returns at once (`find_stored_rate` tells beforehand which). Within 0.2 % of device.sample_rate nothing
-    changes and that rate is returned. Further off: DeviceError, one sentence with the measured rate; or, with
-    accept_measured_rate = true in [daq], device.sample_rate is set to the measured rate and that is returned, so that
-    every Hit of capture_hits(device, ...) has it: make the Trigger from the returned rate. A refused rate is not kept
-    and is measured again the next time. One that is not sure, in the best of three tries, is not kept either; a remark
-    on it is added to `remarks`. The rate of a device whose scans do not follow the clock is not checked.
+    Call it after every connect, before device.start(), with the folder locked. A rate within 0.2 % of the nominal one
+    is
+    accepted as nominal. A larger difference is an error, or with accept_measured_rate = true in [daq] the device gets
+    the
+    measured rate: make the Trigger from the returned rate. Only a certain rate is stored in daq.json; an uncertain one,
+    the best of three, adds a remark. Devices without a clock are not checked.
+
+    Parameters
+    ----------
+    folder
+        Machine folder, locked.
+    device
+        Connected device that is not started.
+    seconds
+        Duration of the measurement (s).
+    clock
+        Clock of the computer (s).
+    remarks
+        List that gets the remark on an uncertain rate.
+
+    Returns
+    -------
+    float
+        Sample rate (Hz).
+
+    Raises
+    ------
+    DeviceError
+        If the measured rate differs from the nominal one and is not accepted.
     """
     if not has_clock(device):
         return device.sample_rate
@@ -81,7 +102,7 @@ def check_device_rate(
 
 
 def _measure_rate(device: Device, seconds: float, clock: Callable[[], float]) -> MeasuredRate:
-    """The first of several tries that is sure, else the surest."""
+    """Measure until a rate is certain, and return the most certain one."""
     tries = [measure_rate(device, seconds, clock)]
     while not tries[-1].is_accurate and len(tries) < MAX_RATE_MEASUREMENTS:
         tries.append(measure_rate(device, seconds, clock))
@@ -89,12 +110,36 @@ def _measure_rate(device: Device, seconds: float, clock: Callable[[], float]) ->
 
 
 def has_clock(device: Device) -> bool:
-    """Whether the scans of a device follow the clock, and it says who it is: its rate is kept by that."""
+    """Tell whether a device has a sample clock and identifies itself, so that its rate can be stored.
+
+    Parameters
+    ----------
+    device
+        Connected device.
+
+    Returns
+    -------
+    bool
+        Whether its rate can be checked.
+    """
     return device.follows_clock and bool(device.identity.model and device.identity.serial)
 
 
 def find_stored_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
-    """Rate measured of this device at this nominal rate; None where it is not known."""
+    """Return the measured rate of a device at its nominal rate.
+
+    Parameters
+    ----------
+    folder
+        Machine folder.
+    device
+        Connected device.
+
+    Returns
+    -------
+    MeasuredRate or None
+        Rate in daq.json; None without one.
+    """
     for entry in read_stored_devices(folder):
         if _is_same_device(entry, device):
             return MeasuredRate(entry.measured_rate_hz, entry.measured_rate_hz_std, entry.n_scans, entry.seconds)
@@ -102,7 +147,27 @@ def find_stored_rate(folder: MachineFolder, device: Device) -> MeasuredRate | No
 
 
 def apply_measured_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:
-    """Rate to use (Hz): a measured one is checked, accepted where [daq] says so, kept in daq.json where it is sure."""
+    """Check a measured rate, set it if [daq] accepts it, and store it if it is certain.
+
+    Parameters
+    ----------
+    folder
+        Machine folder, locked.
+    device
+        Connected device, which gets the rate.
+    measured
+        Measured rate.
+
+    Returns
+    -------
+    float
+        Sample rate to use (Hz).
+
+    Raises
+    ------
+    DeviceError
+        If the measured rate differs from the nominal one and is not accepted.
+    """
     try:
         check_rate(measured, device.sample_rate)
         rate = device.sample_rate
@@ -120,14 +185,14 @@ def apply_measured_rate(folder: MachineFolder, device: Device, measured: Measure
 
 
 def _is_same_device(entry: StoredDevice, device: Device) -> bool:
-    """Whether an entry is of this device, whose nominal rate may have been replaced by the measured one already."""
+    """Tell whether an entry is of a device with its nominal or its measured rate."""
     rates = (entry.nominal_rate_hz, entry.measured_rate_hz)
     identity = device.identity
     return (entry.model, entry.serial) == (identity.model, identity.serial) and device.sample_rate in rates
 
 
 def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
-    """Devices in daq.json; DataError where that is damaged."""
+    """Read the devices in daq.json; DataError if the file is damaged."""
     path = folder.path / "daq.json"
     try:
         entries = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=list[StoredDevice])
@@ -143,17 +208,8 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
 def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
     kept = [entry for entry in read_stored_devices(folder) if not _is_same_device(entry, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    new = StoredDevice(
-        device.identity.model,
-        device.identity.serial,
-        device.sample_rate,
-        measured.rate,
-        measured.std,
-        measured.n_scans,
-        measured.seconds,
-        now,
-    )
-    content = msgspec.json.format(
-        msgspec.json.encode([*kept, msgspec.structs.replace(new, crc=new.computed_crc)]), indent=2
-    )
+    identity, numbers = device.identity, (measured.rate, measured.std, measured.n_scans, measured.seconds)
+    new = StoredDevice(identity.model, identity.serial, device.sample_rate, *numbers, now)
+    new = msgspec.structs.replace(new, crc=new.computed_crc)
+    content = msgspec.json.format(msgspec.json.encode([*kept, new]), indent=2)
     atomic_write(folder.path / "daq.json", content + b"\n")

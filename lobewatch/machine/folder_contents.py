@@ -12,26 +12,16 @@ from pathlib import Path
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
+from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
-from lobewatch.machine.journal.entries import (
-    Acknowledgement,
-    FleetScatter,
-    MaintenanceEvent,
-    read_acknowledgements,
-    read_events,
-    read_exclusion_reasons,
-    read_fleet_scatters,
-    read_mode_edits,
-)
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
 from lobewatch.machine.journal.tap_entry import NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
-"""Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first, as long as they are neither
-more bytes nor more files; lobewatch verify takes all."""
+"""Limits of the newest tap files whose SHA-256 is checked at every reading; lobewatch verify checks all."""
 MAX_LISTED_FILES = 20
-"""Files without a line that are named one by one; chosen."""
+"""Largest number of unlisted files that are listed one by one; chosen."""
 
 
 @dataclass(frozen=True)
@@ -39,39 +29,39 @@ class FolderContents:
     """Tap tests, test cuts and events of a machine folder."""
 
     taps: tuple[TapEntry, ...]
-    """Tap tests whose files are as they were committed, oldest first by their time."""
+    """Usable tap tests, oldest first."""
     lost: tuple[TapEntry, ...]
-    """Committed tap tests that cannot be used, likewise."""
+    """Committed tap tests with damaged files, oldest first."""
     remarks: tuple[Remark, ...]
-    """Remarks on what is wrong."""
-    events: tuple[MaintenanceEvent, ...] = ()
+    """Remarks on damage."""
+    events: tuple[journal_entries.MaintenanceEvent, ...] = ()
     """Maintenance of the machine, oldest first."""
     line_count: int = 0
     """Number of lines of the journal."""
     cuts: tuple[CutEntry, ...] = ()
-    """Test cuts, oldest first, those that a person has taken out too."""
-    acknowledgements: tuple[Acknowledgement, ...] = ()
-    """What a person has acknowledged, oldest first."""
-    fleet_scatters: tuple[FleetScatter, ...] = ()
-    """What the other machines told of its scatter, oldest first."""
+    """Test cuts, oldest first, excluded ones included."""
+    acknowledgements: tuple[journal_entries.Acknowledgement, ...] = ()
+    """Acknowledgements of alarms, oldest first."""
+    fleet_scatters: tuple[journal_entries.FleetScatter, ...] = ()
+    """Scatter of the other machines of the fleet, oldest first."""
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
-        """Contents with a tap test that was just committed, and nothing else since."""
+        """Return the contents with a newly committed tap test."""
         is_newest = not self.taps or _tap_time(self.taps[-1]) <= _tap_time(entry)
         taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
         return replace(self, taps=taps, line_count=self.line_count + 1)
 
     @property
     def baselines(self) -> list[datetime]:
-        """Times at which all comparing began anew, oldest first."""
+        """Times of new baselines, oldest first."""
         return [event.time for event in self.events if event.new_baseline]
 
 
 def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContents:
-    """Contents that the journal and taps/ prove together; reading: of the journal."""
+    """Read the contents that the journal and taps/ prove together."""
     committed = read_committed_taps(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
-    events = read_events(reading.other_entries)
+    events = journal_entries.read_events(reading.other_entries)
     sizes, given_up, proved = _list_tap_sizes(folder), read_given_up_ids(reading), 0
     for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
         proved += entry.size
@@ -98,22 +88,25 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = read_committed_cuts(reading)
-    words = read_acknowledgements(reading.other_entries), read_fleet_scatters(reading.other_entries)
-    return FolderContents(tuple(taps), _sort_by_time(lost), tuple(remarks), events, len(reading.lines), cuts, *words)
+    acknowledged = journal_entries.read_acknowledgements(reading.other_entries)
+    scatters = journal_entries.read_fleet_scatters(reading.other_entries)
+    usable, unusable, damage, count = tuple(taps), _sort_by_time(lost), tuple(remarks), len(reading.lines)
+    return FolderContents(usable, unusable, damage, events, count, cuts, acknowledged, scatters)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
-    """Test cuts of the journal, oldest first."""
-    return read_cuts(reading.other_entries, read_exclusion_reasons(reading.other_entries))
+    """Read the test cuts of the journal, oldest first."""
+    return read_cuts(reading.other_entries, journal_entries.read_exclusion_reasons(reading.other_entries))
 
 
 def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
-    """Tap tests of the journal by identity."""
+    """Read the tap tests of the journal by identity."""
     accepted: dict[str, tuple[str, ...]] = {}
     for line in reading.other_entries:
         if line["kind"] == "accept":
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
-    excluded, by_hand = read_exclusion_reasons(reading.other_entries), read_mode_edits(reading.other_entries)
+    excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
+    by_hand = journal_entries.read_mode_edits(reading.other_entries)
     entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
     for line in reading.other_entries:
         if line["kind"] == "tap":
@@ -124,7 +117,7 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
 
 
 def _list_tap_sizes(folder: Path) -> dict[str, int]:
-    """Sizes (bytes) of the files in taps/ that could be tap tests, by identity."""
+    """Return the sizes (bytes) of the files in taps/ by identity."""
     if not (folder / "taps").is_dir():
         return {}
     with os.scandir(folder / "taps") as listing:
@@ -133,16 +126,16 @@ def _list_tap_sizes(folder: Path) -> dict[str, int]:
 
 
 def list_tap_files(folder: Path) -> Mapping[str, Path]:
-    """Files in taps/ that could be tap tests, by identity."""
+    """Return the tap files in taps/ by identity."""
     taps = folder / "taps"
     files = sorted(taps.glob("*.h5")) if taps.is_dir() else []
     return {path.stem: path for path in files if not path.name.startswith(".")}
 
 
 def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
-    """Fault of the file of a tap test or of a cut; empty where it is as it was written.
+    """Return the fault of a committed file; empty if it has the committed content.
 
-    OSError where this program can open no more files.
+    Raises OSError if this program can open no more files.
     """
     try:
         with open_regular_file(f"{folder}/{entry.file}") as file:
@@ -162,7 +155,7 @@ def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
 
 
 def hash_file(path: Path) -> str:
-    """SHA-256 of a file; empty where it cannot be read."""
+    """Return the SHA-256 of a file; empty if it cannot be read."""
     try:
         return hashlib.sha256(read_regular_file(path)).hexdigest()
     except OSError:
@@ -170,7 +163,7 @@ def hash_file(path: Path) -> str:
 
 
 def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
-    """Remark on a tap test that cannot be used."""
+    """Return the remark on a tap test with a damaged file."""
     text = f"{fault}; results are those of the other tap tests"
     if is_given_up:
         return Remark("tap-lost", entry.file, text)
@@ -179,12 +172,12 @@ def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bo
 
 
 def missing_journal_remark(folder: Path, count: int) -> Remark:
-    """Remark on tap files that lie there alone."""
+    """Return the remark on tap files without a journal."""
     return journal_damage_remark(folder / JOURNAL_NAME, f"is missing beside {count} tap file{'s' if count > 1 else ''}")
 
 
 def has_known_origin(folder: Path, entry: TapEntry) -> bool:
-    """Whether a tap file without a line is what an ended program leaves: its hits or its recording are still there."""
+    """Tell whether a tap file without a line comes from an interrupted program whose hits or recording exist."""
     return bool(entry.source_sha256) or (folder / "spool" / entry.id).is_dir()
 
 
@@ -196,12 +189,12 @@ def _lacks_known_origin(folder: Path, path: Path) -> bool:
 
 
 def unlisted_file_remark(path: Path, text: str, cure: str) -> Remark:
-    """Remark on a file in taps/ that is in no journal."""
+    """Return the remark on a file in taps/ without a line."""
     return Remark("tap-unlisted", f"taps/{path.name}", text, cure)
 
 
 def read_given_up_ids(reading: JournalReading) -> set[str]:
-    """Identities of the tap tests and recordings that `lobewatch rebuild` went on without."""
+    """Return the identities of lost tap tests and recordings."""
     return {line["tap"] for line in reading.other_entries if line["kind"] == "lost"}
 
 

@@ -11,26 +11,23 @@ from acquisition.errors import DataError, check_name
 from acquisition.file_io import atomic_write, make_folder
 
 WATCHED_FILES = ("machine.toml", "journal.jsonl", "journal.copy.jsonl", "taps")
-"""Names in the folder of a machine whose change is a change of what is known of it."""
+"""Names whose change means a change of the machine data."""
 
 
 def to_folder_path(name: Path | str) -> Path:
-    """Path of the folder that a person names; FileNotFoundError for an empty name.
-
-    Python takes that for the current folder: mostly a slip.
-    """
+    """Return the path of a named folder; FileNotFoundError for an empty name, mostly a slip."""
     if not str(name):
         raise FileNotFoundError("the name of the folder is empty; give the machine folder, or . for the current one")
     return Path(name)
 
 
 def format_path(path: Path | str) -> str:
-    """Path as a text that every file and page can hold: what of it is no UTF-8 stands there as escaped."""
+    """Return a path as valid UTF-8, with invalid bytes escaped."""
     return str(path).encode("utf-8", "backslashreplace").decode()
 
 
 def compute_change_mark(folder: Path, file: str = "") -> tuple[int, ...]:
-    """Changes with machine.toml, the journal, the names in taps/, and a file in the folder where one is named."""
+    """Return a mark that changes with machine.toml, the journal, the names in taps/, and one more file."""
     stats = []
     for name in (*WATCHED_FILES, file) if file else WATCHED_FILES:
         try:
@@ -41,10 +38,29 @@ def compute_change_mark(folder: Path, file: str = "") -> tuple[int, ...]:
 
 
 def make_machine_folder(folder: Path, template: str) -> Path:
-    """A machine folder from a template of sim_data, named after itself; DataError where there is one already.
+    """Make a machine folder from a template of sim_data, named after itself.
 
-    ValueError for a folder whose name holds control characters.
+    Parameters
+    ----------
+    folder
+        New folder.
+    template
+        File name of the template.
 
+    Returns
+    -------
+    Path
+        The new machine.toml.
+
+    Raises
+    ------
+    DataError
+        If there is a machine.toml already.
+    ValueError
+        If the name contains control characters.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as parent:
@@ -57,7 +73,7 @@ def make_machine_folder(folder: Path, template: str) -> Path:
 
 
 def make_machine_text(folder: Path, template: str) -> str:
-    """Text of the machine.toml of a folder to be made; DataError where there is one already."""
+    """Return the text of a new machine.toml; DataError if there is one already."""
     name = folder.resolve().name or "machine"  # the root of a disk has no name
     check_name(name, "folder")
     toml = folder / "machine.toml"
@@ -69,7 +85,7 @@ def make_machine_text(folder: Path, template: str) -> str:
 
 
 def write_machine_file(folder: Path, text: str) -> Path:
-    """Write the machine.toml of a folder, which is made where it is not there."""
+    """Write the machine.toml of a folder, which is made if necessary."""
     make_folder(folder)
     toml = folder / "machine.toml"
     atomic_write(toml, text.encode())

@@ -23,11 +23,11 @@ from acquisition.errors import PERMISSION_ERRNOS
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, make_folder, read_regular_file
 
 LOCK_NAME, LOCK_HOLDER_NAME = ".lock", ".lock.holder"
-"""Names of the file that is locked, and of that which says who holds it: a locked file cannot be read everywhere."""
+"""Names of the locked file, and of the file that tells who holds the lock: some systems cannot read a locked file."""
 LOCK_TIMEOUT = 5.0
-"""Time for which another program is waited for (s); as SQLite does by default in Python."""
+"""Time to wait for another program (s), as SQLite in Python."""
 LOCK_POLL_INTERVAL = 0.01
-"""Time between two looks whether it is done (s)."""
+"""Time between two attempts (s)."""
 
 READ_ONLY_HINT = "it can be read, not written; copy it to where you may write"
 NO_LOCKS_HINT = (
@@ -36,50 +36,48 @@ NO_LOCKS_HINT = (
 
 
 class BusyError(DataError):
-    """Another program writes to the folder."""
+    """Raised when another program writes to the folder."""
 
 
 class LockHolder(msgspec.Struct, frozen=True):
-    """The program that holds the lock."""
+    """Program that holds the lock."""
 
     command: str
-    """Command that a person has given, without what it is about."""
+    """Command without its arguments."""
     process: int
-    """Number of its process."""
+    """Process identifier."""
     since: datetime
-    """Time from which on it holds the lock."""
+    """Time since which it holds the lock."""
 
     @classmethod
     def current(cls) -> Self:
-        """This program, from now on."""
+        """Return this program."""
         program, *arguments = sys.argv or [""]
         name = "python" if program in ("", "-", "-c") else Path(program).stem
         words = [name, *[word for word in arguments if not word.startswith("-")][:1]]
         return cls(" ".join(words), os.getpid(), datetime.now(UTC))
 
     def __str__(self) -> str:
-        """For people."""
         return f"`{self.command}` (process {self.process}, since {self.since.astimezone():%H:%M})"
 
 
 class _ThreadState(threading.local):
-    """What a thread holds."""
+    """State of a thread."""
 
     holds = False
 
 
 class FolderLock:
-    """Of one folder; whoever has this object may hold it several times over in one thread."""
+    """Lock of one folder; a thread may hold it several times over."""
 
     def __init__(self, folder: Path) -> None:
-        """Not held yet."""
-        self._folder, self._thread = folder, _ThreadState()
+        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, _ThreadState()
 
     @contextlib.contextmanager
     def hold(self, patience: float) -> Iterator[None]:
-        """Keep other programs from writing here; BusyError where one does for longer than `patience` (s).
+        """Keep other programs from writing here; BusyError if one does for longer than `patience` (s).
 
-        OSError where this folder is not there, can only be read, or nothing can be locked there.
+        Raises OSError if the folder is missing, cannot be written, or its file system has no locks.
         """
         if self._thread.holds:
             yield
@@ -97,7 +95,7 @@ class FolderLock:
                     self._holder.unlink(missing_ok=True)
 
     def _acquire(self, patience: float, stack: contextlib.ExitStack) -> None:
-        """Until the stack is closed. A folder that is away, below a drive say, is not made again."""
+        """Acquire the lock until the stack is closed; a missing folder, for example of a removed drive, is not made."""
         try:
             handle = os.open(self._folder / LOCK_NAME, os.O_RDWR | os.O_CREAT, 0o644)
             stack.callback(os.close, handle)
@@ -116,12 +114,8 @@ class FolderLock:
                 raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
             time.sleep(LOCK_POLL_INTERVAL)
 
-    @property
-    def _holder(self) -> Path:
-        return self._folder / LOCK_HOLDER_NAME
-
     def _read_holder(self) -> LockHolder | None:
-        """What the program that holds the lock says of itself; None where it has not said it yet."""
+        """Return the program that holds the lock; None until it has written its name."""
         try:
             return msgspec.json.decode(read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE), type=LockHolder)
         except (OSError, msgspec.MsgspecError):
@@ -129,23 +123,21 @@ class FolderLock:
 
 
 RESERVE_BYTES = 50_000_000
-"""Room that a tap test needs."""
+"""Disk space that a tap test needs (bytes)."""
 UNSUPPORTED_ERRNOS = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)
-"""Errors of file systems that hold no room for a file."""
+"""Errors of file systems that cannot reserve space."""
 
 
 class DiskReserve:
-    """Held between __enter__ and __exit__; where a system cannot hold room, it is only looked whether there is enough.
+    """Disk space reserved for a tap test in a file that is released when the disk is full.
 
-    A program that was killed leaves the file; the next one takes it over.
+    Systems that cannot reserve space only check the free space. A killed program leaves the file to the next one.
     """
 
     def __init__(self, folder: Path) -> None:
-        """folder: of the machine."""
         self._folder, self._file = folder, folder / "spool" / ".reserve"
 
     def __enter__(self) -> Self:
-        """Hold the room; DataError where there is not so much."""
         self.release()
         if shutil.disk_usage(self._folder).free < RESERVE_BYTES:
             raise self._full()
@@ -157,11 +149,10 @@ class DiskReserve:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give it up."""
         self.release()
 
     def release(self) -> bool:
-        """Give it up; whether there was any that could be given up: what stays is taken over by the next test."""
+        """Release the space, and tell whether there was any; a file that stays is used by the next test."""
         try:
             self._file.unlink()
         except OSError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,29 +12,30 @@ from typing import Any
 from acquisition import DataError, Remark, read_tap
 from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
 from acquisition.files.cut_file import read_cut_signal
+from lobewatch.machine import folder_contents as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_contents import (
-    find_file_fault,
-    hash_file,
-    list_tap_files,
-    read_committed_cuts,
-    read_committed_taps,
-    read_given_up_ids,
-)
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, parse_cut_line
-from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal
+from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
+DAMAGED_FOLDER_NAME = "damaged"
+"""Name of the folder for damaged files."""
+LOST_ENTRIES_HINT = (
+    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
+    "(folder_updates.add_event, machine.folder_updates.exclude_entry, MachineFolder.accept, folder_updates.store_cut)"
+)
+"""Advice on entries that no copy of the journal has."""
 
-def verify_cut_recordings(
-    folder: Path, cuts: Sequence[CutEntry], given_up: Collection[str], mend: str
-) -> Iterator[Remark]:
-    """Remarks on recordings that are altered, missing or unlisted; mend: the command that puts them right."""
+
+def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Remark]:
+    """Yield remarks on recordings that are altered, missing or unlisted."""
+    cuts, given_up = contents.read_committed_cuts(reading), contents.read_given_up_ids(reading)
+    mend = format_command("rebuild", folder)
     for cut in cuts:
-        fault = _find_recording_fault(folder, cut.recording)
+        fault = "" if cut.recording is None else contents.find_file_fault(folder, cut.recording)
         if not fault or cut.recording is None:
             continue
         text = f"{fault}; what was heard in it counts"
@@ -47,42 +48,39 @@ def verify_cut_recordings(
         yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal, does not count", f"{mend} looks into it")
 
 
-def repair_cut_recordings(folder: Path, journal: Journal, put_aside: Callable[[Path], Path]) -> Iterator[str]:
-    """Enter whole recordings without a line, put others aside, delete none; what was done, a sentence each.
+def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
+    """Enter sound recordings without a line, set others aside, and report it in sentences.
 
-    What was heard in a recording that is lost stands in its line and goes on to count.
+    The result of a lost recording is in its journal line and stays valid.
     """
-    for path in _list_unlisted_cuts(folder, read_committed_cuts(journal.read())):
+    for path in _list_unlisted_cuts(folder, contents.read_committed_cuts(journal.read())):
         cut = _read_unlisted_cut(path)
-        if cut is None or cut.id in {entered.id for entered in read_committed_cuts(journal.read())}:
-            yield f"cuts/{path.name}: put into {put_aside(path).relative_to(folder).as_posix()}"
+        if cut is None or cut.id in {entered.id for entered in contents.read_committed_cuts(journal.read())}:
+            yield f"cuts/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}"
             continue
         content = read_regular_file(path)
         recording = RecordingFile(cut.id, hashlib.sha256(content).hexdigest(), len(content))
         journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
         yield f"cuts/{path.name}: entered in the journal"
     reading = journal.read()
-    for lost in _find_damaged_recordings(folder, read_committed_cuts(reading)):
+    recordings = [cut.recording for cut in contents.read_committed_cuts(reading) if cut.recording is not None]
+    for lost in [recording for recording in recordings if contents.find_file_fault(folder, recording)]:
         if (folder / lost.file).exists():
-            put_aside(folder / lost.file)
-        if lost.id not in read_given_up_ids(reading):
+            _move_to_damaged(folder, folder / lost.file)
+        if lost.id not in contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": lost.id, "time": datetime.now(UTC).isoformat()})
             yield f"{lost.file}: lost; what was heard in it goes on to count"
 
 
 def _list_unlisted_cuts(folder: Path, cuts: Sequence[CutEntry]) -> list[Path]:
-    """Files in cuts/ without a line, none that is being written."""
+    """Return the finished files in cuts/ without a line."""
     listed = {f"{cut.id}.h5" for cut in cuts if cut.recording is not None}
     files = sorted((folder / "cuts").glob("*")) if (folder / "cuts").is_dir() else []
     return [path for path in files if path.name not in listed and not path.name.startswith(".")]
 
 
-def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[RecordingFile]:
-    return [cut.recording for cut in cuts if cut.recording is not None and _find_recording_fault(folder, cut.recording)]
-
-
 def _read_unlisted_cut(path: Path) -> CutEntry | None:
-    """The test cut that a recording without a line is of; None where it is no whole one, or has another name."""
+    """Return the test cut of a recording without a line; None if it is damaged or misnamed."""
     try:
         _, about = read_cut_signal(path)
         cut = parse_cut_line(about)
@@ -91,30 +89,18 @@ def _read_unlisted_cut(path: Path) -> CutEntry | None:
     return cut if f"{cut.id}.h5" == path.name else None
 
 
-def _find_recording_fault(folder: Path, recording: RecordingFile | None) -> str:
-    return "" if recording is None else find_file_fault(folder, recording)
-
-
-DAMAGED_FOLDER_NAME = "damaged"
-"""Name of the folder of what was put out of the way."""
-LOST_ENTRIES_HINT = (
-    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
-    "(lobewatch event, exclude, replay --accept, observe)"
-)
-"""Advice on corrections that no copy of the journal has."""
-
-
 def rebuild_files(path: Path) -> list[str]:
-    """Mend machine.toml where it is missing, taps/, the journal and daq.json; what was done, a sentence each.
+    """Repair machine.toml, taps/, the journal and daq.json, and report it in sentences.
 
-    DataError where this is no machine folder, BusyError where another program writes.
+    Damaged files are moved away, never deleted. Raises DataError if this is no machine folder, BusyError if another
+    program writes.
     """
-    if not (path / "machine.toml").is_file() and not list_tap_files(path):
+    if not (path / "machine.toml").is_file() and not contents.list_tap_files(path):
         MachineFolder(path)
     with FolderLock(path).hold(LOCK_TIMEOUT):
         journal = Journal(path)
         reading = journal.read()
-        committed = read_committed_taps(reading)
+        committed = contents.read_committed_taps(reading)
         report = [*_restore_misplaced(path, committed)]
         fresh = _enter_unlisted_taps(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
@@ -126,13 +112,13 @@ def rebuild_files(path: Path) -> list[str]:
                 journal.append(entry.line)
         report += [f"{entry.file}: entered in the journal" for entry in fresh]
         report += _record_lost_taps(path, journal)
-        report += repair_cut_recordings(path, journal, lambda file: _move_to_damaged(path, file))
+        report += _repair_cut_recordings(path, journal)
         report += [*_restore_machine_file(path), *_repair_devices_file(path)]
     return report
 
 
 def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
-    """Lines that no copy of the journal has; n_fresh: tap tests that were entered anew in place of theirs."""
+    """Yield lines that no copy of the journal has; n_fresh: newly entered tap tests in their place."""
     if not entries:
         yield f"{JOURNAL_NAME}: nothing of it or of its copy could be read; {LOST_ENTRIES_HINT}"
         return
@@ -144,16 +130,16 @@ def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) ->
 
 
 def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
-    """Give files with the content of another tap test back to that where its own is wrong, else put them aside."""
+    """Rename swapped tap files back where the right file is damaged, else set them aside."""
     by_content = {entry.sha256: entry for entry in committed.values()}
     misplaced: dict[Path, TapEntry] = {}
-    for path in list_tap_files(folder).values():
-        entry = by_content.get(hash_file(path))
+    for path in contents.list_tap_files(folder).values():
+        entry = by_content.get(contents.hash_file(path))
         if entry is not None and path != folder / entry.file:
             misplaced[path] = entry
     asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced.items()}
     for aside, entry in asides.items():
-        if find_file_fault(folder, entry):
+        if contents.find_file_fault(folder, entry):
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
@@ -164,9 +150,9 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
 
 
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
-    """Give whole tap files without a line their own names and return them; put all others without one aside."""
+    """Return the entries of sound tap files without a line, renamed if necessary; set all others aside."""
     entries = []
-    for name, path in list_tap_files(folder).items():
+    for name, path in contents.list_tap_files(folder).items():
         if name in committed:
             continue
         entry = read_unverified_tap(path)
@@ -181,20 +167,20 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
 
 
 def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
-    """Write down that all goes on without the tap tests that cannot be had back."""
+    """Write to the journal which tap tests are lost."""
     reading = journal.read()
-    for name, entry in read_committed_taps(reading).items():
-        if not find_file_fault(folder, entry):
+    for name, entry in contents.read_committed_taps(reading).items():
+        if not contents.find_file_fault(folder, entry):
             continue
         if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
             _move_to_damaged(folder, folder / entry.file)
-        if name not in read_given_up_ids(reading):
+        if name not in contents.read_given_up_ids(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
 
 def _is_temporarily_unreadable(path: Path) -> bool:
-    """Whether a file cannot be read just now; it stays where it is."""
+    """Tell whether a file cannot be read at the moment; it stays where it is."""
     try:
         read_regular_file(path)
     except IrregularFileError:
@@ -205,14 +191,13 @@ def _is_temporarily_unreadable(path: Path) -> bool:
 
 
 def _restore_machine_file(folder: Path) -> Iterator[str]:
-    """Take a missing machine.toml from the newest tap test that has a copy."""
+    """Restore a missing machine.toml from the newest tap test with a copy."""
     toml = folder / "machine.toml"
     if toml.exists():
         return
-    entries = [
-        entry for entry in read_committed_taps(Journal(folder).read()).values() if not find_file_fault(folder, entry)
-    ]
-    for entry in sorted(entries, key=lambda entry: entry.time, reverse=True):
+    committed = contents.read_committed_taps(Journal(folder).read()).values()
+    sound = [entry for entry in committed if not contents.find_file_fault(folder, entry)]
+    for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
             atomic_write(toml, text.encode())
@@ -231,7 +216,7 @@ def _repair_devices_file(folder: Path) -> Iterator[str]:
 
 
 def _move_to_damaged(folder: Path, path: Path) -> Path:
-    """Move a file into the folder of what is damaged, under a name that nothing has there."""
+    """Move a file to the folder for damaged files under an unused name."""
     make_folder(folder / DAMAGED_FOLDER_NAME)
     aside, number = folder / DAMAGED_FOLDER_NAME / path.name, 1
     while aside.exists():

@@ -1,7 +1,7 @@
-"""File of checksummed rows that can be appended to.
+"""File of rows with checksums that is appended to.
 
-The file begins with a line that names its make; then come rows, each its length and its CRC-32 (4 bytes each, little
-endian) and its bytes. What a crash leaves of a row counts for nothing and is written over by the next.
+The file begins with a line that names its format. Each row is its length and its CRC-32 (4 bytes each, little endian)
+and its bytes. The rest of a row after a crash is ignored, and the next row overwrites it.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ _ROW_HEADER = struct.Struct("<II")
 
 @dataclass(frozen=True)
 class RowFile:
-    """Contents of a file of rows."""
+    """Contents of a row file."""
 
     rows: tuple[bytes, ...]
-    """Rows from the first on, as far as they are sound."""
+    """Sound rows from the first one on."""
     sound_bytes: int
-    """Bytes of the file up to the end of the last of them."""
+    """Size up to the end of the last sound row (bytes)."""
     file_bytes: int
-    """Bytes of the whole file."""
+    """Size of the file (bytes)."""
     is_damaged: bool
-    """Whether something is behind them that no crash has left."""
+    """Whether there is more after the rows than a crash leaves."""
 
 
 def read_rows(path: Path) -> RowFile:
-    """The sound rows of a file; FileNotFoundError where there is none."""
+    """Read the sound rows of a file; FileNotFoundError without one."""
     content = read_regular_file(path)
     if not content.startswith(ROW_FILE_HEADER):
         return RowFile((), 0, len(content), not ROW_FILE_HEADER.startswith(content))
@@ -54,16 +54,16 @@ def read_rows(path: Path) -> RowFile:
 
 
 def write_rows(path: Path, rows: Iterable[bytes]) -> int:
-    """Write the whole file anew, complete under its name or the old one as it was; returns its size (bytes)."""
+    """Write the whole file atomically and return its size (bytes)."""
     content = ROW_FILE_HEADER + _pack_rows(rows)
     atomic_write(path, content)
     return len(content)
 
 
 def append_rows(path: Path, size: int, rows: Sequence[bytes]) -> int:
-    """Write rows behind the first bytes of a file, as many as `read_rows` said; returns the new size (bytes).
+    """Append rows after the sound bytes of a file and return the new size (bytes).
 
-    To be called under a lock. Not made to outlast a power cut: what is worked out can be worked out again.
+    Call it under the lock. It does not wait for the disk: rows can be computed again.
     """
     content = _pack_rows(rows)
     with path.open("r+b", buffering=0) as file:

@@ -14,20 +14,9 @@ from acquisition import DataError, Remark, Trigger
 from acquisition.errors import format_error
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from acquisition.files.hdf5_file import has_valid_checksum
+from lobewatch.machine import folder_contents as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_contents import (
-    find_file_fault,
-    has_known_origin,
-    hash_file,
-    list_tap_files,
-    missing_journal_remark,
-    read_committed_cuts,
-    read_committed_taps,
-    read_given_up_ids,
-    tap_damage_remark,
-    unlisted_file_remark,
-)
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
 from lobewatch.machine.journal.journal import JOURNAL_COPY_NAME, JOURNAL_NAME, Journal, JournalReading, format_command
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -36,24 +25,15 @@ from lobewatch.machine.rebuild_files import verify_cut_recordings
 from lobewatch.machine.row_file import read_rows
 
 DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
-"""Codes of remarks that are damage; those of all others are for information."""
-LOBEWATCH_FILES = (
-    JOURNAL_NAME,
-    JOURNAL_COPY_NAME,
-    "machine.toml",
-    "history.rows",
-    "daq.json",
-    "standing.json",
-    "told.json",
-    "unsent.json",
-    "report.html",
-    LOCK_NAME,
-    LOCK_HOLDER_NAME,
-    "taps",
-    "cuts",
-    "spool",
-)
-"""Names in the folder of a machine that lobewatch gives."""
+"""Codes of remarks on damage; all others are information."""
+DERIVED_FILES = ("history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "report.html")
+"""Files that are made again if they are deleted."""
+LOBEWATCH_FILES = {JOURNAL_NAME, JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml", *DERIVED_FILES}
+"""Files in a machine folder that lobewatch writes."""
+LOBEWATCH_FOLDERS = {"taps", "cuts", "spool"}
+"""Folders in a machine folder that lobewatch makes."""
+ALTERED_TEXT = "altered or cut short since it was written"
+"""Fault of a file with a wrong checksum."""
 
 
 @dataclass(frozen=True)
@@ -63,114 +43,131 @@ class Verification:
     remarks: tuple[Remark, ...]
     """Remarks on all files, damage and information."""
     entered: tuple[str, ...]
-    """Tap files that an ended program had not entered in the journal; they are now."""
+    """Tap files that an interrupted program had not entered in the journal; now they are."""
     n_taps: int
-    """Tap files that are as they were committed."""
+    """Number of tap files with the committed content."""
 
     @property
     def damage(self) -> tuple[Remark, ...]:
-        """Remarks on what is not as it was written."""
+        """Remarks on damage."""
         return tuple(remark for remark in self.remarks if remark.code in DAMAGE_CODES)
 
 
 def verify(path: Path) -> Verification:
-    """Look at every byte; a whole tap file that its spool or its recording explains is entered in the journal.
+    """Verify every byte of a machine folder.
 
-    DataError where this is no machine folder.
+    A sound tap file of an interrupted program, whose spool or recording explains it, is entered in the journal.
+
+    Parameters
+    ----------
+    path
+        Machine folder.
+
+    Returns
+    -------
+    Verification
+        Remarks on damaged, missing, extra, swapped and renamed files.
+
+    Raises
+    ------
+    DataError
+        If this is no machine folder.
     """
-    if not (path / "machine.toml").is_file() and list_tap_files(path):
-        cure = f"put it back from a backup; without one, {format_command('rebuild', path)} takes the copy in the newest tap test"
-        missing = damaged_file_remark("machine.toml", "is missing beside tap tests", cure)
+    if not (path / "machine.toml").is_file() and contents.list_tap_files(path):
+        mend = format_command("rebuild", path)
+        cure = f"put it back from a backup; without one, {mend} takes the copy in the newest tap test"
+        missing = _damaged_file_remark("machine.toml", "is missing beside tap tests", cure)
         return Verification((missing,), (), 0)
     folder = MachineFolder(path)
-    journal = folder.journal
-    adopted = enter_orphaned_taps(folder)
-    reading = journal.read()
-    committed = read_committed_taps(reading)
-    faults = {name: fault for name, entry in committed.items() if (fault := find_file_fault(path, entry))}
+    entered = enter_orphaned_taps(folder)
+    reading = folder.journal.read()
+    committed = contents.read_committed_taps(reading)
+    faults = {name: fault for name, entry in committed.items() if (fault := contents.find_file_fault(path, entry))}
     remarks = [
         *reading.damage,
         *_verify_taps(path, reading, committed, faults),
-        *verify_cut_recordings(
-            path, read_committed_cuts(reading), read_given_up_ids(reading), format_command("rebuild", path)
-        ),
+        *verify_cut_recordings(path, reading),
         *_verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults]),
         *_verify_history(folder),
         *_verify_devices(folder),
-        *verify_spool(path, committed.keys() - faults.keys()),
+        *_verify_spool(path, committed.keys() - faults.keys()),
         *_verify_names(path),
     ]
-    return Verification(tuple(remarks), tuple(adopted), len(committed) - len(faults))
+    return Verification(tuple(remarks), tuple(entered), len(committed) - len(faults))
 
 
 def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
-    """Enter in the journal what an ended program has stored and not entered; the files entered.
+    """Enter tap files of an interrupted program in the journal, and return the files.
 
-    Nothing where another program writes, the journal is damaged, or the folder cannot be written.
+    Nothing happens if another program writes, the journal is damaged, or the folder cannot be written.
     """
-    journal, adopted = folder.journal, list[str]()
+    journal, entered = folder.journal, list[str]()
     try:
         with folder.locked(patience=0):
-            committed = set(read_committed_taps(journal.read()))
-            for name, path in list_tap_files(folder.path).items():
+            committed = set(contents.read_committed_taps(journal.read()))
+            for name, path in contents.list_tap_files(folder.path).items():
                 entry = read_unverified_tap(path) if name not in committed else None
-                if entry is not None and entry.id == name and has_known_origin(folder.path, entry):
+                if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
                     journal.append(entry.line)
-                    adopted.append(entry.file)
+                    entered.append(entry.file)
     except (DataError, OSError):
-        return adopted
-    return adopted
+        return entered
+    return entered
 
 
 def _verify_taps(
     folder: Path, reading: JournalReading, committed: dict[str, TapEntry], faults: dict[str, str]
 ) -> Iterator[Remark]:
-    by_content, given_up = {entry.sha256: entry for entry in committed.values()}, read_given_up_ids(reading)
-    files = list_tap_files(folder)
-    late = read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
+    by_content, given_up = {entry.sha256: entry for entry in committed.values()}, contents.read_given_up_ids(reading)
+    files = contents.list_tap_files(folder)
+    late = contents.read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
     extra = [path for name, path in files.items() if name not in committed and name not in late]
     if not reading.lines and not reading.damage and extra:
-        yield missing_journal_remark(folder, len(extra))
+        yield contents.missing_journal_remark(folder, len(extra))
     for name, fault in faults.items():
         entry, path = committed[name], folder / committed[name].file
-        namesake = by_content.get(hash_file(path))
+        namesake = by_content.get(contents.hash_file(path))
         text = f"it is {namesake.file} under another name" if namesake else fault
-        yield tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
+        yield contents.tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
-        original = by_content.get(hash_file(path))
+        original = by_content.get(contents.hash_file(path))
         yield _unlisted_tap_remark(folder, path, original, original is not None and original.id in faults)
 
 
 def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is_needed: bool) -> Remark:
-    """Remark on a tap file without a line; original: the committed tap test with the same content."""
+    """Return the remark on a tap file without a line; original: committed tap test with the same content."""
     mend = format_command("rebuild", folder)
     if original is not None and is_needed:
-        return unlisted_file_remark(path, f"it is {original.file} under another name", f"{mend} gives it its name back")
+        return contents.unlisted_file_remark(
+            path, f"it is {original.file} under another name", f"{mend} gives it its name back"
+        )
     if original is not None:
-        return unlisted_file_remark(path, f"a copy of {original.file}", f"{mend} puts it out of the way")
+        return contents.unlisted_file_remark(path, f"a copy of {original.file}", f"{mend} puts it out of the way")
     entry = read_unverified_tap(path)
     if entry is None:
-        return unlisted_file_remark(path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way")
-    if entry.id != path.stem:
-        return unlisted_file_remark(path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in")
-    if has_known_origin(folder, entry):
-        cure = f"{format_command('verify', folder)} enters it where nobody else writes"
-        return Remark(
-            "not-entered", f"taps/{path.name}", "not entered in the journal by the program that wrote it", cure
+        return contents.unlisted_file_remark(
+            path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way"
         )
+    if entry.id != path.stem:
+        return contents.unlisted_file_remark(
+            path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in"
+        )
+    if contents.has_known_origin(folder, entry):
+        cure = f"{format_command('verify', folder)} enters it where nobody else writes"
+        text = "not entered in the journal by the program that wrote it"
+        return Remark("not-entered", f"taps/{path.name}", text, cure)
     cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
-    return unlisted_file_remark(path, "a whole tap file that is not in the journal", cure)
+    return contents.unlisted_file_remark(path, "a whole tap file that is not in the journal", cure)
 
 
 def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
-    """Remarks on machine.toml, compared with the copy in the newest tap test."""
+    """Compare machine.toml with the copy in the newest tap test."""
     try:
         _ = folder.machine
     except (ValueError, OSError) as error:
-        cure = (
-            "correct it; without a way to, move it away: lobewatch rebuild then takes the copy in the newest tap test"
-        )
-        yield damaged_file_remark("machine.toml", format_error(error), cure)
+        mend = "rebuild_files.rebuild_files then takes the copy in the newest tap test"
+        cure = f"correct it; without a way to, move it away: {mend}"
+        yield _damaged_file_remark("machine.toml", format_error(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
     copy = ""
@@ -194,92 +191,84 @@ def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
         fault = format_error(error).removeprefix(f"{folder.history_path}: ")
     if fault:
         cure = f"{format_command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield damaged_file_remark(folder.history_path.name, fault, cure)
+        yield _damaged_file_remark(folder.history_path.name, fault, cure)
 
 
 def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_stored_devices(folder)
     except (DataError, OSError) as error:
-        yield damaged_file_remark("daq.json", format_error(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+        yield _damaged_file_remark("daq.json", format_error(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield set_aside_remark(path.name, "left over or set aside", "delete it when you do not need it")
+            yield _set_aside_remark(path.name, "left over or set aside", "delete it when you do not need it")
         elif path.name == "report.html":
-            yield Remark(
-                "not-verified",
-                path.name,
-                "a report is not verified",
-                format_command("report", folder) + " writes it anew",
-            )
+            cure = f"{format_command('report', folder)} writes it anew"
+            yield _not_verified_remark(path.name, "a report is not verified", cure)
         elif path.name == "history.h5":
-            yield Remark(
-                "not-verified", path.name, "no cache any more, or an export", "delete it when you do not need it"
+            yield _not_verified_remark(
+                path.name, "no cache any more, or an export", "delete it when you do not need it"
             )
-        elif path.name not in LOBEWATCH_FILES:
-            yield Remark("not-verified", path.name, "no file of lobewatch")
-    taps, files = folder / "taps", {*list_tap_files(folder).values()}
+        elif path.name not in LOBEWATCH_FILES | LOBEWATCH_FOLDERS:
+            yield _not_verified_remark(path.name, "no file of lobewatch")
+    taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
-            yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
+            yield _not_verified_remark(f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
 
 
-ALTERED_TEXT = "altered or cut short since it was written"
+def _not_verified_remark(about: str, text: str, cure: str = "") -> Remark:
+    return Remark("not-verified", about, text, cure)
 
 
-def damaged_file_remark(about: str, text: str, cure: str = "") -> Remark:
-    """Remark on a file that is missing or not as it was written, and that nothing else has a word for."""
+def _damaged_file_remark(about: str, text: str, cure: str = "") -> Remark:
     return Remark("file-damaged", about, text, cure)
 
 
-def set_aside_remark(about: str, text: str, cure: str) -> Remark:
-    """Remark on a file that harms nothing."""
+def _set_aside_remark(about: str, text: str, cure: str) -> Remark:
     return Remark("set-aside", about, text, cure)
 
 
-def verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
-    """Remarks on the files of interrupted tests.
+def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
+    """Verify the files of interrupted tests, except those of saved tap tests.
 
-    saved: identities of tap tests that need theirs no more. What another program removes meanwhile is left out.
+    Files that another program removes meanwhile are left out.
     """
     spool = folder / "spool"
     for path in sorted(spool.rglob("*")) if spool.is_dir() else []:
         if path.relative_to(spool).parts[0] in saved:
             continue
         try:
-            yield from _verify_spooled_test(folder, path) if path.is_dir() else _verify_spooled_file(folder, path)
+            yield from __verify_spooled_test(folder, path) if path.is_dir() else __verify_spooled_file(folder, path)
         except FileNotFoundError:
             continue
         except OSError as error:
-            yield damaged_file_remark(
-                path.relative_to(folder).as_posix(), format_error(error).removeprefix(f"{path}: ")
-            )
+            about = path.relative_to(folder).as_posix()
+            yield _damaged_file_remark(about, format_error(error).removeprefix(f"{path}: "))
 
 
-def _verify_spooled_test(folder: Path, path: Path) -> Iterator[Remark]:
-    cure = (
-        f"put it back from a backup, or {format_command('tap', folder)} goes on with the others{_deletion_hint(path)}"
-    )
-    about = path.relative_to(folder).as_posix()
-    yield from (damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
+def __verify_spooled_test(folder: Path, path: Path) -> Iterator[Remark]:
+    about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
+    cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
+    yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
 
 
-def _verify_spooled_file(folder: Path, path: Path) -> Iterator[Remark]:
+def __verify_spooled_file(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
     if path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
         cure = f"{tap} sets it aside and goes on with the others{_deletion_hint(path.parent)}"
-        yield damaged_file_remark(about, ALTERED_TEXT, cure)
+        yield _damaged_file_remark(about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_deletion_hint(path.parent)}"
-        yield damaged_file_remark(about, ALTERED_TEXT, cure)
+        yield _damaged_file_remark(about, ALTERED_TEXT, cure)
     elif path.suffix == ".tmp":
-        yield set_aside_remark(about, "half written", f"{tap} removes it")
+        yield _set_aside_remark(about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
         cure = "delete it when you do not need it"
-        yield set_aside_remark(about, "a damaged file of an interrupted test", cure)
+        yield _set_aside_remark(about, "a damaged file of an interrupted test", cure)
 
 
 def _deletion_hint(test: Path) -> str:
@@ -296,7 +285,7 @@ def _is_valid_setup(path: Path) -> bool:
 
 
 def _find_missing_hits(test: Path) -> list[str]:
-    """Names of hits that must have been there: one with a higher number is, and none was set aside under theirs."""
+    """Return the names of hits below the highest number that neither exist nor were set aside."""
     numbers = [int(path.stem) for path in test.glob("[0-9]*.h5") if path.stem.isdigit()]
     names = [f"{number:04d}.h5" for number in range(max(numbers, default=0)) if number not in numbers]
     return [name for name in names if not list(test.parent.glob(f"{test.name}-{name}*.damaged"))]

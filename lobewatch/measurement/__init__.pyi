@@ -1,4 +1,4 @@
-"""One tap test or one recorded file to what it measures: modes, followed mode, calibrated model; questions; workers."""
+"""Measurement of one tap test or recorded file: modes, followed mode, calibrated model, questions."""
 
 from .estimate import Estimate
 from .exponential_window import Window

@@ -1,6 +1,6 @@
 """Check the date of a tap test against the clock.
 
-Imported with every look at a plant, so without numpy and tap files.
+The fleet overview imports this module, so it needs neither numpy nor tap files.
 """
 
 from __future__ import annotations
@@ -12,38 +12,36 @@ from pathlib import Path
 
 from acquisition import Remark
 
-CLOCK_BEHIND, CLOCK_BEFORE_RELEASE, CLOCK_AHEAD = CLOCK_QUESTIONS = (
-    "clock-behind",
-    "clock-before-release",
-    "clock-ahead",
-)
-"""Codes of what is asked about a time, as they stand in the journal line of the test."""
 FIRST_RELEASE = datetime(2026, 1, 1, tzinfo=UTC)
-"""Day before the first release of lobewatch: no test is older."""
+"""Day before the first release of lobewatch; no test is older."""
 MAX_TIME_AHEAD = timedelta(days=1)
-"""Time ahead that no time zone accounts for."""
+"""Largest time ahead that a time zone explains."""
+CLOCK_BEHIND, CLOCK_BEFORE_RELEASE, CLOCK_AHEAD = "clock-behind", "clock-before-release", "clock-ahead"
+CLOCK_QUESTIONS = {
+    CLOCK_BEHIND: "before the newest test that was there",
+    CLOCK_BEFORE_RELEASE: f"before the first release of this program, {FIRST_RELEASE:%Y-%m-%d}",
+    CLOCK_AHEAD: "more than a day in the future",
+}
+"""Reason of each question about the time of a test, by its code in the journal."""
 
 
 def is_in_future(time: datetime, now: datetime) -> bool:
-    """Whether a time lies in the future, whatever its zone."""
+    """Tell whether a time is in the future, whatever its time zone."""
     return time - now > MAX_TIME_AHEAD
 
 
 def clock_question(code: str, time: str) -> Remark:
-    """The question of a code; time: of the test (ISO 8601)."""
-    why = {
-        CLOCK_BEHIND: "before the newest test that was there",
-        CLOCK_BEFORE_RELEASE: f"before the first release of this program, {FIRST_RELEASE:%Y-%m-%d}",
-        CLOCK_AHEAD: "more than a day in the future",
-    }[code]
+    """Return the question of a code about the time of a test (ISO 8601); KeyError for an unknown code."""
     when = f"{datetime.fromisoformat(time).astimezone(UTC):%Y-%m-%d %H:%M} UTC"
     cure = "put the clock of the computer right and tap again; exclude the test with the wrong time"
-    return Remark(code, when, f"its time, {when}, is {why}: was the clock of the computer right?", cure)
+    return Remark(
+        code, when, f"its time, {when}, is {CLOCK_QUESTIONS[code]}: was the clock of the computer right?", cure
+    )
 
 
 def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | str) -> Iterator[Remark]:
-    """Remark on a newest test of the future: the clock was wrong then, or is now. path: of the folder."""
+    """Yield a remark on a newest test with a date in the future; path: machine folder."""
     if is_in_future(time, now):
-        out = shlex.join(["lobewatch", "exclude", str(path), tap_id, "--reason", "clock was wrong"])
+        out = f"{shlex.join(['lobewatch', 'exclude', str(path), tap_id])} exclude_entry.reason 'clock was wrong'"
         cure = f"Put the clock right; if it was wrong at that test, take it out and tap again: {out}"
         yield Remark("tap-in-future", f"tap test {tap_id}", f"dated {time:%Y-%m-%d}, in the future", cure)

@@ -1,4 +1,4 @@
-"""A value with its standard error, and by how much it has changed."""
+"""Value with its standard error."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Estimate(NamedTuple):
-    """A value and its standard error, in any unit.
+    """Value with its standard error, in any unit.
 
     >>> first, now = Estimate(700.0, 0.5), Estimate(665.0, 0.5)  # Hz
     >>> change = now.change_since(first)
@@ -16,9 +16,9 @@ class Estimate(NamedTuple):
     """
 
     value: float
-    """Value; NaN where it is not known."""
+    """Value; NaN if unknown."""
     std: float = math.nan
-    """Standard error, same unit; NaN where it is not known."""
+    """Standard error in the same unit; NaN if unknown."""
 
     @property
     def is_known(self) -> bool:
@@ -26,11 +26,17 @@ class Estimate(NamedTuple):
         return math.isfinite(self.value)
 
     def change_since(self, then: Estimate) -> Estimate:
-        """Relative change (%), positive for a rise, with the standard error that both errors give it."""
+        """Return the relative change (%) since an earlier value, positive for a rise.
+
+        Parameters
+        ----------
+        then
+            Earlier value, whose standard error is propagated too.
+        """
         ratio = self.value / then.value
         error = math.hypot(then.std / then.value, self.std / self.value)
         return Estimate(100 * (ratio - 1), 100 * abs(ratio) * error)
 
 
 UNKNOWN_ESTIMATE = Estimate(math.nan)
-"""No value."""
+"""Unknown value."""

@@ -26,39 +26,36 @@ from modal import ConjugateError, pick_peaks
 ACCEPTABLE_FLAGS = (
     HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 )
-"""Verdicts that can be accepted: a hit with others has no single pulse, or not all of its scans."""
+"""Faults of hits that can be accepted; hits with others have no single pulse, or lost scans."""
 
 
 @dataclass(frozen=True, eq=False)
 class FileFrf:
-    """An FRF with the hits behind it."""
+    """FRF of a recorded file with its hits."""
 
     frf: Frf | None
-    """FRF as it was read, or the average of the hits; None where no force was measured."""
+    """FRF of the file, or the average of its hits; None without force."""
     hits: tuple[Hit, ...] = ()
-    """Hits that it was averaged from; none where the file holds only an FRF."""
+    """Averaged hits; empty if the file contains only an FRF."""
     time_constant: float | None = None
-    """Time constant of the window that was laid over all hits here (s); None where none was."""
+    """Time constant of our own window over all hits (s); None without one."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what was done to the hits."""
     facts: tuple[Fact, ...] = ()
-    """Facts known of the file, and where each is from."""
+    """Facts of the file with their origins."""
     recorded_window: float | None = None
-    """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
+    """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
 
 
 def read_file_frf(
     path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
 ) -> FileFrf:
-    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `fit_file_modes`.
+    """Read the FRF of a file with its hits; see `fit_file_modes`.
 
-    window, conjugate: as they are said, so that what is missing of them is asked for with all else.
+    window, conjugate: as given, so that missing window data is requested together with all other missing data.
     """
-    accepted, averages, description = (
-        _parse_accepted_flags(accept),
-        description.averages,
-        replace(description, averages=None),
-    )
+    accepted, averages = _parse_accepted_flags(accept), description.averages
+    description = replace(description, averages=None)
     recording = inspect_file(path, description)
     if recording.problems:
         phase = "" if conjugate else _check_phase(path, description)
@@ -67,13 +64,13 @@ def read_file_frf(
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:
-        raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+        raise ValueError(f"Description.averages {averages}: {path.name} holds hits, and they are counted; leave it out")
     frf = _average_hits(path, recording.hits, accepted, description)
     return replace(frf, facts=recording.facts, recorded_window=recording.window)
 
 
 def _check_phase(path: Path, description: Description) -> str:
-    """What is wrong with the phase of an FRF that only its unit or its number is missing of; empty where nothing is."""
+    """Return the fault of the phase of an FRF whose unit or response number is missing, else an empty text."""
     unit, response = description.unit or "m/N", description.response or 1
     frf = inspect_file(path, replace(description, unit=unit, response=response)).frf
     try:
@@ -110,28 +107,34 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            raise ValueError(f"--accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}")
+            raise ValueError(
+                f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}"
+            )
         accepted |= flags[code]
     return accepted
 
 
 def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
     frf, windowed, tau = window_ringing_hits(hits)
-    remark = own_window_remark("", tau, "a longer record needs none; --accept not-decayed takes the hits as they are")
+    remark = own_window_remark(
+        "", tau, "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
+    )
     return FileFrf(frf, windowed, tau, (remark,))
 
 
 def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
-    """An FRF of a file with the number of hits behind its coherence: as asked, else as the file says, else inferred."""
+    """Set the number of averages behind the coherence: as given, else as in the file, else inferred."""
     if averages is not None:
         if averages < 1:
-            raise ValueError(f"--averages {averages}: give the number of hits averaged, 1 or more")
+            raise ValueError(f"Description.averages {averages}: give the number of hits averaged, 1 or more")
         if frf.coherence is None:
-            raise ValueError(f"--averages {averages}: {path.name} has no coherence to use it with; leave it out")
+            raise ValueError(
+                f"Description.averages {averages}: {path.name} has no coherence to use it with; leave it out"
+            )
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = infer_averages(frf), "give it with --averages"
+    inferred, cure = infer_averages(frf), "give it with Description.averages"
     if inferred is None:
         text = "the coherence is not used: the number of averages is not known and cannot be inferred"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))

@@ -12,14 +12,7 @@ from acquisition import DataError, Description, Fact, Frf, Remark, correct_windo
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
-from lobewatch.measurement.exponential_window import (
-    Window,
-    hidden_window_remarks,
-    refit_ringing_modes,
-    remove_own_window,
-    remove_recorded_window,
-    resolve_window,
-)
+from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remark
@@ -39,59 +32,85 @@ from modal import (
 )
 
 UNKNOWN_SENSOR = SensorLoading()
-"""An accelerometer that nobody says anything of."""
+"""Accelerometer without any data."""
 MAX_LISTED_PEAKS = 6
-"""Peaks beyond the usable band that are named one by one."""
+"""Largest number of peaks beyond the usable band that are listed one by one."""
 
 
 @dataclass(frozen=True, eq=False)
 class FileModes:
-    """The modes of one recorded file."""
+    """Modes of one recorded file."""
 
     path: Path
-    """Path that it was read from."""
+    """Path of the file."""
     frf: Frf | None
-    """Average of its hits, or the FRF that it holds; None where no force was measured."""
+    """Average of its hits, or its FRF; None without force."""
     extraction: Extraction
-    """Bands and models that the modes were extracted with."""
+    """Bands and fits of the mode extraction."""
     as_recorded: tuple[Mode, ...]
-    """Modes by least squares, the damping of an exponential window still in them."""
+    """Modes by least squares, with the damping of an exponential window."""
     fitted: tuple[Mode, ...]
     """Modes by least squares, without the damping of the window."""
     picked: tuple[Mode, ...]
     """Modes by the peak picking of the paper, for comparison."""
     remarks: tuple[Remark, ...]
-    """Remarks on all modes together, and on those that are missing."""
+    """Remarks on all modes together and on missing ones."""
     facts: tuple[Fact, ...] = ()
-    """Facts known of the file, and where each is from."""
+    """Facts of the file with their origins."""
     by_hand: ModeEdits = NO_MODE_EDITS
-    """What a person said of its modes."""
+    """Mode edits."""
 
 
 def fit_file_modes(
     path: Path,
     band: tuple[float, float] | None = None,
     *,
-    window: Window | None = None,
+    window: windows.Window | None = None,
     conjugate: bool = False,
     accept: Collection[str] = (),
     description: Description | None = None,
     by_hand: ModeEdits = NO_MODE_EDITS,
     sensor: SensorLoading = UNKNOWN_SENSOR,
 ) -> FileModes:
-    """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
+    """Fit the modes of a recorded file.
 
-    window: exponential window on the response, to be corrected; else that which the file names. conjugate: the file
-    holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
-    description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
-    still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
-    otherwise, else the modes that do. by_hand: modes that a person adds, leaves out, or holds at what they are without
-    any window. sensor: accelerometer whose mass is taken off. Hits without force tell no stiffness, and are taken as
-    they are: no window, no mass taken off.
+    Three or more hits give standard errors. Hits that still ring at the end of the record get an exponential window,
+    which is corrected: all hits if none is good, else only the ringing modes. Hits without force give no stiffness, no
+    window correction and no mass correction.
 
-    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
-    verdicts that cannot be accepted, and what `edit_modes` refuses.
+    Parameters
+    ----------
+    path
+        Recorded file.
+    band
+        Frequency range (Hz); None for the usable band.
+    window
+        Exponential window of the response to correct; None for that of the file.
+    conjugate
+        Whether the file contains the complex conjugate of response over force.
+    accept
+        Faults of hits to ignore, such as "not-decayed".
+    description
+        Data that the file lacks; the number of averages is inferred by default.
+    by_hand
+        Modes to add, to remove, or to hold.
+    sensor
+        Accelerometer whose mass is removed.
 
+    Returns
+    -------
+    FileModes
+        Modes with and without the window, peaks, and remarks.
+
+    Raises
+    ------
+    ValueError
+        For a window without the time of the hit, averages without coherence, unknown faults, or impossible mode edits.
+    DataError
+        If data of the file is missing or damaged.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> modes = synthesize_frf([Mode(500.0, 0.02, 2e7)], np.arange(100.0, 1000.0))
@@ -106,11 +125,12 @@ def fit_file_modes(
     file_frf = read_file_frf(path, accept, description or Description(), window, conjugate=conjugate)
     if file_frf.frf is None:
         if window is not None or conjugate:
-            raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")
+            fields = "Window.time_constant, Window.hit_at and fit_file_modes.conjugate"
+            raise ValueError(f"{fields} are of hits with their force; leave them out")
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
     frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
     hits = () if conjugate else file_frf.hits
-    window = resolve_window(file_frf.recorded_window, window)
+    window = windows.resolve_window(file_frf.recorded_window, window)
     delay = None if window is None else window.delay(file_frf.hits)
     frf = frf if window is None else correct_windowed_receptance(frf, window.time_constant)
     tau = file_frf.time_constant if window is None else window.time_constant
@@ -126,13 +146,13 @@ def fit_file_modes(
     mass, fitted = extraction.frf.mass_removed, modes
     frf = remove_sensor_mass(frf, mass)
     if window is not None and delay is not None:
-        fitted, windowed = remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
+        fitted, windowed = windows.remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
     elif file_frf.time_constant is not None:
-        fitted, windowed = tuple(remove_own_window(modes, file_frf.time_constant)), ()
+        fitted, windowed = tuple(windows.remove_own_window(modes, file_frf.time_constant)), ()
     else:
-        windowed = tuple(hidden_window_remarks(hits, modes))
+        windowed = tuple(windows.hidden_window_remarks(hits, modes))
         if not accept:
-            fitted, ringing = refit_ringing_modes(modes, hits, band, mass)
+            fitted, ringing = windows.refit_ringing_modes(modes, hits, band, mass)
             windowed += ringing
     return FileModes(
         path=path,
@@ -150,7 +170,7 @@ def fit_file_modes(
 def _fit_decay_modes(
     path: Path, decays: FileFrf, band: tuple[float, float] | None, by_hand: ModeEdits, sensor: SensorLoading
 ) -> FileModes:
-    """Modes of hits whose force nobody measured; DataError where a window that the file names adds damping to them."""
+    """Fit the modes of hits without force; DataError if a window adds damping to them."""
     if decays.recorded_window is not None:
         raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
     state = edit_modes(extract_decay_modes(decays.hits, band), by_hand)
@@ -176,7 +196,7 @@ def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | No
 
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
-    """Peaks that are not fitted because the force hardly reached them."""
+    """Yield a remark on peaks above the usable band."""
     peaks = find_peaks_above_band(frf)
     if frf.usable_band is None or not peaks:
         return
@@ -188,7 +208,18 @@ def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
 
 
 def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
-    """Remarks on all modes of an FRF together."""
+    """Check all modes of an FRF together for a reversed sensor and a delayed channel.
+
+    Parameters
+    ----------
+    modes
+        Modes of one FRF.
+
+    Returns
+    -------
+    list of Remark
+        Remarks on wrong signs and on a common delay.
+    """
     return [*_check_signs(modes), *_check_delay(modes)]
 
 
@@ -203,14 +234,29 @@ def _check_delay(modes: Sequence[Mode]) -> Iterator[Remark]:
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
         text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
-        cure = "measure it with lobewatch sensors --skew, or add that to skew_us of the accelerometer in machine.toml"
+        cure = "measure it with sensor_checks.check_skew, or add that to skew_us of the accelerometer in machine.toml"
         yield Remark("channel-delay", "", text, cure)
 
 
 def list_comparison_files(
     beside: Sequence[str], file: Path, description: Description
 ) -> list[tuple[Path, Description]]:
-    """Files, and what they do not say: each of beside is a file, or the number of another response of this one."""
+    """List the files to compare with a recorded file.
+
+    Parameters
+    ----------
+    beside
+        Files, or numbers of other responses of the same file.
+    file
+        Recorded file.
+    description
+        Data that the files lack.
+
+    Returns
+    -------
+    list of (Path, Description)
+        Path and missing data of each measurement.
+    """
     return [
         (file, replace(description, response=int(text))) if text.isdecimal() else (Path(text), description)
         for text in beside
@@ -218,13 +264,32 @@ def list_comparison_files(
 
 
 def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], others: Sequence[FileModes]) -> FileModes:
-    """The modes of a file, each with how many of the others have it too; beside: what each of these was named by.
+    """Count for each mode of a file how many other measurements show it.
 
-    ValueError where two are the same measurement.
+    Parameters
+    ----------
+    file_modes
+        Modes of the file.
+    beside
+        Names of the other measurements.
+    others
+        Modes of the other measurements.
+
+    Returns
+    -------
+    FileModes
+        The same modes with the counts.
+
+    Raises
+    ------
+    ValueError
+        If two measurements are identical.
     """
     for place, (text, other) in enumerate(zip(beside, others, strict=True)):
         if any(_is_same_measurement(other, one) for one in (file_modes, *others[:place])):
-            raise ValueError(f"--beside {text}: the same numbers are looked at already; name another measurement")
+            raise ValueError(
+                f"list_comparison_files.beside {text}: the same numbers are looked at already; name another measurement"
+            )
     found = [other.fitted for other in others]
     as_recorded, fitted = (tuple(match_modes(modes, found)) for modes in (file_modes.as_recorded, file_modes.fitted))
     return replace(file_modes, as_recorded=as_recorded, fitted=fitted)

@@ -19,32 +19,32 @@ from modal import (
 )
 
 TYPICAL_SENSOR_MASS = 0.010
-"""Mass of an accelerometer that nobody named (kg): it is asked for where this one would matter."""
+"""Mass of a typical accelerometer (kg), assumed to decide whether an unknown mass matters."""
 MAX_FIRST_ORDER_DROP = 0.1
-"""Fall of a frequency up to which first order tells what a mass does to the stiffness; chosen."""
+"""Frequency drop up to which the first order predicts the change of stiffness; chosen."""
 MOUNTING_RESONANCES = {"magnet": 7000.0, "hand": 2000.0}
 """Resonance of an accelerometer (Hz) that is fixed so, about; with stud, glue or wax it lies beyond 20 kHz.
 
 Source: Bruel & Kjaer, Measuring Vibration (1982), mounting the accelerometer."""
 MIN_REPORTED_BIAS = 0.01
-"""Share of K from which its bias by the mounting is said."""
+"""Smallest bias of K by the mounting that is reported (-)."""
 
 
 class FrfFit(NamedTuple):
-    """What a fit finds in an FRF."""
+    """Result of a mode fit."""
 
     extraction: Extraction
-    """Extraction that the modes are of."""
+    """Extraction behind the modes."""
     modes: tuple[Mode, ...]
-    """Its modes."""
+    """Fitted modes."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on the whole."""
+    """Remarks on the fit."""
 
 
 def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf], FrfFit]) -> FrfFit:
-    """What `fit` finds without the mass of the sensor, its doubt in the errors of the modes, and remarks on the sensor.
+    """Fit an FRF without the sensor mass, and propagate its uncertainty to the modes.
 
-    Of a response that is not the driving point, where a trusted K is negative, nothing is taken off.
+    The mass stays if a trusted K is negative, since the response is not the driving point then.
     """
     if not sensor.mass:
         state, modes, remarks = fit(frf)
@@ -61,7 +61,7 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
 
 
 def mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:
-    """Remark that the mass of the sensor is not taken off."""
+    """Return the remark that the sensor mass stays in the FRF."""
     return Remark("sensor-mass-stays", "", f"{_format_sensor_mass(sensor)} are not taken off: {why}")
 
 
@@ -76,7 +76,7 @@ def _sensor_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) -> I
 
 
 def _trusted_driving_point_modes(modes: Sequence[Mode], frf: Frf) -> list[Mode]:
-    """Trusted modes of an accelerometer at the driving point; none where one of them has a negative K."""
+    """Return the trusted modes at the driving point; empty if one has a negative K."""
     trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
     return trusted if frf.measured_as == "accelerance" and _is_driving_point(trusted) else []
 
@@ -101,7 +101,7 @@ def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
 
 
 def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) -> Iterator[Remark]:
-    """The sensor reads 1/(1 - (f/f_m)^2) too much, f_m the resonance of its mass on its mounting."""
+    """Yield a remark on the mounting, which overestimates acceleration by 1/(1 - (f/f_m)^2)."""
     if sensor.mounting is None or sensor.mounting in ("stud", "glue", "wax"):
         return
     resonance = MOUNTING_RESONANCES[sensor.mounting or "magnet"]
@@ -118,13 +118,16 @@ def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) ->
 
 
 NO_FORCE_CODE = "force-not-measured"
-"""Code of the remark on a tap test of free decays, which tell no stiffness."""
+"""Code of the remark on free decays, which give no stiffness."""
 MAX_DECAY_FREQUENCY_RATIO = 0.4
-"""Share of the sample rate up to which the spectra of decays are used: beyond it filters and aliases begin."""
+"""Share of the sample rate up to which spectra of decays are used, because of filters and aliases."""
 
 
 def extract_decay_modes(hits: Sequence[Hit], band: tuple[float, float] | None = None) -> Extraction:
-    """Modes of hits without force, which `modal.modes_from_decays` reads; band (Hz), None: up to HIGHEST."""
+    """Extract the modes of hits without force, for `modal.modes_from_decays`.
+
+    band: frequency range (Hz); None: up to `MAX_DECAY_FREQUENCY_RATIO`.
+    """
     rate, decays = hits[0].sample_rate, [extract_free_decay(hit) for hit in hits]
     shortest = min(map(len, decays))
     return extract_modes(
@@ -133,7 +136,7 @@ def extract_decay_modes(hits: Sequence[Hit], band: tuple[float, float] | None = 
 
 
 def decay_remarks(sensor: SensorLoading) -> list[Remark]:
-    """Remarks on what free decays do not tell; the mass of the sensor stays in them, for what it does needs K."""
+    """Return the remarks on what free decays cannot tell."""
     text = "no force was measured: frequency and damping are known, stiffness is not; no stability lobes, no depths"
     remark = Remark(NO_FORCE_CODE, "", text, "tap with a hammer that measures its force")
     return [remark, *([mass_not_removed_remark(sensor, "what they do needs K")] if sensor.mass else [])]

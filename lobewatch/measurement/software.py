@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class SoftwareVersions(NamedTuple):
-    """Versions of this program and of what computes for it."""
+    """Versions of this program and of its numerical libraries."""
 
     lobewatch: str
     numpy: str
@@ -18,7 +18,7 @@ class SoftwareVersions(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Versions for people."""
+        """Versions in words."""
         return f"lobewatch {self.lobewatch}, numpy {self.numpy}, scipy {self.scipy} on {self.processor}"
 
 

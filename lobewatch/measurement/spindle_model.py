@@ -31,40 +31,57 @@ from lobewatch.measurement.tap_measurement import Measurement
 
 _Float = NDArray[np.float64]
 MODEL_FRF_POINTS = 400
-"""Points of each curve; chosen, finer than a screen shows."""
+"""Points of each curve; chosen, finer than a screen."""
 MODEL_FRF_BAND = (0.3, 3.0)
-"""Band of the model's FRF, in parts of its first natural frequency; chosen."""
+"""Band of the model FRF relative to its first natural frequency; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelState:
-    """The model with a tool in it."""
+    """Spindle model with a tool and the newest bearings."""
 
     machine: Machine
-    """Settings of machine.toml."""
+    """Machine of the model."""
     tool: str
     """Tool in the spindle."""
     spindle: Spindle
-    """Shaft with this tool and the newest bearings."""
+    """Spindle with this tool and the newest bearings."""
     reference: Spindle
-    """Shaft with the same bearings and the tool that is tapped."""
+    """Spindle with the tapped tool and the same bearings."""
     measurement: Measurement | None
-    """Measurement that set the bearings; None: they are those of machine.toml."""
+    """Measurement that calibrated the bearings; None: bearings of machine.toml."""
     origin: str
     """Origin of the bearing stiffness, in words."""
 
     @property
     def title(self) -> str:
-        """Machine, its label and the tool."""
+        """Machine, label of the model, and tool."""
         spindle = self.machine.spindle
         label = f" ({spindle.label})" if spindle and spindle.label else ""
         return f"{self.machine.machine.name}{label}, tool {self.tool}"
 
 
 def build_model_state(machine: Machine, newest: Measurement | None, tool: str | None = None) -> ModelState:
-    """The model with a tool (None: the one that is tapped); DataError where there is none.
+    """Build the spindle model with a tool and the newest bearings.
 
-    newest: the measurement that sets the bearings (`Logbook.calibrated`).
+    Parameters
+    ----------
+    machine
+        Machine with a [spindle].
+    newest
+        Measurement that calibrates the bearings (`Logbook.calibrated`).
+    tool
+        Name of the tool; None for the tapped one.
+
+    Returns
+    -------
+    ModelState
+        Model with the tool.
+
+    Raises
+    ------
+    DataError
+        If there is no model of the tool.
     """
     wanted = machine.tap.tool if tool is None else tool
     drawn, reference = machine.model(wanted), machine.model(machine.tap.tool)
@@ -82,7 +99,18 @@ def _copy_bearings(calibrated: Spindle, shaft: Spindle) -> Spindle:
 
 
 def first_critical_speed(spindle: Spindle) -> float | None:
-    """The lowest critical speed (rpm); None where gyroscopic moments leave none."""
+    """Return the lowest critical speed.
+
+    Parameters
+    ----------
+    spindle
+        Spindle model.
+
+    Returns
+    -------
+    float or None
+        Speed (rpm); None if gyroscopic moments leave none.
+    """
     try:
         return critical_speed(spindle)
     except ArithmeticError:
@@ -90,8 +118,18 @@ def first_critical_speed(spindle: Spindle) -> float | None:
 
 
 def compute_model_frf(state: ModelState) -> Frf:
-    """FRF around the first modes where the spindle is tapped; that of another tool at its tip, by coupling it to the
-    calibrated spindle."""
+    """Compute the FRF of the model around its first modes.
+
+    Parameters
+    ----------
+    state
+        Model; another tool than the tapped one is coupled to the calibrated spindle.
+
+    Returns
+    -------
+    Frf
+        Receptance (m/N) at the tapped place, or at the tip of another tool.
+    """
     machine = state.machine
     table = machine.spindle
     if table is None:
@@ -110,19 +148,19 @@ def compute_model_frf(state: ModelState) -> Frf:
 
 
 def _remove_dampers(spindle: Spindle) -> Spindle:
-    """Spindle without dampers: a measured damping ratio holds what they do already."""
+    """Remove the dampers, whose damping the measured damping ratio already includes."""
     return replace(spindle, bearings=[replace(bearing, damping=0.0) for bearing in spindle.bearings])
 
 
 def tap_position(state: ModelState) -> float:
-    """Distance from the tool tip (m); another tool than the one that is always tapped is looked at where it cuts."""
+    """Return the distance of the FRF from the tool tip (m); 0 for another tool than the tapped one."""
     tap = state.machine.tap
     return tap.position_mm / 1e3 if state.tool == tap.tool else 0.0
 
 
 @dataclass(frozen=True)
 class ModelMode:
-    """One mode of the model."""
+    """Mode of the model."""
 
     frequency: float
     """Natural frequency (Hz)."""
@@ -138,34 +176,40 @@ class ModelMode:
 
 @dataclass(frozen=True)
 class ModelSummary:
-    """The model in figures."""
+    """Key figures of the model."""
 
     state: ModelState
     """Model with its tool."""
     modes: tuple[ModelMode, ...]
-    """First modes, the lowest first."""
+    """First modes, lowest first."""
     static_stiffness: float
     """Static stiffness at the tool tip (N/m)."""
     critical_speed: float | None
-    """Lowest critical speed (rpm); None where gyroscopic moments leave none."""
+    """Lowest critical speed (rpm); None if gyroscopic moments leave none."""
     rigid_frequency: float
-    """Natural frequency of the first mode with rigid bearings (Hz): no bearing lifts it beyond."""
+    """Natural frequency of the first mode with rigid bearings (Hz), its upper limit."""
 
 
 def summarize_model(state: ModelState, count: int) -> ModelSummary:
-    """The figures of a model: its first modes, stiffness and critical speed."""
+    """Compute the key figures of a model.
+
+    Parameters
+    ----------
+    state
+        Model with a tool.
+    count
+        Number of modes.
+
+    Returns
+    -------
+    ModelSummary
+        First modes, static stiffness and critical speed.
+    """
     frequency, stiffness = modes_at(state.spindle, count)
     shares = energy_shares(state.spindle, count)
-    modes = tuple(
-        ModelMode(
-            frequency=float(frequency[n]),
-            tip_stiffness=float(stiffness[n]),
-            bearing_share=float(np.sum(shares.bearings[n] + shares.housings[n])),
-            segment_share=float(np.sum(shares.segments[n])),
-            joint_share=float(np.sum(shares.joints[n])),
-        )
-        for n in range(count)
-    )
+    in_bearings = np.sum(shares.bearings + shares.housings, axis=1)
+    columns = frequency, stiffness, in_bearings, np.sum(shares.segments, axis=1), np.sum(shares.joints, axis=1)
+    modes = tuple(ModelMode(*row) for row in np.column_stack(columns)[:count].tolist())
     return ModelSummary(
         state,
         modes,
@@ -177,14 +221,14 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
 
 @dataclass(frozen=True)
 class ModelCalibration:
-    """Stiffness and dampers that make a model fit."""
+    """Calibrated stiffness and damping of a model."""
 
     label: str
     """Label of the model in machine.toml."""
     stiffness: Calibration | StiffnessFit
-    """Calibration with one factor for all bearings, or with one for each group of bearings and joints."""
+    """Calibration with one factor for all bearings, or one for each group."""
     dampers: DampingCalibration | None
-    """Dampers of the bearings; None where no damping ratio was given."""
+    """Dampers of the bearings; None without a damping ratio."""
 
 
 def calibrate_model(
@@ -195,11 +239,32 @@ def calibrate_model(
     group: Sequence[str] = (),
     damping_ratio: float | None = None,
 ) -> ModelCalibration:
-    """Scale these groups until the model has these natural frequencies (Hz), and add dampers for a damping ratio (-).
+    """Calibrate bearing groups of a model to natural frequencies, and dampers to a damping ratio.
 
-    Standard errors (Hz), modes and groups may be left out; what is given stands for each frequency. Raises what
-    dsm.calibrate, dsm.fit_stiffness and dsm.calibrate_damping raise.
+    It raises what dsm.calibrate, dsm.fit_stiffness and dsm.calibrate_damping raise.
 
+    Parameters
+    ----------
+    machine
+        Machine with a [spindle].
+    frequency
+        Natural frequencies (Hz), shape (n,).
+    frequency_std
+        Standard errors (Hz), shape (n,); optional.
+    mode
+        Mode numbers from 1, shape (n,); optional.
+    group
+        Groups of bearings and joints to scale; optional.
+    damping_ratio
+        Damping ratio of the first of these modes (-); None for no dampers.
+
+    Returns
+    -------
+    ModelCalibration
+        Scaled stiffness, and dampers.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from lobewatch.machine import MachineFolder, make_machine_folder

@@ -17,14 +17,8 @@ from threadpoolctl import ThreadpoolController
 from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
+from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.exponential_window import hidden_window_remarks
-from lobewatch.measurement.recording_questions import (
-    check_band_coverage,
-    check_frequency_jump,
-    check_model_stiffness,
-    check_stiffness_jump,
-    no_mode_remark,
-)
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from modal import (
     CredibleModes,
@@ -42,18 +36,17 @@ from modal import (
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
-"""Codes of the remarks on what a person said of the modes of a tap test, which they are about."""
+"""Codes of the remarks on mode edits."""
 BEARING_STIFFNESS_RANGE = (1e5, 1e11)
-"""Range that is believed of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
+"""Plausible bearing stiffness (N/m), from a plain bearing on a soft seat to a rigid seat."""
 MAX_STIFFNESS_CHANGE_RATIO = 2.0
-"""K of one test over that of the one before of the series, or the inverse, above which nothing is calibrated.
-
-Wear of 10 % in frequency takes a third off K, tests scatter by a tenth, the smallest mistake of a unit is 4.4."""
+"""Ratio of K of two successive tests, or the inverse, above which nothing is calibrated. Wear of 10 % in frequency
+takes a third off K, tests scatter by a tenth, the smallest mistake of a unit is 4.4."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One tap test as it is understood: modes, the mode followed, the model recalibrated to it."""
+    """Result of one tap test: modes, followed mode, calibrated model."""
 
     tap_id: str
     """Identity of the tap test."""
@@ -64,22 +57,22 @@ class Measurement:
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     modes: Sequence[Mode] = ()
-    """All modes found, as measured."""
+    """All modes as measured."""
     followed: Mode | None = None
-    """Mode that calibration and trend follow; None where there is none."""
+    """Mode of calibration and trend; None without one."""
     calibration: Calibration | None = None
-    """Model recalibrated to the mode followed; None where that was not possible or is not believed."""
+    """Model calibrated to the followed mode; None if impossible or implausible."""
     at_tip: Sequence[Mode] = ()
-    """Modes that lobes are computed from, at the tool tip; empty where there are none."""
+    """Modes at the tool tip for lobes; empty without any."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what could not be done, and on what is in doubt."""
+    """Remarks on missing and doubtful results."""
     cross: Sequence[Mode] | None = None
-    """Modes of a cross tap at the tool tip, signed; None of another tap, and where it was not at the tip."""
+    """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
 
 
 @dataclass(frozen=True, eq=False)
 class TapFit:
-    """The modes of one tap test, fitted by itself, whatever other tests say."""
+    """Fitted modes of one tap test, independent of other tests."""
 
     tap_id: str
     """Identity of the tap test."""
@@ -90,33 +83,49 @@ class TapFit:
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     modes: Sequence[Mode] = ()
-    """All modes found, as measured."""
+    """All modes as measured."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what is in doubt, and why there are no modes."""
+    """Remarks on doubtful modes, and why there are none."""
     failed: bool = False
-    """Whether the fit was not possible at all."""
+    """Whether the fit was impossible."""
 
 
 @cache
 def _thread_controller() -> ThreadpoolController:
-    """The numerical libraries of this process, looked for once: that takes longer than many a fit."""
+    """Return the controller of the numerical libraries, whose search takes longer than a fit."""
     return ThreadpoolController()
 
 
 def measure(
     tap: TapTest, machine: Machine, last: Mode | None = None, by_hand: ModeEdits = NO_MODE_EDITS
 ) -> Measurement:
-    """Measurement of one tap test; last: the mode that was followed in the test before; by_hand: as `fit_tap`."""
+    """Measure one tap test.
+
+    Parameters
+    ----------
+    tap
+        Tap test.
+    machine
+        Machine with its settings.
+    last
+        Followed mode of the previous test; None for the first one.
+    by_hand
+        Mode edits.
+
+    Returns
+    -------
+    Measurement
+        Modes, followed mode, calibrated model, and remarks.
+    """
     return interpret_fit(fit_tap(tap, machine, by_hand), machine, last)
 
 
 def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) -> TapFit:
-    """The modes of one tap test: most of the work, and the part that needs no other tap test.
+    """Fit the modes of one tap test, the largest part of the work, which needs no other test.
 
-    by_hand: what a person said of its modes; where that cannot be done the modes are those of the fit, and a remark
-    says so.
+    by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
-    about, band = tap.circumstances, None if tap.frf is None else check_band_coverage(tap.frf, machine)
+    about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
@@ -129,7 +138,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
-            return TapFit(*named, (), (*remarks, failure, no_mode_remark((), machine)), failed=True)
+            return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
 
 
 def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
@@ -144,7 +153,7 @@ def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
-    """An extraction as a person says, or as it is where that cannot be done, with a remark."""
+    """Apply mode edits, or return the extraction with a remark if they are impossible."""
     if not by_hand:
         return state, ()
     try:
@@ -155,12 +164,12 @@ def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tup
 
 
 def mode_edits_remark(by_hand: ModeEdits) -> Remark:
-    """Remark on modes that a person chose."""
+    """Return the remark on mode edits."""
     return Remark("modes-by-hand", str(by_hand), "modes chosen by hand")
 
 
 def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
-    """Measurement that follows from the modes of a tap test; last: the mode that was followed in the test before."""
+    """Follow the mode, calibrate the model and find the modes at the tip; last: followed mode of the previous test."""
     if fit.direction == CROSS_TAP:
         return _interpret_cross_tap(fit, machine, last)
     remarks, modes = [*fit.remarks], fit.modes
@@ -177,7 +186,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
-    """What a cross tap says: modes of either sign, none where x and y do not move each other. It calibrates nothing."""
+    """Interpret a cross FRF: modes of either sign, and no calibration."""
     signed = _select_in_band(fit.modes, machine)
     plain = [replace(mode, stiffness=abs(mode.stiffness)) for mode in signed]
     trusted = select_credible_modes(plain)
@@ -202,24 +211,23 @@ def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
 def _follow_mode(
     trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
-    """The believed mode that continues the last one, the predominant one where there is none yet."""
+    """Return the credible mode that continues the last one, or the predominant one."""
     mode = predominant_mode(trusted.modes)
     if mode is None:
-        remarks.append(no_mode_remark(modes, machine))
+        remarks.append(questions.no_mode_remark(modes, machine))
     elif last is not None:
         mode = _continue_mode(last, mode, trusted.modes, remarks)
     return mode
 
 
 def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
-    """The candidate that is like the last mode; now: the predominant one, which is taken, and asked about, where none
-    is and it is far off."""
+    """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
     next_mode = follow_mode(last, candidates)
-    jump = check_frequency_jump(last, now) if next_mode.mode is None else None
+    jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)
         return now
-    remarks += [] if next_mode.mode is None else filter(None, [check_stiffness_jump(last, next_mode.mode)])
+    remarks += [] if next_mode.mode is None else filter(None, [questions.check_stiffness_jump(last, next_mode.mode)])
     cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode
@@ -241,12 +249,12 @@ def _calibrate(
     remarks += [] if doubt is None else [doubt]
     if doubt is None and last is None and followed.has_stiffness:
         of_model = modal_stiffness(calibration.spindle, calibration.mode, machine.tap.position_mm / 1e3)
-        remarks += filter(None, [check_model_stiffness(followed, of_model)])
+        remarks += filter(None, [questions.check_model_stiffness(followed, of_model)])
     return calibration if doubt is None else None
 
 
 def _check_calibration(calibration: Calibration, followed: Mode, last: Mode | None) -> Remark | None:
-    """Why a calibration is not believed; None where it is."""
+    """Return the reason why a calibration is implausible, or None."""
     low, high = BEARING_STIFFNESS_RANGE
     before = followed.stiffness if last is None else last.stiffness
     ratio = followed.stiffness / before if followed.has_stiffness and not math.isnan(before) else 1.0
@@ -270,7 +278,7 @@ def _transfer_to_tip(
     machine: Machine,
     remarks: list[Remark],
 ) -> list[Mode]:
-    """Believed modes, carried to the tip by the model where the tap was elsewhere; none where one has K < 0."""
+    """Return the modes at the tip, by the model if tapped elsewhere; empty if a K is negative."""
     if not trusted.modes or not all(mode.has_stiffness for mode in trusted.modes):
         return []
     if trusted.opposed:
@@ -295,7 +303,7 @@ def _scale_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode
 
 
 def is_fit_of(answer: object, entry: TapEntry) -> bool:
-    """Whether it is one of this tap test with modes that may be. A wrong value that could be right is not seen."""
+    """Tell whether a worker's answer is a plausible fit of a tap test."""
     return (
         isinstance(answer, TapFit)
         and (answer.tap_id, answer.time.isoformat()) == (entry.id, entry.time)

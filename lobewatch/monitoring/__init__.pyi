@@ -1,4 +1,4 @@
-"""How a series of tap tests decays: points, alarm, forecast; arrays in, records out."""
+"""Condition monitoring of a series of tap tests: changes, alarms, forecasts, machine status."""
 
 from .machine_status import MachineStatus, SeriesStatus
 from .status_rules import StatusLevel

@@ -1,4 +1,4 @@
-"""Alarms: raised and closed by what was measured, acknowledged by a person.
+"""Alarms: triggered and closed by what was measured, acknowledged by a person.
 
 Imported with every look at a plant, so without numpy.
 """
@@ -17,14 +17,14 @@ from lobewatch.machine.journal.entries import Acknowledgement, format_alarm_id
 
 
 class Alarm(msgspec.Struct, frozen=True):
-    """A reason that rings. Its identity is what rings, of what, and the tap test that first raised it."""
+    """A reason with an active alarm. Its identity is the alarm, of what, and the tap test that first triggered it."""
 
     code: str
     """Code of the reason."""
     about: str
     """Series or program."""
     triggered_by: str
-    """Identity of the tap test that raised it."""
+    """Identity of the tap test that triggered it."""
     triggered_at: datetime
     """Time of that tap test."""
     acknowledgement: Acknowledgement | None = None
@@ -36,15 +36,15 @@ class Alarm(msgspec.Struct, frozen=True):
         return format_alarm_id(self.code, self.about, self.triggered_by)
 
     def is_about(self, remark: Remark) -> bool:
-        """Whether it rings for a reason."""
+        """Return whether it belongs to a remark."""
         return (self.code, self.about) == (remark.code, remark.about)
 
     def is_acknowledged(self, now: datetime) -> bool:
-        """Whether it is acknowledged at a time."""
+        """Return whether it is acknowledged at a time."""
         return self.acknowledgement is not None and self.acknowledgement.is_active_at(now)
 
     def to_row(self, now: datetime) -> dict[str, Any]:
-        """Fields for other programs; times are ISO 8601, `acknowledged` is null where it is not quiet."""
+        """Return the fields for other programs; times are ISO 8601, `acknowledged` is null if it is not."""
         word = self.acknowledgement if self.is_acknowledged(now) else None
         return {
             "id": self.id,
@@ -63,7 +63,7 @@ class Alarm(msgspec.Struct, frozen=True):
 
 
 class TriggeredAlarm(NamedTuple):
-    """A reason that rings, and the tap test that first raised it."""
+    """A reason with an active alarm, and the tap test that first triggered it."""
 
     remark: Remark
     """Reason."""
@@ -73,8 +73,7 @@ class TriggeredAlarm(NamedTuple):
     """Time of the tap test."""
 
     def build_alarm(self, acknowledgements: Iterable[Acknowledgement], baseline: datetime | None) -> Alarm:
-        """The alarm, with the newest acknowledgement of the same one: it was open when that was given, and has not been
-        closed since, whatever was excluded or included meanwhile."""
+        """Build the alarm, with its newest acknowledgement since it was triggered."""
         code, about = self.remark.code, self.remark.about
         given = [
             word
@@ -85,7 +84,7 @@ class TriggeredAlarm(NamedTuple):
 
 
 def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:
-    """The reasons, those that are acknowledged at a time with that in their text."""
+    """Add acknowledgements to the text of remarks."""
     return tuple(_add_acknowledgement(remark, alarms, now) for remark in remarks)
 
 
@@ -95,7 +94,7 @@ def _add_acknowledgement(remark: Remark, alarms: Sequence[Alarm], now: datetime)
 
 
 def select_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:
-    """All that ring, or the open one with this identity, or this part of one; ValueError where none or several fit."""
+    """Select the alarm of this identity or part of one, or all that are not acknowledged."""
     if not alarms:
         raise ValueError("nothing rings on this machine: there is nothing to acknowledge")
     exact = [alarm for alarm in alarms if alarm.id == name]

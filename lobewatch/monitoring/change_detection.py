@@ -1,15 +1,15 @@
 """Detect drops and rises in a series with a change-point model.
 
-Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality
-Technology 35(4), with hinges beside the steps, one-sided.
+Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality Technology
+35(4), with hinges beside the steps, one-sided.
 
-anew.
+again.
 
-Two points running that are sure of a fall raise an alarm; four running that are not close it. Nothing else does: no
-rise, and nothing that was done to the machine. A sure rise begins the watch anew at the point that was sure of it, for
-among the lower points before no fall would be seen any more. (From where it seems to have risen, chance rises would
-begin it at their highest points, and a third of them would end as a fall.) An alarm that is open goes on to be judged
-by its own watch.
+Two points running that are sure of a drop trigger an alarm; four running that are not close it. Nothing else does:
+no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of
+it, for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance
+rises would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on
+to be evaluated by its own monitor.
 """
 
 from __future__ import annotations
@@ -21,23 +21,22 @@ from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
 MIN_MONITORED_POINTS = 9
-"""Number of points before which nothing is judged; chosen."""
+"""Number of points before which nothing is evaluated; chosen."""
 MIN_POINTS_WITH_PRIOR = 5
 """The same where something is known of the scatter beforehand; chosen."""
 SURE_CHANGE_SCORE = 3.3
-"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is looked at."""
+"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is checked."""
 MIN_SHARED_CHANGE = 0.5
 """Least share of what two series did on the mean that one of them did, where that counts for it; chosen."""
 SCORE_BLOCK_ROWS = 64
-"""Number of points that are judged at once, to bound the memory."""
+"""Number of points that are evaluated at once, to bound the memory."""
 
-Floats = NDArray[np.float64]
 ChangeKind = Literal["step", "slope"]
 CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
 MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
@@ -48,11 +47,11 @@ class SeriesChange(NamedTuple):
     """A change of a series, as it is fitted to a number of its points."""
 
     kind: ChangeKind
-    """Kind: fallen at once, or falling since."""
+    """Kind: dropped at once, or falling since."""
     point: int
     """Index of the first point after the step, or of the last one before the slope."""
     size: float
-    """Fall from there to the last point fitted, in the unit of the series."""
+    """Drop from there to the last point fitted, in the unit of the series."""
     half_width: float
     """Half the width of the 95 % interval of the size."""
 
@@ -62,14 +61,14 @@ class LikeliestChange(NamedTuple):
 
     score: Floats
     """Score: how ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
-    is_step: NDArray[np.bool_]
+    is_step: Flags
     """Whether the change is a step, shape (r,)."""
-    point: NDArray[np.intp]
-    """Index of its point as in Fall, shape (r,)."""
+    point: Indices
+    """Index of its point as in Drop, shape (r,)."""
 
     @classmethod
     def of_none(cls, n: int) -> Self:
-        """Where no point is judged."""
+        """Where no point is evaluated."""
         return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
 
 
@@ -80,18 +79,17 @@ class ChangeMonitor:
     level_model: LevelModel
     """Base of the fits."""
     change: LikeliestChange
-    """Likeliest change up to each point; the score of the first ones, which are not judged, is NaN."""
+    """Likeliest change up to each point; the score of the first ones, which are not evaluated, is NaN."""
     sign: int
-    """1 where it looks for falls, -1 where for rises."""
+    """1 where it detects drops, -1 where for rises."""
 
     @property
     def scores(self) -> Floats:
-        """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape
-        (n,); NaN before the 9th, before the 5th where something is known of the scatter beforehand."""
+        """Score of each point, a normal quantile, shape (n,); NaN before the first scored point."""
         return self.change.score
 
     @cached_property
-    def is_sure(self) -> NDArray[np.bool_]:
+    def is_sure(self) -> Flags:
         """Whether each point is sure of a change, shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.scores >= SURE_CHANGE_SCORE)
@@ -102,17 +100,17 @@ class ChangeMonitor:
         return next(self.alarms_from(0), None)
 
     def alarms_from(self, first: int) -> Iterator[int]:
-        """Points from one on that are sure of a change as the ones before them were."""
+        """Return the points from one on that are sure of a change, as the ones before them are."""
         begin = max(first, 1)
         return (begin + int(i) for i in np.flatnonzero(self.is_sure[begin:] & self.is_sure[begin - 1 : -1]))
 
     def change_at(self, alarm: int) -> SeriesChange:
-        """The change that a point is sure of: kind and beginning as it sees them, size by all points."""
+        """Return the change that a point is sure of: kind and beginning as of then, size by all points."""
         return _fit_change(self.level_model, self.change, alarm, self.sign)
 
 
 def find_newest_change(y: Floats) -> SeriesChange | None:
-    """The fall, or with a negative size the rise, that the last two points (n,) are both sure of; None without one."""
+    """Find the drop, or with a negative size the rise, that the last two points (n,) are sure of, or None."""
     if y.size <= MIN_MONITORED_POINTS:
         return None
     base = build_level_model(Readings(y))
@@ -124,14 +122,14 @@ def find_newest_change(y: Floats) -> SeriesChange | None:
 
 
 def monitor_drops(readings: Readings) -> ChangeMonitor:
-    """Judge a series point after point: whether it falls."""
+    """Monitor a series for drops, point by point."""
     return monitor_drops_and_rises(readings)[0]
 
 
 def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMonitor]:
-    """Judge a series likewise, and its mirror image: whether it rises.
+    """Monitor a series for drops, and its mirror image for rises.
 
-    What the mean of both directions did is looked at beside what the one did alone.
+    What the mean of both directions did is checked beside what the one did alone.
     """
     base, common, shared = (
         build_level_model(readings),
@@ -144,7 +142,7 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
 
 
 def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
-    """The likeliest fall, and the likeliest rise, up to each point."""
+    """Find the likeliest drop and rise up to each point."""
     first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
     last = np.arange(first - 1, base.y.size)
     falls, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
@@ -160,9 +158,9 @@ def _merge_directions(
     alone: LikeliestChange,
     common: LevelModel,
     together: LikeliestChange,
-    shared: NDArray[np.intp],
+    shared: Indices,
 ) -> LikeliestChange:
-    """The surer of what a series did alone and what the mean of both directions did, where the series did that too.
+    """Merge the change of one direction with that of the mean of both, whichever is surer.
 
     shared: points of the series that the mean has. Who looks twice is told of chance twice as often.
     """
@@ -178,8 +176,8 @@ def _merge_directions(
     return merged
 
 
-def _find_likeliest_changes(base: LevelModel, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
-    """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
+def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestChange, LikeliestChange]:
+    """Find the likeliest drop and rise up to each of these consecutive points."""
     blocks = [
         _find_largest_changes(base, last[begin : begin + SCORE_BLOCK_ROWS] + 1)
         for begin in range(0, last.size, SCORE_BLOCK_ROWS)
@@ -189,8 +187,8 @@ def _find_likeliest_changes(base: LevelModel, last: NDArray[np.intp]) -> tuple[L
     return fall, rise
 
 
-def _find_largest_changes(base: LevelModel, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
-    """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
+def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
+    """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
     points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
     for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
@@ -204,10 +202,8 @@ def _find_largest_changes(base: LevelModel, n: NDArray[np.intp]) -> tuple[NDArra
     return points, leans
 
 
-def _choose_likeliest(
-    base: LevelModel, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats
-) -> LikeliestChange:
-    """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
+def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
+    """Choose the likelier of a step and a slope in the first n (r,) points."""
     t = [base.t_statistic(lean, n) for lean in leans]
     scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
@@ -215,7 +211,7 @@ def _choose_likeliest(
 
 
 def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:
-    """The change up to one of the points, fitted to the whole series; at: index of that point."""
+    """Fit the change up to one of the points to the whole series; at: index of that point."""
     kind: ChangeKind = "step" if change.is_step[at] else "slope"
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
@@ -225,18 +221,18 @@ def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -
 
 
 N_CLOSING_POINTS = 4
-"""Points running, none of them sure of the fall, that close an alarm; chosen."""
+"""Points running, none of them sure of the drop, that close an alarm; chosen."""
 
 
 class DetectedDrop(NamedTuple):
-    """A fall that has raised an alarm; points by their index in the series."""
+    """A drop that has triggered an alarm; points by their index in the series."""
 
     triggered_at: int
-    """Point that raised it, the second one running that was sure."""
+    """Point that triggered it, the second one running that was sure."""
     closed_at: int | None
     """Point that closed it; None while it is open."""
     change: SeriesChange
-    """Kind and beginning as they were when it was raised, size as it is now."""
+    """Kind and beginning as they were when it was triggered, size as it is now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,11 +240,11 @@ class Detection:
     """What has been seen of a series."""
 
     scores: Floats
-    """Score of each point in the watch of its time, shape (n,); NaN for the first 8 points of a watch."""
+    """Score of each point in the monitor of its time, shape (n,); NaN for the first 8 points of a monitor."""
     drops: tuple[DetectedDrop, ...]
-    """Falls that have raised an alarm, oldest first."""
+    """Drops that have triggered an alarm, oldest first."""
     rise: SeriesChange | None
-    """Newest sure rise, which the watch began anew with, its size positive; None where there is none."""
+    """Newest sure rise, which restarted the monitor, its size positive; None where there is none."""
 
     @property
     def open_drops(self) -> tuple[DetectedDrop, ...]:
@@ -257,12 +253,12 @@ class Detection:
 
     @property
     def needs_repeat(self) -> bool:
-        """Whether the newest point alone is sure of a fall."""
+        """Whether the newest point alone is sure of a drop."""
         return not self.open_drops and self.scores.size > 0 and bool(self.scores[-1] >= SURE_CHANGE_SCORE)
 
 
 def detect_changes(readings: Readings) -> Detection:
-    """What is to be seen of a series."""
+    """Detect all drops, and the newest rise, in a series."""
     count = readings.y.size
     scores, falls, rise = np.full(count, np.nan), list[DetectedDrop](), None
     begin = judged = 0
@@ -279,7 +275,7 @@ def detect_changes(readings: Readings) -> Detection:
 
 
 def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
-    """Falls that a watch from one point on raises an alarm for between two others."""
+    """Find the drops that a monitor triggers an alarm for between two points."""
     raised = next(watch.alarms_from(first - begin), None)
     while raised is not None and begin + raised < end:
         closed = _find_closing_point(watch, raised)
@@ -290,7 +286,7 @@ def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Itera
 
 
 def _find_closing_point(watch: ChangeMonitor, raised: int) -> int | None:
-    """Point that closes an alarm."""
+    """Find the point that closes an alarm."""
     calm = 0
     for point in range(raised + 1, watch.scores.size):
         calm = 0 if watch.is_sure[point] else calm + 1

@@ -1,8 +1,8 @@
 """When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
 
 Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
-averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No random
-numbers.
+averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No
+random numbers.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.monitoring.level_model import build_level_model
 from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
 from lobewatch.monitoring.series_points import Readings
@@ -28,11 +28,11 @@ from lobewatch.monitoring.trend_shapes import (
 )
 
 MIN_FORECAST_POINTS = 8
-"""Number of points from which on anything is foretold; chosen."""
+"""Number of points from which on anything is forecast; chosen."""
 CROSSING_QUANTILES = (0.1, 0.5, 0.9)
 """Probabilities at which a level counts as reached: earliest, probable and latest date; chosen."""
 N_FORECAST_DATES = 241
-"""Number of dates looked at up to the horizon; between them the probability is interpolated."""
+"""Number of dates checked up to the horizon; between them the probability is interpolated."""
 
 DROPPED_SHAPE_WEIGHT = 1e-3
 """Weight that all shapes that are left out have together."""
@@ -43,11 +43,10 @@ NEGLIGIBLE_PROBABILITY = 1e-12
 RATE_QUANTILES = (0.025, 0.975)
 """Probabilities of the interval of a rate."""
 QUANTILE_HALVINGS = 40
-"""Halvings of the range in which a quantile is looked for."""
+"""Halvings of the range in which a quantile is searched."""
 FAN_STANDARD_ERRORS = 50
 """Standard errors around the means within which any level of a fan lies."""
 
-Floats = NDArray[np.float64]
 FitFamily = ShapeFits | RandomWalkFits
 """Shapes of one sort, fitted to a series."""
 
@@ -67,7 +66,7 @@ class Rate(NamedTuple):
     """Rate of change of a series at its last point, in its unit for one of its dates."""
 
     value: float
-    """Mean of the mixture; negative where it falls."""
+    """Mean of the mixture; negative where it drops."""
     low: float
     """2.5 % quantile."""
     high: float
@@ -76,7 +75,7 @@ class Rate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """The mixture of all courses that a series may take."""
+    """The mixture of all trends that a series may take."""
 
     shapes: tuple[TrendShape, ...]
     """Shapes that were fitted, j of them."""
@@ -108,14 +107,13 @@ class Forecast:
         return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
-        """Probability that the series is below a level (one, or one a date; with its standard error) at the dates,
-        shape (d,)."""
+        """Return the probability of being below a level (one, or one a date) at the dates, shape (d,)."""
         away = level - self.mean
         away /= np.hypot(self.error, error) if error else self.error
         return np.asarray(self.weight @ _student_cdf(self.freedom, away))
 
     def crossing_dates(self, level: float, error: float = 0.0) -> DateRange:
-        """Dates at which a level (with its standard error) is reached."""
+        """Return the dates at which a level (with its standard error) is reached."""
         chance = np.maximum.accumulate(self.probability(level, error))
         return DateRange(*(self._first(chance, quantile) for quantile in CROSSING_QUANTILES))
 
@@ -126,7 +124,7 @@ class Forecast:
         return float(np.interp(quantile, chance[above - 1 : above + 1], self.dates[above - 1 : above + 1]))
 
     def quantile_line(self, quantile: float) -> Floats:
-        """Level below which the series is with a probability at the dates, shape (d,)."""
+        """Return the quantile of the series at the dates, shape (d,)."""
         low, high = (
             (self.mean - FAN_STANDARD_ERRORS * self.error).min(axis=0),
             (self.mean + FAN_STANDARD_ERRORS * self.error).max(axis=0),
@@ -139,9 +137,10 @@ class Forecast:
 
 
 def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
-    """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
+    """Forecast a series y (n,) over its increasing dates (n,) to a date, at most twice its own span ahead.
 
-    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
+    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a
+    span.
     """
     return fit_past(dates, Readings(y, temperature)).forecast(horizon)
 
@@ -185,7 +184,7 @@ class PastFit:
 
 
 def fit_past(dates: Floats, readings: Readings) -> PastFit:
-    """Fit all shapes to a series over its dates (n,), increasing; ValueError as that of `forecast_series`."""
+    """Fit all shapes to a series over its increasing dates (n,)."""
     at, y = dates - dates[:1].sum(), readings.y
     if y.size < MIN_FORECAST_POINTS or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {MIN_FORECAST_POINTS}")
@@ -209,12 +208,12 @@ def _point_spread(families: Sequence[ShapeFits]) -> float:
 
 
 def _average_neighbors(values: Floats) -> Floats:
-    """Means of neighbours where there are many."""
+    """Average neighbors where there are many."""
     return np.array([part.mean() for part in np.array_split(values, min(values.size, MAX_FITTED_POINTS))])
 
 
 def _average_readings(readings: Readings) -> Readings:
-    """The same of the means; who held the hammer counts where each is one point."""
+    """Average readings; operators count only where each reading is one point."""
     if readings.y.size <= MAX_FITTED_POINTS:
         return readings
     temperature = None if readings.temperature is None else _average_neighbors(readings.temperature)
@@ -222,7 +221,7 @@ def _average_readings(readings: Readings) -> Readings:
 
 
 def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ...], Floats]:
-    """The families without those of their shapes that together weigh next to nothing, and the weights of the others."""
+    """Drop the shapes that together have next to no weight, and return the weights of the others."""
     log = np.concatenate([family.evidence for family in families])
     weight = np.exp(log - log.max())
     order = np.argsort(weight)
@@ -234,7 +233,7 @@ def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ..
 
 
 def _student_cdf(freedom: Floats, t: Floats) -> Floats:
-    """Distribution of Student's t (j, d) of degrees of freedom (j,): 0 and 1 where nobody asks for more."""
+    """Return the distribution of Student's t (j, d) with degrees of freedom (j,)."""
     freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
     share, near = (
         (t > 0).astype(np.float64),
@@ -245,7 +244,7 @@ def _student_cdf(freedom: Floats, t: Floats) -> Floats:
 
 
 def _mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
-    """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    """Return a quantile of a mixture of Student's t; an error of 0 is a value that is certain."""
     reach = scipy.special.stdtrit(freedom, 1 - NEGLIGIBLE_PROBABILITY) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())
     for _ in range(QUANTILE_HALVINGS):

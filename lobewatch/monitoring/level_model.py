@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, winsorize
 
 MIN_TEMPERATURE_POINTS = 12
@@ -27,8 +27,6 @@ MIN_SINGULAR_SHARE = 1e-12
 MIN_RESIDUAL_SHARE = 1e-20
 """Least share of the sum of squares that is taken as left: less is rounding."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class LevelModel:
@@ -45,8 +43,8 @@ class LevelModel:
     scatter_prior: ScatterPrior = NO_SCATTER_PRIOR
     """What is known of the scatter from point to point beforehand."""
 
-    def precision(self, n: NDArray[np.intp]) -> Floats:
-        """Precision of the coefficients as known beforehand, times the variance of n (r,) points, shape (r, p, p)."""
+    def precision(self, n: Indices) -> Floats:
+        """Return the prior precision of the coefficients times the variance of n (r,) points, shape (r, p, p)."""
         p = self.columns.shape[1]
         precision = np.zeros((n.size, p, p))
         for i in range(1 + self.n_temperature_columns, p):
@@ -58,11 +56,11 @@ class LevelModel:
             )
         return precision
 
-    def explained_root(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
-        """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
+    def explained_root(self, kind: str, n: Indices, k: Indices) -> Floats:
+        """Return the signed root of the sum of squares that a change from each point k (m,) on explains.
 
-        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
-        n runs from one number to another, k from 0.
+        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the
+        change. n runs from one number to another, k from 0.
         """
         if self.columns.shape[1] > 1:
             product, square = self._change(kind, n, k)
@@ -75,14 +73,14 @@ class LevelModel:
             product /= root
         return product
 
-    def t_statistic(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
-        """Student's t of changes that explain so much in the first n, shape (r,) each."""
+    def t_statistic(self, lean: Floats, n: Indices) -> Floats:
+        """Return Student's t of changes that explain this much in the first n, shape (r,) each."""
         total = self._residual_squares_up_to[n]
         left = np.maximum(total - lean**2, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
         return np.asarray(lean / np.sqrt((left + self._prior_squares) / self.freedom(n)))
 
-    def freedom(self, n: NDArray[np.intp]) -> Floats:
-        """Degrees of freedom of a change in the first n, shape (r,) each."""
+    def freedom(self, n: Indices) -> Floats:
+        """Return the degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
     @property
@@ -91,7 +89,7 @@ class LevelModel:
         return self.scatter_prior.freedom * self.scatter_prior.percent**2
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
-        """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
+        """Return size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
         until = np.array([n])
         product, square = (
             float(products[0, 0]) for products in self._change(kind, until[:, np.newaxis], np.array([k]))
@@ -100,8 +98,8 @@ class LevelModel:
         left = max(total - size * product, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
         return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
 
-    def change_sizes(self, fell: NDArray[np.bool_], n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
-        """Sizes of changes from points k (r,) on in the first n (r,), shape (r,): steps, or slopes a point."""
+    def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
+        """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
         sizes = np.empty(n.size)
         for kind, rows in (("step", np.flatnonzero(fell)), ("slope", np.flatnonzero(~fell))):
             if rows.size:
@@ -109,8 +107,8 @@ class LevelModel:
                 sizes[rows] = (product / square)[:, 0]
         return sizes
 
-    def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
-        """Products of the column of a change with the series and with itself, what the base leaves of both."""
+    def _change(self, kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
+        """Return products of the column of a change with the series and with itself, both orthogonal to the model."""
         tail, square = (
             [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])],
             _change_square(kind, n - k),
@@ -124,8 +122,8 @@ class LevelModel:
                 square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
         return product, square
 
-    def _tail(self, i: int, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
-        """Product of the column of a change with the series (0) or one of the columns (from 1 on)."""
+    def _tail(self, i: int, kind: str, n: Indices, k: Indices) -> Floats:
+        """Return the product of the column of a change with the series (0) or one of the columns (from 1 on)."""
         sums, moments = self._sums[i], self._moments[i]
         tail: Floats = sums[n] - sums[k]
         if i == 0:
@@ -144,8 +142,7 @@ class LevelModel:
 
     @cached_property
     def _levels(self) -> tuple[Floats, Floats]:
-        """Inverse (n + 1, p, p) of the normal matrix of the base, and its coefficients (n + 1, p), by the number of the
-        first points; those of less than two are nothing."""
+        """Inverse normal matrix (n + 1, p, p) and coefficients (n + 1, p) by the number of the first points."""
         n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
         inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
         normal = self._outer[n, 1:, 1:] + self.precision(n)
@@ -189,7 +186,7 @@ class LevelModel:
         return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
 
     def fit_columns(self, columns: Floats) -> ColumnFits:
-        """Each of some sets of k columns (j, k, n) fitted beside the base, one set at a time."""
+        """Fit each of some sets of k columns (j, k, n) together with the model."""
         level = self.inverse_normal_matrix @ self.columns.T @ self.y
         crossed = columns @ self.columns
         leaning = crossed @ self.inverse_normal_matrix
@@ -223,33 +220,32 @@ class ColumnFits(NamedTuple):
     freedom: int
     """Degrees of freedom; the temperature costs none, its influence is known beforehand."""
 
-    def select(self, numbers: NDArray[np.intp]) -> ColumnFits:
-        """The fits of some of the sets."""
+    def select(self, numbers: Indices) -> ColumnFits:
+        """Select some of the fits."""
         rss, size, inverse, leaning = (values[numbers] for values in self[:4])
         return ColumnFits(rss, size, inverse, leaning, self.level, self.level_variance, self.freedom)
 
     def predict(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard error of the series where the columns have other values (j, k, d), shape (j, d) each."""
+        """Predict mean and standard error for other values of the columns (j, k, d), shape (j, d) each."""
         away = columns - self.level_leaning[..., np.newaxis]
         mean = self.level + (self.size[:, np.newaxis] @ away)[:, 0]
         variance = self.level_variance + np.einsum("jkd,jkd->jd", self.inverse @ away, away)
         return mean, np.sqrt(variance * (self.rss / self.freedom)[:, np.newaxis])
 
     def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
-        """Rate of change of the series, and its standard error, where the columns change so (j, k)."""
+        """Return the rate of change and its standard error for slopes of the columns (j, k)."""
         variance = np.einsum("jk,jkl,jl->j", slopes, self.inverse, slopes)
         return (self.size * slopes).sum(axis=1), np.sqrt(variance * self.rss / self.freedom)
 
 
-def _change_square(kind: str, length: NDArray[np.intp]) -> Floats:
-    """Product of the column of a change over so many points with itself."""
+def _change_square(kind: str, length: Indices) -> Floats:
+    """Return the squared norm of the column of a change over some points."""
     points = length.astype(np.float64)
     return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
 
 
-def _change_without_level(kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Sums of the columns of changes from each point k (m,) on in the first n (r, 1), and the root of the square of
-    what a column of ones leaves of them, shape (r, m) each."""
+def _change_without_level(kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
+    """Return sums and root squares of change columns orthogonal to the level, shape (r, m) each."""
     length = (n - k).astype(np.float64)
     sums = length if kind == "step" else length * (length - 1) / 2
     with np.errstate(invalid="ignore"):
@@ -261,13 +257,13 @@ def _cumulative_sums(values: Floats) -> Floats:
 
 
 def is_temperature_usable(temperature: Floats) -> bool:
-    """Whether the temperature counts in any part of a series."""
+    """Return whether enough temperatures are recorded over a wide enough span."""
     recorded = temperature[np.isfinite(temperature)]
     return recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
 
 
 def build_level_model(readings: Readings) -> LevelModel:
-    """The base of a series, the temperature in it only where enough of it is known over a wide enough span."""
+    """Build the model of a series, with the temperature only if enough of it is recorded over a wide enough span."""
     rest, columns = readings.y - readings.y[:1].sum(), [np.ones(readings.y.size)]
     temperature = np.full(rest.size, np.nan) if readings.temperature is None else readings.temperature
     is_warm = is_temperature_usable(temperature)

@@ -19,12 +19,25 @@ from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
 from lobewatch.monitoring.alarm import Alarm, TriggeredAlarm, add_acknowledgements
-from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SeriesChange
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import (
+    DOUBTFUL_DECAY,
+    EVENT_CALL,
+    FREQUENCY_ALARM,
+    FREQUENCY_DECAY,
+    FREQUENCY_ROSE,
+    FREQUENCY_WARNING,
+    MODE_LOST,
+    NEVER_TAPPED,
+    ONE_DIRECTION,
+    PROGRAM_DOUBTFUL,
+    PROGRAM_NOT_STABLE,
+    PROGRAM_UNKNOWN,
     STATUS_BY_CODE,
     UNREADABLE_NEXT_STEP,
+    VALUE_CHANGED,
     StatusLevel,
     add_file_remedy,
     count_days_left,
@@ -44,70 +57,69 @@ OTHER_VALUES = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
 MIN_REPORTED_CHANGE = 0.1
 """Change of these (%) that is told; no verdict feels a smaller one, and computed data have such."""
 RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (run-in)?"
-"""What is said of a fall as that of bearings that run in; it rings like any other."""
+"""What is said of a drop as that of bearings that run in; it triggers an alarm like any other."""
 
 
-def lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
-    """Remark on a newest test that does not show the mode followed."""
+def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
+    """Remark on a newest test that does not show the followed mode."""
     if not newest.frequency.is_known and newest.direction != CROSS_TAP:
-        cure = "Tap again: the mode that is followed was not found in the newest test."
-        yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+        yield MODE_LOST.remark(name)
 
 
-def drop_limit_remarks(name: str, fall: Estimate, limits: LimitsTable) -> Iterator[Remark]:
-    """Remark on a fall that has reached a limit of machine.toml."""
-    text = f"frequency fallen by {fall.value:.1f} % since the first tests"
-    if fall.value >= limits.frequency_alarm_percent:
-        cure = "Before the next part have the bearings, the tool and its clamping looked at, then tap again."
-        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
-    elif fall.value >= limits.frequency_warn_percent:
-        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
-        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
+def _drop_limit_remarks(name: str, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
+    """Remark on a frequency drop that has reached a limit of machine.toml."""
+    if drop.value >= limits.frequency_alarm_percent:
+        yield FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
+    elif drop.value >= limits.frequency_warn_percent:
+        yield FREQUENCY_WARNING.remark(name, drop=drop.value, limit=limits.frequency_warn_percent)
 
 
-def trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
-    """Remarks on what the watch over the frequency sees: a fall, a doubt, a rise. path: of the folder, for commands."""
+def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
+    """Remark on drops, doubtful drops and rises of the frequency; path: of the machine folder."""
     folder = shlex.quote(str(path))
-    event = f'lobewatch event {folder} "what was done" --new-baseline'
+    event = EVENT_CALL.format(folder=folder)
     if trend.open_drop is not None:
-        fall = trend.open_drop.change
-        course = "fell at once before" if fall.kind == "step" else "has been falling since"
-        text = f"frequency {course} {trend.drop_since:%Y-%m-%d}, by {_change_text(fall.size, fall.half_width)}"
-        text += RUN_IN_TEXT if trend.is_run_in else ""
-        cure = f"Have the bearings, the tool and its clamping looked at; after a repair: {event}"
-        yield Remark("decay", name, text, f"{cure}. Known already: lobewatch ack {folder}")
+        yield FREQUENCY_DECAY.remark(
+            name,
+            course=_course_text(trend.open_drop.change),
+            since=trend.drop_since,
+            change=_change_text(trend.open_drop.change),
+            run_in=RUN_IN_TEXT if trend.is_run_in else "",
+            event=event,
+            folder=folder,
+        )
     elif trend.detection.needs_repeat:
-        text = "the newest test is lower than those before it"
-        cure = f"Clamp the tool anew and tap again: lobewatch tap {folder} --reclamped shows whether it fell."
-        yield Remark("decay-doubtful", name, text, cure)
+        yield DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         rise = trend.detection.rise
-        text = f"frequency rose by {_change_text(-rise.size, rise.half_width)}: assembly changed?"
-        yield Remark("frequency-rose", name, text, f"If so: {event}")
+        yield FREQUENCY_ROSE.remark(name, change=_change_text(rise._replace(size=-rise.size)), event=event)
 
 
-def value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
-    """Remarks on changes of damping ratio and stiffness."""
-    for field, word in OTHER_VALUES.items():
-        newest = series.values[field].find_newest_change()
+def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
+    """Remark on changes of damping ratio and stiffness."""
+    for value, label in OTHER_VALUES.items():
+        newest = series.values[value].find_newest_change()
         if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
             time, change = newest
-            verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
-            course = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
-            by = _change_text(change.size, change.half_width)
-            text = f"{word} {course} {time:%Y-%m-%d}, by {by}; programs are judged with it, the light does not watch it"
-            yield Remark("value-changed", name, text)
+            yield VALUE_CHANGED.remark(
+                name, value=label, course=_course_text(change), since=time, change=_change_text(change)
+            )
 
 
-def _change_text(fall: float, half_width: float) -> str:
-    """Size of a change (%), from that of its logarithm (%) with the half-width of its 95 % interval."""
-    share = math.exp(-fall / 100)
-    return f"{100 * abs(1 - share):.2f} ±{half_width * share:.2f} %"
+def _course_text(change: SeriesChange) -> str:
+    past, present = ("fell", "falling") if change.size > 0 else ("rose", "rising")
+    return f"{past} at once before" if change.kind == "step" else f"has been {present} since"
+
+
+def _change_text(change: SeriesChange) -> str:
+    """Format the size of a change (%) with the half-width of its 95 % interval; both are logarithmic in the series."""
+    ratio = math.exp(-change.size / 100)
+    return f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} %"
 
 
 @dataclass(frozen=True)
 class SeriesStatus:
-    """The standing of one tool in one direction."""
+    """The status of one tool in one direction."""
 
     tool: str
     """Tool in the spindle."""
@@ -118,13 +130,13 @@ class SeriesStatus:
     first_time: datetime
     """Time of the test that it is compared with."""
     drop: Estimate
-    """Fall of the followed frequency from the start of the series to the last test that shows it (%)."""
+    """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
     """Points, alarm and forecast; None where no test of it can be compared with."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
     triggered: tuple[TriggeredAlarm, ...]
-    """Those that ring."""
+    """Those that trigger an alarm."""
     history: SeriesHistory = field(compare=False, repr=False)
     """Rows that all this follows from, and the history of their values."""
 
@@ -141,12 +153,12 @@ class SeriesStatus:
 
 @dataclass(frozen=True)
 class MachineStatus:
-    """The standing of one machine."""
+    """The status of one machine."""
 
     time: datetime
-    """Time that it is the standing at."""
+    """Time that it is the status at."""
     reasons: tuple[Remark, ...]
-    """Reasons in order of harm, without what a person has said to them."""
+    """Reasons in order of severity, without what a person has said to them."""
     next_step: str
     """Next step, one sentence."""
     remarks: tuple[Remark, ...]
@@ -154,7 +166,7 @@ class MachineStatus:
     alarms: tuple[Alarm, ...] = ()
     """Alarms that are open, in the order of their reasons."""
     series: tuple[SeriesStatus, ...] = ()
-    """Series, the one that fell most first."""
+    """Series, the one that dropped most first."""
     last_tap: datetime | None = None
     """Time of the newest tap test; None where there is none."""
     days_left: float | None = None
@@ -162,16 +174,29 @@ class MachineStatus:
 
     @property
     def status(self) -> StatusLevel:
-        """Light of the worst reason."""
+        """Status of the worst reason."""
         return worst_status(self.remarks)
 
     @property
     def is_early(self) -> bool:
-        """Whether its alarm is that of a fall short of every limit."""
+        """Whether its alarm is that of a drop short of every limit."""
         return is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
-        """The standing of one series; None where there is none."""
+        """Return the status of one series, or None.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        direction
+            Direction at the tool tip, "x" or "y".
+
+        Returns
+        -------
+        SeriesStatus or None
+            Status of the series; None if it was never tapped.
+        """
         fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
         return next(fits, None)
 
@@ -185,18 +210,17 @@ def assess_status(
     acknowledgements: Sequence[Acknowledgement] = (),
     scatter: FleetScatter | None = None,
 ) -> MachineStatus:
-    """The standing at a time; the last row holds the word on every program.
+    """Assess the status of a machine at a time; the last row has the verdict on every program.
 
-    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first; scatter:
-    what other machines told of it.
+    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first;
+    scatter: what other machines told of it.
     """
     rows = history.current
     if not rows and files:
         return _build_status(now, [unreadable_remark("; ".join(map(str, files)))], UNREADABLE_NEXT_STEP)
     if not rows:
-        cure = "Take the first tap test: all others are compared with it."
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
-        return _build_status(now, [Remark("never-tapped", "", f"no tap test {since}", cure)])
+        return _build_status(now, [NEVER_TAPPED.remark("", since=since)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.tap_interval_days
@@ -229,7 +253,7 @@ def _build_status(
     left: float | None = None,
     alarms: Sequence[Alarm] = (),
 ) -> MachineStatus:
-    """The standing with these reasons; well: the next step where none says another."""
+    """Build the status from its remarks; well: next step where no remark has one."""
     ordered = sort_by_severity(remarks)
     said = add_acknowledgements(ordered, alarms, now)
     return MachineStatus(
@@ -252,10 +276,10 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
     of_limits, of_watch = (
-        [*drop_limit_remarks(name, fall, machine.limits)],
-        [*trend_remarks(name, trend, path)] if trend else [],
+        [*_drop_limit_remarks(name, fall, machine.limits)],
+        [*_trend_remarks(name, trend, path)] if trend else [],
     )
-    remarks = [*lost_mode_remarks(name, newest), *of_limits, *of_watch, *value_change_remarks(name, series)]
+    remarks = [*_lost_mode_remarks(name, newest), *of_limits, *of_watch, *_value_change_remarks(name, series)]
     raised = [
         TriggeredAlarm(remark, row.tap_id, row.time)
         for remarks, row in (
@@ -274,20 +298,17 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
     to_tap = {remark.about: remark.cure for remark in _direction_remarks(rows)}
     tools = {program.name: program.tool for program in machine.program}
     for name, ruling in (rows[-1].verdicts or {}).items():
-        tap = to_tap.get(tools[name])
+        tap, stability = to_tap.get(tools[name], ""), ruling.stability.value
         if ruling.stability is Stability.NOT_STABLE:
-            cure = "Change these programs before the next part: lobewatch check names a safe speed and depth."
-            cure = f"Do not run these programs. {tap}" if tap else cure
-            yield Remark("program-not-stable", name, ruling.stability.value, cure)
+            yield PROGRAM_NOT_STABLE.remark(name, tap and f"Do not run these programs. {tap}", stability=stability)
         elif ruling.stability is Stability.UNKNOWN:
-            yield Remark("program-unknown", name, ruling.stability.value, "See why with lobewatch check.")
+            yield PROGRAM_UNKNOWN.remark(name, stability=stability)
         elif ruling.stability is Stability.DOUBTFUL:
-            cure = tap or "See with lobewatch check what would settle it, and where to go until then."
-            yield Remark("program-doubtful", name, ruling.stability.value, cure)
+            yield PROGRAM_DOUBTFUL.remark(name, tap, stability=stability)
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
-    """The alarm of a program that is not stable: raised by the first of the newest tap tests that all say so."""
+    """Build the alarm of a program that is not stable, triggered by the first of the tap tests that all say so."""
     first = rows[-1]
     for row in reversed(rows):
         ruling = (row.verdicts or {}).get(remark.about)
@@ -303,9 +324,7 @@ def _direction_remarks(rows: Sequence[HistoryRow]) -> Iterator[Remark]:
         tapped = {direction for name, direction in pairs if name == tool and _is_frequency_known(rows, name, direction)}
         if len(tapped) == 1:
             direction = tapped.pop()
-            missing = "y" if direction == "x" else "x"
-            cure = f"Tap direction {missing} of the same tool too: no program is sure with one direction alone."
-            yield Remark("one-direction", tool, f"tapped in direction {direction} alone", cure)
+            yield ONE_DIRECTION.remark(tool, direction=direction, missing="y" if direction == "x" else "x")
 
 
 def _is_frequency_known(rows: Sequence[HistoryRow], tool: str, direction: str) -> bool:

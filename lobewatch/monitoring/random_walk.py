@@ -10,17 +10,15 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.monitoring.level_model import MIN_RESIDUAL_SHARE, LevelModel
 from lobewatch.monitoring.trend_shapes import PRIOR_ODDS, ShapeKind, TrendShape
 
 LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances that the level gathers over the span, in that of a point; chosen."""
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
-"""Variances that the rate, in levels a span, gathers over the span, likewise; chosen."""
-
-Floats = NDArray[np.float64]
+"""Variances that the rate, in levels a span, gathers over the span, too; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +39,13 @@ class RandomWalkFits:
         """Degrees of freedom, shape (j,)."""
         return np.full(len(self.shapes), self.points.freedom)
 
-    def select(self, numbers: NDArray[np.intp]) -> Self:
-        """Some of the lines alone."""
+    def select(self, numbers: Indices) -> Self:
+        """Select some of the lines."""
         shapes = tuple(self.shapes[j] for j in numbers)
         return replace(self, shapes=shapes, evidence=self.evidence[numbers], variance=self.variance[numbers])
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard error of each at dates that count from the first point on, shape (j, d) each."""
+        """Predict mean and standard error of each at dates from the first point on, shape (j, d) each."""
         ahead = at / self.points.span
         is_bend = self.points.kind == "bend"
         return self._predict(
@@ -55,7 +53,7 @@ class RandomWalkFits:
         )
 
     def rate(self) -> tuple[Floats, Floats]:
-        """Rate of change of each at the last point, that of the line where the level wanders; shape (j,) each."""
+        """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
         is_bend, span = self.points.kind == "bend", self.points.span
         crossed = is_bend * self.points.share[:, np.newaxis] ** 2 / 2
         rate, error = self._predict(crossed, np.array([float(is_bend)]), np.ones(1), 0.0)
@@ -116,7 +114,7 @@ class _RotatedPoints:
 
 
 def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWalkFits:
-    """Lines whose level ("wander") or rate ("bend") wanders; at: dates from the first point on, shape (n,)."""
+    """Fit lines whose level ("wander") or rate ("bend") is a random walk; at: dates, shape (n,)."""
     points = _rotate_points(base, at, kind)
     amounts = RATE_VARIANCES if kind == "bend" else LEVEL_VARIANCES
     still, _, _ = points.solve(np.ones(at.size))
@@ -145,7 +143,7 @@ def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoi
 
 
 def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:
-    """Covariance of what wanders, its amount being 1, at two sets of shares of the span, shape (n, d)."""
+    """Return the covariance of the random walk, its amount being 1, at two sets of shares of the span, shape (n, d)."""
     first = np.minimum(share[:, np.newaxis], ahead)
     return first**3 / 3 + first**2 * np.abs(share[:, np.newaxis] - ahead) / 2 if is_bend else first
 

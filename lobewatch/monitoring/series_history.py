@@ -1,6 +1,6 @@
 """One series of tap tests and what follows from its rows: where each value started, and how it has changed since.
 
-Made once for a standing and handed on with it. What is worked out of it lasts as long as it does.
+Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from functools import cached_property
 from itertools import chain, compress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsm import RemainingPreload, calibrate, remaining_preload
+from lobewatch.arrays import Flags, Floats
 from lobewatch.history.history import WATCHED_VALUES, HistoryRow
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
@@ -32,9 +32,9 @@ class ValueHistory:
     """Field of a row, one of `WATCHED`."""
     rows: tuple[HistoryRow, ...]
     """Rows of the series, oldest first, n of them."""
-    values: NDArray[np.float64]
+    values: Floats
     """Value of each row and its standard error, shape (n, 2)."""
-    has_questions: NDArray[np.bool_]
+    has_questions: Flags
     """Whether anything is asked about a row that nobody has answered, shape (n,)."""
     other_direction: ValueHistory | None = None
     """The same value in the other direction; None where nothing is known of it, or where it does not count."""
@@ -96,14 +96,14 @@ class ValueHistory:
         return self.change_at(self.rows[-1])
 
     def change_at(self, row: HistoryRow) -> Estimate:
-        """Change (%) from the start to a row; unknown where that does not know the value."""
+        """Return the change (%) from the start to a row; unknown if the row has no value."""
         value: Estimate = getattr(row, self.name)
         if not value.is_known:
             return UNKNOWN_ESTIMATE
         return Estimate(0.0, 0.0) if self.start == value else value.change_since(self.start)
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
-        """The change that the newest points are sure of, whatever the temperature, and its time; None without one."""
+        """Find the change that the newest points are sure of, and its time, or None."""
         rows, numbers = self._positive
         reclamped = [row.conditions.reclamped for row in rows]
         times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
@@ -111,7 +111,7 @@ class ValueHistory:
         return None if change is None else (times[change.point], change)
 
     @property
-    def _positive(self) -> tuple[tuple[HistoryRow, ...], NDArray[np.float64]]:
+    def _positive(self) -> tuple[tuple[HistoryRow, ...], Floats]:
         """The sure rows whose value is one to take a logarithm of, with their numbers, shape (n, 2)."""
         counts = np.isfinite(self.values[:, 0]) & ~self.has_questions & (self.values[:, 0] > 0)
         return self._select(counts), self.values[counts]
@@ -121,7 +121,7 @@ class ValueHistory:
         """The rows that the trend is of, oldest first."""
         return self._positive[0]
 
-    def _select(self, counts: NDArray[np.bool_]) -> tuple[HistoryRow, ...]:
+    def _select(self, counts: Flags) -> tuple[HistoryRow, ...]:
         return self.rows if counts.all() else tuple(compress(self.rows, counts.tolist()))
 
 
@@ -141,13 +141,13 @@ class SeriesHistory:
 
     @property
     def drop(self) -> Estimate:
-        """Fall of the frequency (%) to the newest test, or where that is in question, to another that fell farther."""
+        """Frequency drop (%) to the newest test, or where that is in question, to another that dropped farther."""
         newest = [rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows]
         change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN_ESTIMATE)
         return Estimate(-change.value + 0.0, change.std)
 
     def first_below(self, percent: float) -> HistoryRow | None:
-        """The first of the newest tap tests that all show a fall of so much (%); None where the newest does not."""
+        """Find the first of the newest tap tests that all show a drop of this much (%), or None."""
         first = None
         for row in reversed(self.frequency.known_rows):
             if -self.frequency.change_at(row).value < percent and (first is not None or not row.questions):
@@ -157,7 +157,7 @@ class SeriesHistory:
 
     @property
     def first_falling(self) -> HistoryRow | None:
-        """The tap test that raised the alarm of the watch over the frequency; None where none is open."""
+        """The tap test that triggered the alarm of the monitor over the frequency; None where none is open."""
         trend = self.frequency.trend
         if trend is None or trend.open_drop is None:
             return None
@@ -167,7 +167,7 @@ class SeriesHistory:
 def build_series_history(
     rows: Iterable[HistoryRow], beside: Iterable[HistoryRow] = (), scatter: SeriesScatterPrior = NO_SERIES_PRIOR
 ) -> SeriesHistory:
-    """The history of a series from its rows, oldest first, one at least.
+    """Build the history of a series from its rows, oldest first, one at least.
 
     beside: rows of the same tool in the other direction; scatter: what is known of that of the frequency beforehand.
     """
@@ -189,10 +189,10 @@ def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHisto
 
 
 def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
-    """The preload left in the bearings of a machine, from the change of their stiffness; see dsm.preload_left.
+    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.preload_left.
 
-    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it open,
-    or where one of the calibrated bearings has rollers.
+    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it
+    open, or where one of the calibrated bearings has rollers.
     """
     stiffness = series.values["bearing_stiffness"]
     change = stiffness.change
@@ -205,7 +205,7 @@ def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreloa
 
 
 def _is_preload_open(row: HistoryRow, machine: Machine) -> bool:
-    """Whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
+    """Return whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
     frequency, std = row.frequency
     try:
         model = machine.model(row.tool)

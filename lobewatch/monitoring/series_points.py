@@ -12,9 +12,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Floats, Indices
 
 
 class ScatterPrior(NamedTuple):
@@ -59,7 +58,7 @@ class Readings:
     """What is known of its scatter beforehand."""
 
     def since(self, begin: int) -> Self:
-        """The points from one on."""
+        """Return the points from one on."""
         temperature, other = (
             None if values is None else values[begin:] for values in (self.temperature, self.other_direction)
         )
@@ -67,7 +66,7 @@ class Readings:
         return replace(self, y=self.y[begin:], temperature=temperature, operators=operators, other_direction=other)
 
     @property
-    def shared_points(self) -> NDArray[np.intp]:
+    def shared_points(self) -> Indices:
         """Points that the other direction has too."""
         return (
             np.empty(0, np.intp) if self.other_direction is None else np.flatnonzero(np.isfinite(self.other_direction))
@@ -99,23 +98,23 @@ class PercentSeries(NamedTuple):
     temperatures: tuple[float, ...]
     """Temperatures of the spindle (degC); NaN where not recorded."""
     reclamped: tuple[bool, ...]
-    """Whether the tool was clamped anew for each of them."""
+    """Whether the tool was reclamped for each of them."""
 
     def percent(self, span: TapRange) -> float:
-        """Change of a point (%): mean of two, median from three on."""
+        """Return the change of a point (%): mean of two, median from three on."""
         first, end = span
         if end - first > 2:
             return median(self.percents[first:end])
         return (self.percents[first] + self.percents[end - 1]) / 2
 
     def temperature(self, span: TapRange) -> float:
-        """Mean of the temperatures recorded for a point; NaN where none was."""
+        """Return the mean of the temperatures recorded for a point, or NaN."""
         recorded = [temperature for temperature in self.temperatures[slice(*span)] if temperature == temperature]
         return sum(recorded) / len(recorded) if recorded else np.nan
 
 
 def divide_into_points(series: PercentSeries) -> Iterator[TapRange]:
-    """The points of a series, one test at least."""
+    """Divide the tap tests of a series, at least one, into points."""
     first = 0
     for tap in range(1, len(series.times)):
         if series.reclamped[tap] or series.times[tap] - series.times[first] >= SAME_CLAMPING_TIME:
@@ -132,7 +131,7 @@ STANDSTILL_DAYS = 1e-6
 
 
 def days_of_use(days: Floats, hours: Floats) -> Floats:
-    """Days (n,) at which the points would lie had the spindle always run as much a day as lately; the last one stays.
+    """Return the days (n,) of the points had the spindle always run as much as lately; the last point stays.
 
     days: increasing; hours: that it had run (h). The days themselves where hours are missing or go back, or where it
     has not run lately.
@@ -158,7 +157,7 @@ MAD_TO_STD = 1.4826
 
 
 def winsorize(y: Floats) -> Floats:
-    """A series (n,) with the points that stand alone drawn in to 3 scatters from those before them.
+    """Clip isolated outliers of a series (n,) to three robust standard deviations.
 
     What a point becomes follows from those until the one after it, so that the last one is as it was measured.
     """
@@ -178,8 +177,8 @@ def winsorize(y: Floats) -> Floats:
 MIN_SCATTER_POINTS = 8
 """Points of a series from which on its scatter tells anything; chosen."""
 DOF_PER_DIFFERENCE = 0.25
-"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares, differences
-of neighbours two thirds of that of residuals."""
+"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares,
+differences of neighbours two thirds of that of residuals."""
 MIN_OTHER_SERIES = 4
 """Series that anything is said of others from; chosen."""
 MAX_PRIOR_DOF = 30.0
@@ -187,14 +186,14 @@ MAX_PRIOR_DOF = 30.0
 
 
 def estimate_scatter(y: Floats) -> ScatterPrior:
-    """Scatter from point to point of a series (n,), by the median of its steps: what it fell counts little."""
+    """Estimate the scatter from point to point of a series (n,) by the median of its steps."""
     if y.size < MIN_SCATTER_POINTS:
         return NO_SCATTER_PRIOR
     return ScatterPrior(MAD_TO_STD * float(np.median(np.abs(np.diff(y)))) / 2**0.5, DOF_PER_DIFFERENCE * (y.size - 1))
 
 
 def pool_scatter(series: Sequence[ScatterPrior]) -> ScatterPrior:
-    """What the scatters of some series, each known with its own degrees of freedom, say of another one.
+    """Pool the scatters of several series into a prior for another one.
 
     Empirical Bayes: variances scattered as scaled inverse chi squares; its two parameters by the moments of their
     logarithms (Smyth 2004, "Linear models and empirical Bayes methods", Stat. Appl. Genet. Mol. Biol. 3(1), section

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
@@ -22,113 +22,203 @@ CodedT = TypeVar("CodedT", Remark, Alarm)
 
 
 class StatusLevel(StrEnum):
-    """The light of a machine, worst first."""
+    """The status of a machine, worst first."""
 
     ALARM = "alarm"
-    """Beyond a limit: a fall, a decay, or a program that is not stable any more."""
+    """Beyond a limit: a drop, a decay, or a program that is not stable any more."""
     UNKNOWN = "unknown"
     """Damaged, unreadable or never tapped: nothing can be said."""
     WARN = "warn"
-    """In want of attention: a smaller fall, a doubt, damage, a test that is due."""
+    """In want of attention: a smaller drop, an uncertainty, damage, a test that is due."""
     GOOD = "good"
     """Nothing is known to be wrong."""
 
 
-STATUS_BY_CODE = {
-    "frequency-alarm": StatusLevel.ALARM,
-    "decay": StatusLevel.ALARM,
-    "program-not-stable": StatusLevel.ALARM,
-    "unreadable": StatusLevel.UNKNOWN,
-    "never-tapped": StatusLevel.UNKNOWN,
-    "journal-damaged": StatusLevel.WARN,
-    "tap-damaged": StatusLevel.WARN,
-    "tap-unreadable": StatusLevel.WARN,
-    "tap-unlisted": StatusLevel.WARN,
-    "file-damaged": StatusLevel.WARN,
-    "cut-damaged": StatusLevel.WARN,
-    "cut-unlisted": StatusLevel.WARN,
-    "frequency-warn": StatusLevel.WARN,
-    "decay-doubtful": StatusLevel.WARN,
-    "frequency-jump": StatusLevel.WARN,
-    "mode-lost": StatusLevel.WARN,
-    "no-mode-in-band": StatusLevel.WARN,
-    "no-mode-to-follow": StatusLevel.WARN,
-    "other-band": StatusLevel.WARN,
-    "stiffness-jump": StatusLevel.WARN,
-    "stiffness-off-model": StatusLevel.WARN,
-    **dict.fromkeys(CLOCK_QUESTIONS, StatusLevel.WARN),
-    "tap-in-future": StatusLevel.WARN,
-    "overdue": StatusLevel.WARN,
-    "program-unknown": StatusLevel.WARN,
-    "program-doubtful": StatusLevel.WARN,
-    "frequency-rose": StatusLevel.GOOD,
-    "value-changed": StatusLevel.GOOD,
-    "one-direction": StatusLevel.GOOD,
-}
-"""Light of each reason by its code, in order of harm."""
+@dataclass(frozen=True)
+class StatusRule:
+    """A rule of the machine status: what a remark code means, with its texts; words in braces are filled in."""
 
-LIMIT_CODES = ("frequency-alarm", "frequency-warn", "program-not-stable")
-"""Reasons with which an alarm is not early."""
+    code: str
+    """Code of the remark."""
+    status: StatusLevel
+    """Status of a machine with this remark."""
+    text: str = ""
+    """Sentence of the remark; empty where another package writes it."""
+    remedy: str = ""
+    """Next step."""
+    is_limit: bool = False
+    """Whether a limit of machine.toml or a program is exceeded: then an alarm is not early."""
+
+    def remark(self, about: str, remedy: str = "", **values: object) -> Remark:
+        """Build the remark on a series, a program or a file, with another remedy where one is given."""
+        return Remark(self.code, about, self.text.format(**values), (remedy or self.remedy).format(**values))
+
+
+FREQUENCY_ALARM = StatusRule(
+    "frequency-alarm",
+    StatusLevel.ALARM,
+    "frequency fallen by {drop:.1f} % since the first tests (alarm at {limit:g} %)",
+    "Before the next part have the bearings, the tool and its clamping looked at, then tap again.",
+    is_limit=True,
+)
+FREQUENCY_DECAY = StatusRule(
+    "decay",
+    StatusLevel.ALARM,
+    "frequency {course} {since:%Y-%m-%d}, by {change}{run_in}",
+    "Have the bearings, the tool and its clamping looked at; after a repair: {event}. "
+    "Known already: operator_entries.acknowledge_alarms {folder}",
+)
+PROGRAM_NOT_STABLE = StatusRule(
+    "program-not-stable",
+    StatusLevel.ALARM,
+    "{stability}",
+    "Change these programs before the next part: Logbook.verdicts names a safe speed and depth.",
+    is_limit=True,
+)
+UNREADABLE = StatusRule("unreadable", StatusLevel.UNKNOWN, "{reason}")
+NEVER_TAPPED = StatusRule(
+    "never-tapped",
+    StatusLevel.UNKNOWN,
+    "no tap test {since}",
+    "Take the first tap test: all others are compared with it.",
+)
+FREQUENCY_WARNING = StatusRule(
+    "frequency-warn",
+    StatusLevel.WARN,
+    "frequency fallen by {drop:.1f} % since the first tests (warning at {limit:g} %)",
+    "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon.",
+    is_limit=True,
+)
+DOUBTFUL_DECAY = StatusRule(
+    "decay-doubtful",
+    StatusLevel.WARN,
+    "the newest test is lower than those before it",
+    "Clamp the tool anew and tap again: TapSession.run {folder} Conditions.reclamped shows whether it fell.",
+)
+MODE_LOST = StatusRule(
+    "mode-lost",
+    StatusLevel.WARN,
+    "the newest test does not show the mode followed",
+    "Tap again: the mode that is followed was not found in the newest test.",
+)
+OVERDUE = StatusRule(
+    "overdue", StatusLevel.WARN, "the next tap test is overdue by {days}", "Take the tap test that is due."
+)
+PROGRAM_UNKNOWN = StatusRule("program-unknown", StatusLevel.WARN, "{stability}", "See why with Logbook.verdicts.")
+PROGRAM_DOUBTFUL = StatusRule(
+    "program-doubtful",
+    StatusLevel.WARN,
+    "{stability}",
+    "See with Logbook.verdicts what would settle it, and where to go until then.",
+)
+FREQUENCY_ROSE = StatusRule(
+    "frequency-rose", StatusLevel.GOOD, "frequency rose by {change}: assembly changed?", "If so: {event}"
+)
+VALUE_CHANGED = StatusRule(
+    "value-changed",
+    StatusLevel.GOOD,
+    "{value} {course} {since:%Y-%m-%d}, by {change}; programs are judged with it, the light does not watch it",
+)
+ONE_DIRECTION = StatusRule(
+    "one-direction",
+    StatusLevel.GOOD,
+    "tapped in direction {direction} alone",
+    "Tap direction {missing} of the same tool too: no program is sure with one direction alone.",
+)
+EVENT_CALL = 'folder_updates.add_event {folder} "what was done" add_event.new_baseline'
+"""Call that records a repair in the journal of a folder."""
+
+
+def _rules_of(*codes: str) -> list[StatusRule]:
+    """Rules of warnings that other packages write."""
+    return [StatusRule(code, StatusLevel.WARN) for code in codes]
+
+
+STATUS_RULES = (
+    FREQUENCY_ALARM,
+    FREQUENCY_DECAY,
+    PROGRAM_NOT_STABLE,
+    UNREADABLE,
+    NEVER_TAPPED,
+    *_rules_of("journal-damaged", "tap-damaged", "tap-unreadable", "tap-unlisted"),
+    *_rules_of("file-damaged", "cut-damaged", "cut-unlisted"),
+    FREQUENCY_WARNING,
+    DOUBTFUL_DECAY,
+    *_rules_of("frequency-jump"),
+    MODE_LOST,
+    *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
+    *_rules_of(*CLOCK_QUESTIONS, "tap-in-future"),
+    OVERDUE,
+    PROGRAM_UNKNOWN,
+    PROGRAM_DOUBTFUL,
+    FREQUENCY_ROSE,
+    VALUE_CHANGED,
+    ONE_DIRECTION,
+)
+"""All rules of the machine status, in order of severity; an unknown code is an error."""
+STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
+"""Status by remark code, in order of severity."""
+LIMIT_CODES = {rule.code for rule in STATUS_RULES if rule.is_limit}
+"""Codes with which an alarm is not early."""
 UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
 """Next step of a machine that cannot be read."""
 
 
 def unreadable_remark(reason: str) -> Remark:
-    """Remark on a machine whose files cannot be read."""
-    return Remark("unreadable", "", reason)
+    """Return the remark on a machine whose files cannot be read."""
+    return UNREADABLE.remark("", reason=reason)
 
 
 def sort_by_severity(remarks: Iterable[CodedT]) -> tuple[CodedT, ...]:
-    """Reasons, or their alarms, in order of harm."""
+    """Sort remarks or alarms by severity."""
     order = list(STATUS_BY_CODE)
     return tuple(sorted(remarks, key=lambda remark: order.index(remark.code)))
 
 
 def worst_status(ordered: Sequence[Remark]) -> StatusLevel:
-    """Light of the worst reason."""
+    """Return the status of the most severe remark."""
     return STATUS_BY_CODE[ordered[0].code] if ordered else StatusLevel.GOOD
 
 
 def is_early_alarm(ordered: Sequence[Remark]) -> bool:
-    """Whether an alarm is of the watch alone: a fall that is sure, but short of every limit and of every program."""
+    """Return whether the only alarm is a detected drop short of every limit and program."""
     codes = {remark.code for remark in ordered}
     return worst_status(ordered) is StatusLevel.ALARM and codes.isdisjoint(LIMIT_CODES)
 
 
 def find_next_step(ordered: Sequence[Remark], well: str) -> str:
-    """Next step, one sentence; well: that where no reason says another."""
+    """Return the next step, one sentence; well: where no remark has one."""
     return ordered[0].cure if ordered and ordered[0].cure else well
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:
-    """Next step where nothing is wrong; newest: when it was tapped last."""
+    """Return the next step where nothing is wrong; newest: time of the last tap test."""
     return f"All is well: tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
 
 
 def count_days_left(newest: datetime, interval_days: float, now: datetime) -> float:
-    """Days until the next tap test is due; newest: when the last one was."""
+    """Return the days until the next tap test is due; newest: time of the last one."""
     return interval_days - (now - newest) / timedelta(days=1)
 
 
 def date_remarks(
     tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
 ) -> Iterator[Remark]:
-    """Remarks that the date alone gives: a test is overdue, or one of the future. path: of the folder, for commands."""
+    """Yield remarks by date: a test is overdue, or in the future; path: of the folder."""
     left = count_days_left(newest, interval_days, now)
     if left < 0:
         days = math.ceil(-left)
-        text = f"the next tap test is overdue by {days} day{'s' if days > 1 else ''}"
-        yield Remark("overdue", "", text, "Take the tap test that is due.")
+        yield OVERDUE.remark("", days=f"{days} day{'s' if days > 1 else ''}")
     yield from future_tap_remarks(tap_id, newest, now, path)
 
 
 def add_file_remedy(remark: Remark) -> Remark:
-    """A remark on a file, with a cure that can be the next step."""
+    """Add a remedy that can be the next step to a remark on a file."""
     return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
 
 
 def add_damage_remarks(ordered: tuple[Remark, ...], damage: Sequence[Remark]) -> tuple[Remark, ...]:
-    """The reasons with what else was found damaged in the folder."""
+    """Add the remarks on damaged files to those of the machine."""
     named = {(remark.code, remark.about) for remark in ordered}
     new = [add_file_remedy(remark) for remark in damage if (remark.code, remark.about) not in named]
     return sort_by_severity([*ordered, *new])

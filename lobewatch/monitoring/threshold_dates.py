@@ -23,11 +23,11 @@ class ThresholdDates(msgspec.Struct, frozen=True):
     earliest: float | None = None
     """At a probability of 10 %; None where not before `foretold_to`."""
     probable: float | None = None
-    """At 50 %; None likewise."""
+    """At 50 %; None also."""
     latest: float | None = None
-    """At 90 %; None likewise."""
+    """At 90 %; None also."""
     forecast_end: float | None = None
-    """Last day that was looked at; None where nothing can be foretold."""
+    """Last day that was checked; None where nothing can be forecast."""
 
     @property
     def is_known(self) -> bool:
@@ -35,7 +35,7 @@ class ThresholdDates(msgspec.Struct, frozen=True):
         return self.is_measured or self.forecast_end is not None
 
     def to_row(self) -> dict[str, str | None]:
-        """As other programs take it: p10, p50, p90, each a date, null where none is in sight, "already"."""
+        """Return the fields p10, p50, p90 for other programs: a date, null where none is in sight, or "already"."""
         dates = zip(("p10", "p50", "p90"), (self.earliest, self.probable, self.latest), strict=True)
         return {name: "already" if self.is_measured else _iso_date(days) for name, days in dates}
 
@@ -52,11 +52,11 @@ class ProgramForecast(msgspec.Struct, frozen=True):
 NO_FORECAST = ThresholdDates()
 ALREADY_REACHED = ThresholdDates(is_measured=True)
 LimitForecasts = tuple[tuple[float, ThresholdDates], ...]
-"""Fixed limits (%) of machine.toml, each with when the worst series has fallen by it."""
+"""Fixed limits (%) of machine.toml, each with when the worst series has dropped by it."""
 
 
 def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:
-    """The earliest of several; where nobody can tell of one of them, that none is in sight is not known."""
+    """Return the earliest of several; unknown if the others have no date and one is unknown."""
     if ALREADY_REACHED in reaches:
         return ALREADY_REACHED
     known = [reach for reach in reaches if reach.is_known]
@@ -72,7 +72,7 @@ def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:
 def build_forecast_rows(
     fates: Mapping[str, ProgramForecast], limits: LimitForecasts
 ) -> dict[str, dict[str, dict[str, str | None]]]:
-    """All dates of a machine as other programs take them: by program and by limit ("10 %")."""
+    """Return all dates of a machine for other programs, by program and by limit ("10 %")."""
     programs = {
         name: {"doubtful": fate.doubtful.to_row(), "not stable": fate.not_stable.to_row()}
         for name, fate in fates.items()
@@ -81,7 +81,7 @@ def build_forecast_rows(
 
 
 def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | None:
-    """The fixed limit that is reached next; None where none is ahead, or nobody can tell.
+    """Return the limit that is reached next, or None.
 
     Where none is in sight: the lowest of them.
     """
@@ -90,7 +90,7 @@ def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | No
 
 
 def build_limit_row(limit: tuple[float, ThresholdDates] | None) -> dict[str, float | str | None] | None:
-    """A limit as other programs take it."""
+    """Return a limit as fields for other programs."""
     if limit is None:
         return None
     percent, reach = limit

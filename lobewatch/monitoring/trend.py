@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
 from lobewatch.monitoring.series_points import (
@@ -29,17 +29,15 @@ from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
 
 MAX_TREND_POINTS = 1000
-"""Number of newest points that alone are judged; chosen, as the work grows with its square."""
+"""Number of newest points that alone are evaluated; chosen, as the work grows with its square."""
 DAYS_PER_MONTH = 30.44
 """Mean length of a month (days)."""
 FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
-"""Time after the last point (days) beyond which nothing is foretold; chosen."""
+"""Time after the last point (days) beyond which nothing is forecast; chosen."""
 MAX_RUN_IN_RATE = 0.4
-"""Rate of a fall over its mean rate so far below which it has slowed down; chosen."""
+"""Rate of a drop over its mean rate so far below which it has slowed down; chosen."""
 N_START_POINTS = 3
-"""Points that the start of a series is looked for in while it has no fitted line; chosen."""
-
-Floats = NDArray[np.float64]
+"""Points that the start of a series is searched in while it has no fitted line; chosen."""
 
 
 class TapValue(NamedTuple):
@@ -58,7 +56,7 @@ class TapValue(NamedTuple):
     operator: str = ""
     """Who held the hammer."""
     reclamped: bool = False
-    """Whether the tool was clamped anew for it."""
+    """Whether the tool was reclamped for it."""
 
 
 class TrendPoint(NamedTuple):
@@ -82,7 +80,7 @@ class TrendPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """One series, judged."""
+    """One series, evaluated."""
 
     points: tuple[TrendPoint, ...]
     """Points, oldest first; one at least."""
@@ -94,15 +92,15 @@ class Trend:
     """Shapes that it allows, over days of use, those behind the last point being days since 1970; None below 8
     points."""
     today: int
-    """Day since 1970 that it is judged on."""
+    """Day since 1970 that it is evaluated on."""
 
     def at_day(self, now: datetime) -> Trend:
-        """This trend as judged on another day."""
+        """Return this trend as of another day."""
         return replace(self, today=int(days_since_epoch(now)))
 
     @cached_property
     def detection(self) -> Detection:
-        """What the watch over its points has seen."""
+        """What the monitor over its points has seen."""
         return detect_changes(self.readings)
 
     @cached_property
@@ -126,8 +124,8 @@ class Trend:
     def start(self) -> float:
         """Its start (%): the highest of the fitted line at the first 8 points, else of the first three points.
 
-        A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
-        spindle that falls from the beginning.
+        A first test clamped badly must not hide a drop for ever, and a mean of the first ones would hide that of a
+        spindle that drops from the beginning.
         """
         if self.past_fit is not None:
             return float(self.past_fit.fitted[:MIN_FORECAST_POINTS].max())
@@ -135,7 +133,7 @@ class Trend:
 
     @property
     def is_stale(self) -> bool:
-        """Whether today is farther from its last point than anything is foretold."""
+        """Whether today is farther from its last point than anything is forecast."""
         return self.forecast is not None and self.today > self.forecast.dates[-1]
 
     @property
@@ -144,7 +142,7 @@ class Trend:
         return self.past_fit is not None and not self.is_stale
 
     def forecast_level(self, percent: float, error: float = 0.0) -> ThresholdDates:
-        """When it falls to a level: 100 ln of the frequency there over that of its first test; error: of that."""
+        """Forecast when a level is reached: 100 ln of the frequency over that of its first test, with its error."""
         if self.forecast is None or self.is_stale:
             return NO_FORECAST
         dates = self.forecast.crossing_dates(percent, error)
@@ -164,12 +162,12 @@ class Trend:
 
     @property
     def open_drop(self) -> DetectedDrop | None:
-        """The newest fall whose alarm is open; None without alarm."""
+        """The newest drop whose alarm is open; None without alarm."""
         return next(reversed(self.detection.open_drops), None)
 
     @property
     def is_run_in(self) -> bool:
-        """Whether the open fall began among the first points and has slowed down since, as new bearings run in."""
+        """Whether the open drop began among the first points and has slowed down since, as new bearings run in."""
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
         fallen = self.start - float(self.past_fit.fitted[-1])
@@ -178,7 +176,7 @@ class Trend:
 
     @property
     def drop_since(self) -> datetime | None:
-        """Time at which the fall began or happened that the alarm is about; None without alarm."""
+        """Time at which the drop began or happened that the alarm is about; None without alarm."""
         return None if self.open_drop is None else self.points[self.open_drop.change.point].time
 
 
@@ -188,10 +186,10 @@ def fit_trend(
     other: Sequence[TapValue] = (),
     known: SeriesScatterPrior = NO_SERIES_PRIOR,
 ) -> Trend:
-    """Judge a series, oldest first, one value at least.
+    """Fit the trend of a series, oldest first, with at least one value.
 
-    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, likewise;
-    known: what is known of its scatter beforehand.
+    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
+    what is known of its scatter beforehand.
     """
     points = _newest_points(series)
     readings = _build_readings(points, _newest_points(other) if other else (), known)
@@ -199,7 +197,7 @@ def fit_trend(
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
-    """The newest points of a series, oldest first."""
+    """Return the newest points of a series, oldest first."""
     times, values, _, temperatures, _, _, reclamped = zip(*series, strict=True)
     percents = PercentSeries(times, _log_percents(values), temperatures, reclamped)
     return tuple(_build_point(percents, series, span) for span in [*divide_into_points(percents)][-MAX_TREND_POINTS:])
@@ -216,14 +214,14 @@ def _build_point(percents: PercentSeries, series: Sequence[TapValue], span: TapR
 def list_newest_percents(
     times: Sequence[datetime], values: Sequence[float], reclamped: Sequence[bool]
 ) -> tuple[list[datetime], list[float]]:
-    """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
+    """Return times and percents of the newest points of a series without temperatures, oldest first."""
     series = PercentSeries(tuple(times), _log_percents(values), (math.nan,) * len(times), tuple(reclamped))
     spans = [*divide_into_points(series)][-MAX_TREND_POINTS:] if times else []
     return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
 
 
 def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
-    """Changes of values, 100 ln of each over the first."""
+    """Return 100 ln of each value over the first."""
     log, first = math.log, values[0] if values else 1.0
     return tuple([100 * log(value / first) for value in values])
 
@@ -241,7 +239,7 @@ def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], 
 
 
 def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) -> Iterator[float]:
-    """Percent of the other direction nearest in time to each point, NaN where there is none within a day."""
+    """Yield the percent of the other direction within a day of each point, else NaN."""
     times = [other.time for other in others]
     for point in points:
         at = bisect(times, point.time)
@@ -250,15 +248,15 @@ def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) 
 
 
 def point_days(points: Sequence[TrendPoint]) -> Floats:
-    """Days since 1970, shape (n,)."""
+    """Return the days since 1970 of points, shape (n,)."""
     return np.array([point.time.timestamp() for point in points]) / 86400
 
 
 def days_since_epoch(time: datetime) -> float:
-    """Days since 1970."""
+    """Return the days since 1970."""
     return time.timestamp() / 86400
 
 
 def date_of_days(days: float) -> datetime:
-    """Date of so many days since 1970."""
+    """Return the date of a number of days since 1970."""
     return datetime.fromtimestamp(86400 * days, UTC)

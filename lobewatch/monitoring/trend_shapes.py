@@ -9,8 +9,8 @@ from itertools import groupby
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.monitoring.level_model import ColumnFits, LevelModel
 
 EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
@@ -22,7 +22,6 @@ RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.1, 1.2
 MIN_RUNAWAY_DISTANCE = 1e-6
 """Least share of the way to that end at which such a curve is drawn."""
 
-Floats = NDArray[np.float64]
 ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
 SHAPE_KINDS: tuple[ShapeKind, ...] = (
     "none",
@@ -48,18 +47,18 @@ PRIOR_ODDS: dict[ShapeKind, float] = {
     "wander": 0.5,
     "bend": 0.5,
 }
-"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many courses hold their dates."""
+"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many trends hold their dates."""
 
 
 class TrendShape(NamedTuple):
-    """One shape that the course of a series may have."""
+    """One shape that the trend of a series may have."""
 
     kind: ShapeKind
-    """Kind: "none", steady; "slope", a line from a point on; "step", fallen once; "curve", accelerating or slowing;
+    """Kind: "none", steady; "slope", a line from a point on; "step", dropped once; "curve", accelerating or slowing;
     "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
     "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
     start: float
-    """Date from which on it falls, or on which it fell; the later one of two slopes; the step of a crash."""
+    """Date from which on it drops, or on which it dropped; the later one of two slopes; the step of a crash."""
     accelerates: bool = False
     """Whether a curve accelerates; else it slows down."""
     rate: float = 0.0
@@ -71,7 +70,7 @@ class TrendShape(NamedTuple):
 
 
 def list_single_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of one column that are tried; dates count from the first point on."""
+    """List all shapes of one column; dates count from the first point on."""
     return [
         TrendShape("none", 0.0),
         TrendShape("line", 0.0),
@@ -84,7 +83,7 @@ def list_single_shapes(at: Floats) -> list[TrendShape]:
 
 
 def list_pair_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of two columns that are tried."""
+    """List all shapes of two columns."""
     ramps, steps = [0.0, *at[1:-3].tolist()], at[2:-1].tolist()
     slopes = [TrendShape("slopes", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
     crashes = [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
@@ -92,14 +91,13 @@ def list_pair_shapes(at: Floats) -> list[TrendShape]:
 
 
 def list_triple_shapes(at: Floats) -> list[TrendShape]:
-    """All shapes of three columns that are tried."""
+    """List all shapes of three columns."""
     ramps = at[1:-3].tolist()
     return [TrendShape("breaks", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
 
 
 def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floats:
-    """Courses of shapes of one column over dates that count from the first point on, shape (j, 1, d); span: of the
-    series."""
+    """Build the columns of one-column shapes at dates from the first point on, shape (j, 1, d)."""
     starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
     columns, end = np.empty((len(shapes), at.size)), 0
     for kind, alike in groupby(shape.kind for shape in shapes):
@@ -122,7 +120,7 @@ def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floa
 
 
 def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
-    """Courses of shapes of two columns, shape (j, 2, d): that of the earlier date, that of the later one."""
+    """Build the columns of two-column shapes, shape (j, 2, d): the earlier date, the later one."""
     places = np.array([(shape.end, shape.start) for shape in shapes]).reshape(-1, 2, 1)
     columns = np.maximum(at - places, 0.0)
     is_crash = np.array([shape.kind == "crash" for shape in shapes], dtype=bool)
@@ -131,7 +129,7 @@ def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
 
 
 def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
-    """Courses of shapes of three columns, shape (j, 3, d): the line, and both dates."""
+    """Build the columns of three-column shapes, shape (j, 3, d): the line, and both dates."""
     line = np.broadcast_to(at, (len(shapes), 1, at.size))
     return np.concatenate([line, build_pair_columns(shapes, at)], axis=1)
 
@@ -168,39 +166,39 @@ class ShapeFits:
         """Variance of a point around each shape, shape (j,)."""
         return self.fits.rss / self.fits.freedom
 
-    def select(self, numbers: NDArray[np.intp]) -> Self:
-        """Some of the shapes alone."""
+    def select(self, numbers: Indices) -> Self:
+        """Select some of the shapes."""
         shapes = tuple(self.shapes[j] for j in numbers)
         return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard error of each at dates, shape (j, d) each."""
+        """Predict mean and standard error of each at dates, shape (j, d) each."""
         return self.fits.predict(self.build_columns(self.shapes, at))
 
     def rate(self) -> tuple[Floats, Floats]:
-        """Rate of change of each at the last point, and its standard error, shape (j,) each."""
+        """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
         near = self.build_columns(self.shapes, np.array([self.span - RATE_STEP * self.span, self.span]))
         return self.fits.rate(np.diff(near)[..., 0] / (RATE_STEP * self.span))
 
 
 def fit_single_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of one column."""
+    """Fit the shapes of one column."""
     span = float(at[-1])
     return _fit_shapes(base, at, list_single_shapes(at), lambda shapes, dates: build_columns(shapes, dates, span))
 
 
 def fit_pair_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of two columns."""
+    """Fit the shapes of two columns."""
     return _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
 
 
 def fit_triple_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Shapes of three columns."""
+    """Fit the shapes of three columns."""
     return _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)
 
 
 def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], drawn: ColumnBuilder) -> ShapeFits:
-    """Within a kind equal weight beforehand for each of its shapes."""
+    """Fit shapes; within a kind each has the same prior weight."""
     fits = base.fit_columns(drawn(shapes, at))
     counts = Counter(shape.kind for shape in shapes)
     columns = np.array([0 if shape.kind == "none" else fits.size.shape[1] for shape in shapes])

@@ -7,18 +7,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsm import Spindle, SpinningSegment, spinning_element
+from dsm.arrays import Floats
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup
-
-_Float = NDArray[np.float64]
 
 
 def printed_element(
     segment: SpinningSegment, frequency: float, speed_rpm: float, coupling: float = 1.0, one_sign: bool = True
-) -> _Float:
+) -> Floats:
     """Stiffness of one element at a frequency (Hz) seen from the shaft, shape (8, 8), laid out as `spinning_element`.
 
     The eight solutions exp(r z) of (13), r by (14) to (16), each with its ratio of v to u: their end forces are A,
@@ -45,7 +43,7 @@ def printed_element(
             return np.full((8, 8), np.nan)
 
 
-def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) -> _Float:
+def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) -> Floats:
     """The two fourth powers of the roots of (13) by (14) to (16) (m^-4), shape (2,)."""
     w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
     exx, eyy, mass = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsm import Spindle
+from dsm.arrays import Floats
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
-
-_Float = NDArray[np.float64]
 
 ElementKind = Literal["euler-bernoulli", "timoshenko", "linear"]
 """Hermite cubics without shear; the cubics of Timoshenko theory; straight lines with shear, as BEAM188 has them."""
@@ -49,7 +47,7 @@ def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, bearings
     return float(1 / np.sqrt(inverse[0]) / (2 * np.pi))
 
 
-def _mesh(spindle: Spindle, elements: int) -> tuple[_Float, _Float]:
+def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
     """Length of each element (m), and EI (N m^2), kappa GA (N), mass per length (kg/m), rho I (kg m), shape (4, n)."""
     if elements < len(spindle.segments):
         raise ValueError(f"elements={elements} is less than the {len(spindle.segments)} segments; give one for each")
@@ -71,13 +69,13 @@ def _mesh(spindle: Spindle, elements: int) -> tuple[_Float, _Float]:
     return np.repeat(length / count, count), np.repeat(section, count, axis=1)
 
 
-def _cowper(poisson: float, bore: _Float) -> _Float:
+def _cowper(poisson: float, bore: Floats) -> Floats:
     """Shear coefficient of a ring, bore over outer diameter (G. R. Cowper, J. Appl. Mech. 33, 1966)."""
     square = (1 + bore**2) ** 2
     return np.asarray(6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + (20 + 12 * poisson) * bore**2))
 
 
-def _matrices(length: _Float, section: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+def _matrices(length: Floats, section: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
     """Stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
     rigidity, shear, mass, rotary = section
     point, weight = np.polynomial.legendre.leggauss(4)
@@ -100,7 +98,7 @@ def _matrices(length: _Float, section: _Float, kind: ElementKind) -> tuple[_Floa
     return stiff, heavy
 
 
-def _shapes(x: float, length: _Float, softness: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
     """Deflection and rotation at x (0 to 1) for each end value, shape (4, n)."""
     one, none = np.ones(length.size), np.zeros(length.size)
     if kind == "linear":
@@ -125,7 +123,7 @@ def _shapes(x: float, length: _Float, softness: _Float, kind: ElementKind) -> tu
     return deflection / (1 + softness), rotation / (1 + softness)
 
 
-def _strains(x: float, length: _Float, softness: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+def _strains(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tuple[Floats, Floats]:
     """Curvature (1/m) and shear strain at x for each end value, shape (4, n)."""
     one, none = np.ones(length.size), np.zeros(length.size)
     if kind == "linear":
@@ -139,11 +137,11 @@ def _strains(x: float, length: _Float, softness: _Float, kind: ElementKind) -> t
     return curvature, slide
 
 
-def _weighted_square(shape: _Float, weight: _Float) -> _Float:
+def _weighted_square(shape: Floats, weight: Floats) -> Floats:
     return np.asarray(np.einsum("in,jn,n->nij", shape, shape, weight))
 
 
-def _assemble_elements(parts: _Float) -> _Float:
+def _assemble_elements(parts: Floats) -> Floats:
     """All elements in a row, shape (2 n + 2, 2 n + 2)."""
     whole = np.zeros((2 * len(parts) + 2, 2 * len(parts) + 2))
     for i, part in enumerate(parts):

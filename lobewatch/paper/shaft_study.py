@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsm import (
     Calibration,
@@ -21,6 +20,7 @@ from dsm import (
     stiffness_curve,
     whirl_map,
 )
+from dsm.arrays import Floats
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
@@ -35,7 +35,6 @@ def surrogate_spindle(bearing_stiffness: float, theory: Theory = "euler-bernoull
     return replace(spindle, bearings=bearings, theory=theory)
 
 
-_Float = NDArray[np.float64]
 STIFFNESS_CURVE_POINTS = 300
 """Points of Fig. 8; chosen, finer than a screen shows."""
 WHIRL_SPEEDS_RPM = np.linspace(0.0, 150e3, 61)
@@ -60,7 +59,7 @@ class ShaftStudy:
     """Those bearings calibrated to the frequency after the fall."""
     critical_speeds: tuple[float, float]
     """Critical speed on rigid and on calibrated bearings (rpm)."""
-    curve: tuple[_Float, _Float]
+    curve: tuple[Floats, Floats]
     """Bearing stiffness (N/m) and first natural frequency (Hz), shape (n,) each."""
     rigid_whirl: WhirlMap
     """Frequencies over speed on rigid bearings."""

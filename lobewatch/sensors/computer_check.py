@@ -21,33 +21,46 @@ from acquisition.ports import SerialLink
 from lobewatch.machine.folder import MachineFolder
 
 MIN_FREE_BYTES = 200 << 20
-"""Free bytes below which a tap test may not end, twenty times what one takes; chosen."""
+"""Free bytes below which a tap test may not end, twenty times what one takes, chosen."""
 AMPLE_FREE_BYTES = 2 << 30
-"""Free bytes below which a year of tests may not fit; chosen."""
+"""Free bytes below which a year of tests may not fit, chosen."""
 MAX_LATENCY_TIMER = 2
-"""Latency timer of an FTDI port that does no harm (ms); the factory's 16 delays what a rate is measured by."""
+"""Harmless latency timer of an FTDI port (ms). The default of 16 ms delays the measurement of a rate."""
 LATENCY_TIMER_FOLDER = Path("/sys/bus/usb-serial/devices")
-"""Where Linux keeps the latency timers of FTDI ports."""
+"""Folder in which Linux keeps the latency timers of FTDI ports."""
 MIN_CLOCK_YEAR = 2025
-"""Year before which no clock is right that runs this program."""
+"""Year before which a clock is certainly wrong."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """Result of one check."""
 
     subject: str
-    """Name of the thing in a word or two."""
+    """Subject in a word or two."""
     state: Literal["fine", "note", "hinders"]
-    """State: a note is worth knowing, what hinders stands in the way of a tap test."""
+    """State: "note" is worth knowing, "hinders" prevents a tap test."""
     text: str
-    """What there is."""
+    """Result in words."""
     cure: str = ""
-    """What to do about it; empty where nothing need be done."""
+    """Remedy, empty if none is needed."""
 
 
 def check_computer(machine: MachineFolder | None = None, now: float | None = None) -> tuple[Finding, ...]:
-    """All findings, in the order in which one would go about a test. machine: looked at, too; now: time (s, UTC)."""
+    """Check this computer, in the order in which a test needs it.
+
+    Parameters
+    ----------
+    machine
+        Machine folder to check too.
+    now
+        Present time (s, UTC), None for the clock's.
+
+    Returns
+    -------
+    tuple of Finding
+        Result of each check.
+    """
     folder = machine.path if machine else Path.cwd()
     moment = datetime.fromtimestamp(time.time() if now is None else now, UTC)
     return (
@@ -70,7 +83,7 @@ def _check_versions() -> Iterator[Finding]:
 
 
 def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
-    """Ports and what answers; where machine.toml names a port, that one must be there."""
+    """Check the ports. A port that machine.toml names must exist."""
     survey = scan_ports()
     for port in survey.ports:
         yield _check_port(port)
@@ -94,7 +107,7 @@ def _check_port(port: ScannedPort) -> Finding:
 
 
 def _check_named_port(name: str) -> Finding:
-    """A port of machine.toml that is not listed: a pseudo-terminal, the network, or not there."""
+    """Check a port of machine.toml that is not listed: a pseudo-terminal, the network, or missing."""
     subject = f"port {name}"
     try:
         SerialLink(name).close()
@@ -104,7 +117,7 @@ def _check_named_port(name: str) -> Finding:
 
 
 def _check_latency(folder: Path) -> Iterator[Finding]:
-    """Ports whose driver waits before it hands over what has come."""
+    """Check the ports whose driver waits before it delivers data."""
     for timer in sorted(folder.glob("*/latency_timer")):
         try:
             wait = int(timer.read_text("ascii"))
@@ -116,7 +129,7 @@ def _check_latency(folder: Path) -> Iterator[Finding]:
 
 
 def _check_clock(machine: MachineFolder | None, now: datetime) -> Finding:
-    """A clock that is behind what has been written already is wrong."""
+    """Check the clock: one that is behind stored tap tests is wrong."""
     written = [datetime.fromisoformat(entry.time) for entry in machine.taps()] if machine else []
     newest = max((moment.astimezone(UTC) for moment in written), default=None)
     text = f"{now:%Y-%m-%d %H:%M} UTC"
@@ -129,7 +142,7 @@ def _check_clock(machine: MachineFolder | None, now: datetime) -> Finding:
 
 
 def _check_disk_space(folder: Path) -> Finding:
-    """Room, and whether files can be made there."""
+    """Check free space and write permission."""
     subject = f"disk of {folder}"
     if not os.access(folder, os.W_OK):
         return Finding(subject, "hinders", "cannot be written", "give yourself the right to write there")
@@ -141,7 +154,7 @@ def _check_disk_space(folder: Path) -> Finding:
 
 
 def _check_extras(machine: MachineFolder | None) -> Iterator[Finding]:
-    """Extras that are installed; one that the driver of the machine needs must be."""
+    """Check the installed extras. The one that the machine's driver needs must be there."""
     packages: dict[str, list[str]] = {}
     for line in requires("lobewatch") or ():
         if match := re.match(r"([\w.-]+).*extra == ['\"]([\w-]+)['\"]", line):
@@ -166,16 +179,21 @@ def _is_installed(package: str) -> bool:
 
 
 def _check_browser() -> Finding:
-    """Whether a page can be opened here; another computer can show it, too."""
+    """Check whether a page can be opened here. Another computer can show it, too."""
     try:
         name = webbrowser.get().__class__.__name__
     except webbrowser.Error:
-        return Finding("browser", "note", "none here", "open the address of --screen on a tablet: --listen 0.0.0.0")
+        return Finding(
+            "browser",
+            "note",
+            "none here",
+            "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0",
+        )
     return Finding("browser", "fine", f"there is one ({name})")
 
 
 def _check_load() -> Finding:
-    """A busy computer measures rates badly."""
+    """Check the load: a busy computer measures rates badly."""
     cores = os.cpu_count() or 1
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     busy = load > cores

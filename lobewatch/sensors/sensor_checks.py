@@ -34,34 +34,49 @@ from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor
 from lobewatch.tap.trial_hits import TrialHits
 
 RATE_MEASUREMENT_SECONDS = 5.0
-"""Time for which the rate is measured (s)."""
+"""Length of the rate measurement (s)."""
 
 
 @dataclass(frozen=True)
 class SensorList:
-    """A device, its channels, and what is wrong with them."""
+    """Device, its channels, and what is wrong with them."""
 
     identity: DeviceIdentity
     """Model and serial number of the device."""
     channels: tuple[Channel, ...]
-    """Channels of the device, a sensor each."""
+    """Channels of the device, one sensor each."""
     nominal_rate: float
-    """Sample rate that it names (Hz)."""
+    """Sample rate that the device reports (Hz)."""
     measured_rate: MeasuredRate | None
-    """Sample rate against the clock; None where it follows none, or could not be measured."""
+    """Measured sample rate, None if the device has no clock or the measurement failed."""
     replaces_nominal: bool
-    """Whether the measured rate is worked with."""
+    """Whether the measured rate is used."""
     remarks: tuple[Remark, ...]
-    """Remarks on sensitivities, ranges, dates and rates that are not believed."""
+    """Remarks on implausible sensitivities, ranges, dates and rates."""
 
     @property
     def errors(self) -> tuple[Remark, ...]:
-        """Remarks on what is to be put right first."""
+        """Remarks that must be settled first."""
         return tuple(remark for remark in self.remarks if remark.code in SENSOR_ERROR_CODES)
 
 
 def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> SensorList:
-    """Look at a connected device; a rate that is right is kept for it. tell: what is being done, for a person."""
+    """List the sensors of a connected device, check them and measure the sample rate.
+
+    Parameters
+    ----------
+    folder
+        Machine folder, in which an accepted rate is stored.
+    device
+        Connected device.
+    tell
+        Function called with a sentence on what is being done.
+
+    Returns
+    -------
+    SensorList
+        Channels, rates and remarks.
+    """
     today = datetime.now(UTC).date()
     remarks = sensor_remarks(device.channels, today, folder.machine.daq.calibration_interval_months)
     remarks += _aliasing_remarks(folder.machine.daq.anti_alias, device.sample_rate)
@@ -79,7 +94,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
 
 
 def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
-    """An FRF does not show what has folded into it; declared: whether a filter keeps that out, None: nobody says."""
+    """Return the remark on a missing anti-alias filter. declared: whether there is one, None if not stated."""
     if declared:
         return []
     filter_text = "nobody says that a filter keeps" if declared is None else "no filter keeps"
@@ -91,27 +106,46 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
 
 
 MASS_CHECK_BASELINE_SECONDS = 0.5
-"""Time that is listened before the first hit (s)."""
+"""Length of the record before the first hit (s)."""
 
 
 @dataclass(frozen=True)
 class MassCheck:
-    """What a hung mass says, and where to change what is wrong."""
+    """Result of the check with a hung mass, and where to correct a sensitivity."""
 
     calibration: MassCalibration
-    """Force over mass times acceleration, and what follows from it."""
+    """Ratio of force to mass times acceleration, and what follows from it."""
     place: SensorDataLocation | None
-    """Place where the device keeps its sensitivities; None where machine.toml does."""
+    """Location of the sensitivities in the device, None if machine.toml has them."""
 
 
 def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, tell: Callable[[str], None]) -> MassCheck:
-    """Take good hits on a freely hung mass (kg) and compare; tell: what to do, and the verdict on each hit."""
+    """Take good hits on a freely hung mass and compare force with mass times acceleration.
+
+    Parameters
+    ----------
+    folder
+        Machine folder.
+    port
+        Port of the device.
+    device
+        Connected device.
+    mass
+        Total moving mass (kg).
+    tell
+        Function called with instructions and the verdict on each hit.
+
+    Returns
+    -------
+    MassCheck
+        Calibration, and where to correct a sensitivity.
+    """
     hits = _capture_good_hits(folder, device, tell)
     return MassCheck(calibrate_by_mass(hits, mass), find_sensor_data(folder.machine.daq, port))
 
 
 def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> list[Hit]:
-    """As many hits without a fault as a tap test takes."""
+    """Capture as many good hits as a tap test takes."""
     wanted = folder.machine.tap.hits
     check_device_rate(folder, device)
     tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
@@ -131,25 +165,47 @@ def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[st
 
 
 SKEW_RECORDING_SECONDS = 2.0
-"""Time for which a common signal is recorded (s)."""
+"""Length of the recording of a common signal (s)."""
 
 
 @dataclass(frozen=True)
 class SkewCheck:
-    """The skew of a device, and where to enter it."""
+    """Measured skew of a device, and where to enter it."""
 
     measured: MeasuredSkew
     """Skew of channel 1 against channel 0."""
     sample_rate: float
-    """Sample rate at which it was measured (Hz)."""
+    """Sample rate of the measurement (Hz)."""
     channel: Channel
-    """Channel 1, with the skew that is entered."""
+    """Channel 1, with the skew entered so far."""
     place: SensorDataLocation | None
-    """Place where the device keeps its skews; None where machine.toml does."""
+    """Location of the skews in the device, None if machine.toml has them."""
 
 
 def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[[str], None]) -> SkewCheck:
-    """Record a signal that is fed to both inputs of a connected device; tell: what to do, for a person."""
+    """Record a signal fed to both inputs of a connected device and measure their skew.
+
+    Parameters
+    ----------
+    folder
+        Machine folder.
+    port
+        Port of the device.
+    device
+        Connected device with two channels.
+    tell
+        Function called with a sentence on what to do.
+
+    Returns
+    -------
+    SkewCheck
+        Measured skew, and where to enter it.
+
+    Raises
+    ------
+    DataError
+        The device does not have exactly two channels.
+    """
     if len(device.channels) != 2:
         raise DataError(
             f"a skew is that of two inputs; the DAQ has {len(device.channels)}: name two in [[daq.channel]]"

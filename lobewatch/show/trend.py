@@ -13,6 +13,7 @@ from dsm import RemainingPreload, format_with_error
 from lobewatch.arrays import Floats, Indices
 from lobewatch.logbook.machine_forecast import MachineForecast
 from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
 from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
@@ -169,7 +170,9 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
 
 def _score_text(trend: Trend) -> str:
     score = trend.detection.scores[-1]
-    return f"{score:.1f} (alarm at 3.3 twice)" if math.isfinite(score) else "from 9 points on"
+    if not math.isfinite(score):
+        return f"from {MIN_MONITORED_POINTS} points on"
+    return f"{score:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
 
 
 def _alarm_json(trend: Trend) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""The live tap test: connection, hits, trial, self-check, state, outcome; and the devices made of software for it."""
+"""Live tap test: device connection, hits, self-check, state and outcome, and the emulated devices for it."""
 
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession, plan_session

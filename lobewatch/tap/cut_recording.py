@@ -17,6 +17,7 @@ from acquisition import Block, Channel, DataError, Description, Device, DeviceEr
 from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
+from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook import Logbook
@@ -29,68 +30,68 @@ from lobewatch.tap.live_curves import find_extremes
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""
-Floats = NDArray[np.float64]
 
 
 class CutStep(enum.StrEnum):
-    """The word that can be read from 3 m."""
+    """Step of a cut recording, as a word that can be read from 3 m."""
 
     SENSOR = "SENSOR TO HOUSING"
     """The accelerometer is moved, the device opened."""
     LISTENING = "LISTENING"
-    """The spindle is heard to turn in air; the cut is waited for."""
+    """The spindle turns in air, the cut is awaited."""
     CUTTING = "CUTTING"
     """A cut has begun."""
     AGAIN = "CUT AGAIN"
-    """It was no use; the next is waited for."""
+    """The cut was unusable, the next one is awaited."""
     JUDGING = "JUDGING"
     """The cut is over."""
     STABLE = "STABLE"
-    """What was heard, as the four words of CutWord."""
+    """Result, as the four words of the cut evaluation."""
     CHATTER = "CHATTER"
     FLIP = "FLIP CHATTER"
     CANNOT_TELL = "CANNOT TELL"
     FAILED = "FAILED"
-    """Nothing was heard; the reason says why, the cure what to do."""
+    """Nothing was recorded. The reason says why and what to do."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutState:
-    """One picture of listening to a cut."""
+    """State of a cut recording."""
 
     revision: int
-    """Number that rises with every change."""
+    """Number that increases with every change."""
     word: CutStep
-    """Word that can be read from 3 m."""
+    """Step."""
     title: str
     """Machine and cut."""
     device: str = ""
     """DAQ, port and rate."""
     reason: str = ""
-    """Sentence on what to do, or on why nothing was heard."""
+    """Sentence on what to do, or why nothing was recorded."""
     level: float | None = None
-    """Root mean square of the acceleration over the newest 50 ms (m/s^2)."""
+    """RMS of the acceleration over the newest 50 ms (m/s^2)."""
     left: float | None = None
-    """Time for which a cut is still waited for (s)."""
+    """Remaining time to wait for a cut (s)."""
     cut_seconds: float | None = None
-    """Length of the cut heard so far (s)."""
+    """Length of the cut recorded so far (s)."""
     comparison: CutComparison | None = None
-    """Cut as it was heard, beside what was expected of it; None before the end."""
+    """Recorded cut compared with its prediction, None before the end."""
     saved: str = ""
-    """Name under which it is kept; empty where it is not, or not yet."""
+    """Name under which it is saved, empty if it is not or not yet."""
     plots: Mapping[str, Floats] | None = None
-    """Curves of what was heard, see cut_curves."""
+    """Curves of the recorded cut, see build_cut_curves."""
 
 
 def get_result_step(comparison: CutComparison) -> CutStep:
-    """The word on what was heard."""
+    """Return the step that shows the result of a recorded cut."""
     return CutStep[comparison.detected.verdict.upper().replace(" ", "_")]
 
 
 def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
-    """The spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), thinned, no peak lost; empty without one.
+    """Build the spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), reduced without losing a peak.
 
-    For each name of `marked`, its lines as `MODAL_SHOP_NAME_PATTERN` (Hz) and `NAME_amplitude`; the modes as tapped as `x` and `y` (Hz).
+    Empty without a spectrum. For each kind of line, its lines as `NAME` (Hz) and `NAME_amplitude`. The tapped modes as
+    `x` and `y` (Hz).
     """
     spectrum = comparison.detected.spectrum
     if spectrum is None:
@@ -107,17 +108,17 @@ def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
 
 
 CUT_SEARCH_INTERVAL = 0.5
-"""Time between two looks at what has been heard (s)."""
+"""Time between two searches for a cut in the recorded signal (s)."""
 KEPT_SIGNAL_SECONDS = 20.0
-"""Length of the newest sound that is kept (s)."""
+"""Length of the newest signal that is kept (s)."""
 MAX_CUT_SECONDS = 8.0
-"""Length after which a cut is judged, whether it ends or not (s)."""
+"""Length after which a cut is evaluated, whether it ends or not (s)."""
 AIR_AFTER_CUT = 0.3
 """Length of air that shows that a cut has ended (s)."""
 AIR_BEFORE_CUT = 1.0
 """Length of air that is kept before a cut (s)."""
 SENSOR_CHECK_DELAY = 1.0
-"""Time after which it is looked at whether anything is heard at all (s)."""
+"""Time after which the sensor signal is checked (s)."""
 
 BEGIN_CUT_TEXT = "hearing the spindle turn in air; begin the cut"
 SENSOR_ON_HOUSING_TEXT = "The sensor on the housing, the spindle turning in air: now begin the cut."
@@ -127,7 +128,7 @@ CUT_RUNNING_TEXT = "A second or longer, then out of the cut: it is judged by its
 
 @dataclass
 class _SignalBuffer:
-    """Sound heard so far on one channel."""
+    """Newest signal of one channel."""
 
     channel: Channel
     row: int
@@ -140,7 +141,7 @@ class _SignalBuffer:
         self.heard = 0
 
     def add(self, block: Block) -> None:
-        """Keep a block, and forget what is too old."""
+        """Keep a block and drop what is too old."""
         codes = block.codes[self.row]
         overloaded = bool(block.overload >> self.row & 1)
         if block.lost_before or overloaded:
@@ -152,7 +153,7 @@ class _SignalBuffer:
 
     @property
     def signal(self) -> CutSignal:
-        """Sound that is kept."""
+        """Signal that is kept."""
         codes, first = np.concatenate(self.codes), self.heard - self.count
         marks = [mark for place, mark in self.marks if place > first]
         lost = sum(mark for mark in marks if mark > 0)
@@ -162,7 +163,7 @@ class _SignalBuffer:
 
     @property
     def level(self) -> float:
-        """Root mean square about the mean over the newest LEVEL_TIME (m/s^2)."""
+        """RMS about the mean over the newest LEVEL_WINDOW (m/s^2)."""
         wanted, newest = round(LEVEL_WINDOW * self.rate), list[NDArray[np.int32]]()
         for codes in reversed(self.codes):
             newest.insert(0, codes)
@@ -171,7 +172,7 @@ class _SignalBuffer:
         return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
 
     def forget(self) -> None:
-        """Drop the sound heard so far, which is no use."""
+        """Drop the signal so far."""
         self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
 
 
@@ -186,10 +187,11 @@ def record_cut(
     show: Callable[[str], None],
     picture: Callable[..., None] = _ignore_state,
 ) -> CutSignal:
-    """The next whole cut that a started device hears; turn: of the spindle (s), patience: until it ends (s).
+    """Record the next whole cut of a started device, from the air before it to the air after it.
 
-    show: told what is being waited for; picture: given the fields of CutState that change. DataError without an
-    accelerometer, and where no cut is heard in time; DeviceError where the sensor is dead.
+    turn: time of a spindle revolution (s). patience: time limit for the end of the cut (s). show: called with what is
+    awaited. picture: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
+    detected in time, DeviceError if the sensor is dead.
     """
     ear, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
     show(BEGIN_CUT_TEXT)
@@ -208,7 +210,7 @@ def record_cut(
             picture(**waiting, cut_seconds=None)
     raise DataError(
         f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
-        "more --seconds"
+        "more record_cut.patience"
     )
 
 
@@ -222,7 +224,7 @@ def _make_buffer(device: Device) -> _SignalBuffer:
 def _iterate_signals(
     device: Device, ear: _SignalBuffer, patience: float, picture: Callable[..., None]
 ) -> Iterator[CutSignal]:
-    """Sound heard so far, again and again."""
+    """Yield the signal so far, again and again."""
     next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
     for block in device.blocks():
         ear.add(block)
@@ -265,19 +267,21 @@ def acquire_cut(
     show: Callable[[str], None],
     picture: Callable[..., None],
 ) -> CutSignal:
-    """The sound at the accelerometer; file: in place of the device, description: what the file does not say itself.
+    """Read a cut from a file, or record one with the device of machine.toml.
 
-    patience: how long a cut is waited for (s); show: told what to do; picture: as in record_cut. ValueError without a
-    port, DataError for a file that holds no such recording and where no cut is heard, DeviceError where no device
-    answers.
+    file: replaces the device. description: what the file does not state itself. patience: time limit for a cut (s).
+    show: called with what to do. picture: as in record_cut. ValueError without a port, DataError for a file without
+    such a recording or if no cut is detected, DeviceError if no device answers.
     """
     if file is not None:
         return read_cut_recording(file, description)
     port = port or folder.machine.daq.port
     if not port:
-        raise ValueError(f"no port: give --port, --file, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port: give acquire_cut.port, acquire_cut.file, or port in [daq] of {folder.toml}")
     if port.startswith(REPLAY_PREFIX):
-        raise ValueError(f"--port {port}: a recording of hits; give the recording of a cut with --file")
+        raise ValueError(
+            f"acquire_cut.port {port}: a recording of hits; give the recording of a cut with acquire_cut.file"
+        )
     show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
     show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
     with open_device(folder.machine.daq, port) as device:
@@ -289,25 +293,25 @@ def acquire_cut(
 
 
 def check_sensor_kind(sensor: str, file: Path | None) -> str:
-    """A kind of sensor; ValueError for one that is not known, and for a microphone at a device."""
+    """Return a kind of sensor. ValueError for an unknown one, and for a microphone at a device."""
     if sensor not in get_args(CutSensor):
-        raise ValueError(f"--sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
+        raise ValueError(f"Description.sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
     if sensor == "microphone" and file is None:
-        raise ValueError("--sensor microphone is for a --file; a device hears by its accelerometer")
+        raise ValueError("Description.sensor microphone is for a acquire_cut.file; a device hears by its accelerometer")
     return sensor
 
 
 def check_tacho_options(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
-    """Fields of a description of a tachometer; ValueError at a device, which has none."""
+    """Return the tachometer fields of a description. ValueError at a device, which has none."""
     if file is None and (tacho or pulses is not None):
-        given = f"--tacho {tacho}" if tacho else f"--pulses {pulses}"
-        raise ValueError(f"{given} is for a --file; of a device only the accelerometer is heard")
+        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
+        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
     return {"tacho": tacho, "pulses": pulses}
 
 
 @contextlib.contextmanager
 def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StatePublisher[CutState]]:
-    """Begin with where the sensor belongs; what is raised within is the last of them."""
+    """Publish states from the move of the sensor on. An error raised within becomes the last state."""
     cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
     title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
     pictures = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
@@ -324,7 +328,7 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
 def evaluate_live_cut(
     logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: StatePublisher[CutState]
 ) -> list[CutComparison]:
-    """Listen to a recording, and show the word on its last cut."""
+    """Evaluate a recording and show the result of its last cut."""
     pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
     comparisons = compare_cuts(logbook, setting, signal)
     last = comparisons[-1]

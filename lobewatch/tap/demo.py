@@ -30,7 +30,7 @@ from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
 
 SCATTER_ONLY = MountingVariation()
-"""Tests that differ by their scatter alone."""
+"""Variation of tests that differ by their scatter only."""
 TEST_DAY, TEST_HOUR = 15, 9
 """Day of the month, and hour, of the tests of a month."""
 DEMO_DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
@@ -39,7 +39,7 @@ DEMO_DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
 
 @dataclass(frozen=True)
 class SpindleState:
-    """A spindle in four figures."""
+    """Spindle in four numbers."""
 
     frequency: float
     """First natural frequency (Hz)."""
@@ -51,20 +51,20 @@ class SpindleState:
     """Stiffness of each bearing (N/m)."""
 
     def relative_to(self, reference: SpindleState) -> SpindleState:
-        """Relative differences (-)."""
+        """Return the relative differences from a reference (-)."""
         return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
 
 
 @dataclass(frozen=True)
 class PlannedTap:
-    """One tap test of the demo before it is taken."""
+    """Tap test of the demo before it is taken."""
 
     date: datetime
     """Date in the simulated calendar; those of the two tests of a month differ."""
     direction: TapDirection
-    """Direction in which is tapped."""
+    """Tapped direction."""
     structure: Structure
-    """Structure that the hammer meets."""
+    """Structure that is hit."""
     truth: SpindleState
     """Truth: the spindle as emulated."""
     conditions: Conditions = UNKNOWN_CONDITIONS
@@ -73,22 +73,22 @@ class PlannedTap:
 
 @dataclass(frozen=True)
 class TakenTap:
-    """One tap test of the demo, committed."""
+    """Committed tap test of the demo."""
 
     plan: PlannedTap
-    """Test as it was planned, with its truth."""
+    """Test as planned, with its truth."""
     id: str
-    """Identity in the journal."""
+    """Id in the journal."""
 
 
 @dataclass(frozen=True)
 class DemoTap:
-    """One tap test of the demo."""
+    """Tap test of the demo with its result."""
 
     plan: PlannedTap
-    """Test as it was planned, with its truth."""
+    """Test as planned, with its truth."""
     result: SpindleState
-    """Spindle as the pipeline measured it."""
+    """Spindle as measured."""
 
 
 def plan_taps(
@@ -100,11 +100,11 @@ def plan_taps(
     mounting: MountingVariation = SCATTER_ONLY,
     now: datetime | None = None,
 ) -> list[PlannedTap]:
-    """Tap tests in x and y every month of a story up to now; the tool is remounted before each test.
+    """Plan tap tests in x and y every month of a scenario up to now. The tool is reclamped before each test.
 
-    scatter: standard deviation of f_1 from test to test, as a share of it (-), in place of that of `mounting`: every
-    test has bearings whose stiffness puts f_1 where remounting has moved it. now: the last two are those of its month,
-    or of the month before where that day is still to come; None for the clock's. DataError without [spindle].
+    scatter: relative standard deviation of f1 from test to test (-), replaces that of `mounting`. Each test has
+    bearings whose stiffness gives the f1 after reclamping. now: the last two tests are those of its month, or of the
+    month before if that day is still to come, None for the clock's. DataError without [spindle].
     """
     wear, mounting = SpindleWear.of(folder, months, story), mounting._replace(scatter=scatter)
     shifts, warmth = mounting.shifts(months, len(DEMO_DIRECTIONS), random), mounting.temperatures(months)
@@ -121,7 +121,7 @@ def plan_taps(
 
 
 def _find_last_month(now: datetime) -> int:
-    """The newest month whose tests are past, counted from the year 0."""
+    """Return the newest month whose tests are past, counted from the year 0."""
     now = now.astimezone(UTC)
     tested = now.replace(day=TEST_DAY, hour=TEST_HOUR, minute=max(DEMO_DIRECTIONS.values()), second=0, microsecond=0)
     return 12 * now.year + now.month - 1 - (now < tested)
@@ -148,9 +148,9 @@ def age_spindle(
 
 
 def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
-    """The results of these tests beside what was emulated; DataError where one does not show the mode followed.
+    """Compare the results of these tests with the truth. DataError if one does not show the followed mode.
 
-    The history is worked out once, after the last test, and not anew after every one with a word on every program.
+    The history is computed once, after the last test, and not after every one with a verdict on every program.
     """
     return [DemoTap(tap.plan, _get_measured_state(logbook.measurement(tap.id))) for tap in taken]
 
@@ -165,7 +165,7 @@ def _plan_tap(
 
 
 def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator, tcp: bool) -> str:
-    """Take and commit one tap test as a session without a person does; its id."""
+    """Take and commit one tap test, as a session without a person does. Return its id."""
     machine, toml = folder.machine, folder.toml_text
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
@@ -188,27 +188,27 @@ def _get_measured_state(measurement: Measurement) -> SpindleState:
     mode, calibration = measurement.followed, measurement.calibration
     if mode is None or calibration is None:
         why = "; ".join(map(str, measurement.remarks))
-        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller --scatter")
+        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller MountingVariation.scatter")
     return SpindleState(mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)
 
 
 FORECAST_DROP = 0.02
-"""Fall of the frequency from where it is, that is foretold, as a share; chosen."""
+"""Relative frequency drop from the present value that is forecast, chosen."""
 
 
 class LevelForecast(NamedTuple):
-    """One level, foretold after the last test."""
+    """Forecast of one level after the last test."""
 
     level: str
-    """Level for people."""
+    """Level in words."""
     reached: ThresholdDates
-    """When it is reached."""
+    """Forecast of when it is reached."""
     truth: float | None
-    """Date at which the emulated spindle, without scatter, is there (days since 1970); None where it never is."""
+    """Date at which the emulated spindle without scatter is there (days since 1970), None if never."""
 
 
 def forecast_levels(logbook: Logbook, wear: SpindleWear) -> list[LevelForecast]:
-    """Forecasts after the last test: a fall of so much more in x, and each program that will not be stable."""
+    """Forecast, after the last test, a further drop in x, and each program that will not be stable."""
     last = logbook.history.rows[-1].time
     prospect = forecast_machine(logbook, last)
     x = next((series for series in prospect.status.series if series.direction == "x"), None)
@@ -228,7 +228,7 @@ def forecast_levels(logbook: Logbook, wear: SpindleWear) -> list[LevelForecast]:
 
 
 def _forecast_level(level: str, trend: Trend, percent: float, wear: SpindleWear, last: datetime) -> LevelForecast:
-    """Dates at which a series falls to a level, foretold and true; percent: 100 ln(f/f_first) there."""
+    """Return forecast and true date of a level of a series. percent: 100 ln(f/f_first) there."""
     month = wear.find_month(trend.first_value * math.exp(percent / 100))
     truth = (
         None if month is None else days_since_epoch(last + timedelta(days=DAYS_PER_MONTH * (month - wear.months + 1)))

@@ -26,7 +26,7 @@ from acquisition import (
 )
 from acquisition.channel import ChannelQuantity
 from acquisition.devices import convert_driver_errors
-from acquisition.hits import TapInputs
+from acquisition.hit import TapInputs
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.setup_tables import DaqTable
@@ -35,22 +35,22 @@ from lobewatch.tap.state import Check, TapStep
 from lobewatch.tap.tap_in_progress import TapInProgress
 
 REPLAY_PREFIX = "file:"
-"""Beginning of a port that is no port but a recording, whatever the driver."""
+"""Prefix of a port that is a recording, whatever the driver."""
 
 
 class DeviceOpener:
-    """Opens one device again and again: a USB device wherever it is plugged in after the first time.
+    """Opener of one device, again and again, at whatever port its USB device is plugged in later.
 
-    A USB device without a serial number, and what is no USB device, is known by the name of its port alone.
+    Devices without USB or without a USB serial number are identified by the name of their port only.
     """
 
     def __init__(self, daq: DaqTable, port: str) -> None:
-        """A device as [daq] sets it up; port: where it is the first time."""
+        """Configure the device by [daq]. port: where it is the first time."""
         self._daq, self._port = daq, port
         self._identity: tuple[int, str] | None = None
 
     def open(self) -> Device:
-        """Open as open_source does; DeviceError while the USB device is nowhere: no other at its port is touched."""
+        """Open as `open_device` does. DeviceError while the USB device is absent: no other at its port is touched."""
         if self._identity is not None and find_usb_identity(self._port) != self._identity:
             port = find_usb_port(*self._identity)
             if port is None:
@@ -63,9 +63,9 @@ class DeviceOpener:
 
 
 def open_device(daq: DaqTable, port: str) -> Device:
-    """A connected device on a port, as [daq] sets it up, or the hits of a recording, "file:PATH".
+    """Connect to a device as [daq] configures it, or open the hits of a recording, "file:PATH".
 
-    Raises DeviceError where no device is there, DataError for a file without hits.
+    Raises DeviceError if there is no device, DataError for a file without hits.
     """
     if port.startswith(REPLAY_PREFIX):
         return FileSource(port.removeprefix(REPLAY_PREFIX))
@@ -74,34 +74,34 @@ def open_device(daq: DaqTable, port: str) -> Device:
 
 
 def find_sensor_data(daq: DaqTable, port: str) -> SensorDataLocation | None:
-    """Place where the device on a port keeps the data of its sensors; None where machine.toml does."""
+    """Return the location of the sensor data in the device on a port, None if machine.toml has them."""
     return None if port.startswith(REPLAY_PREFIX) else find_driver(daq.driver).sensor_data
 
 
 LEVEL_WINDOW = 0.05
-"""Length of the live levels (s)."""
+"""Length of the window of live levels (s)."""
 
 
 def describe_device(device: Device) -> str:
-    """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
+    """Describe model, serial number, firmware and loss detection, as far as known."""
     who = device.identity
     details = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
     return ", ".join([who.model, *(name + value for name, value in details.items() if value)])
 
 
 class LiveSignal:
-    """Force and acceleration of one connected source, or the acceleration alone."""
+    """Newest samples of force and acceleration, or of the acceleration only."""
 
     def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
-        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `select_input_channels`."""
+        """Select the inputs. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
         self.inputs = TapInputs.select(source.channels, quantity, direction)
-        """Inputs of the tap test: force and acceleration, or the latter alone; between them that across to it."""
+        """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
         self._rate = source.sample_rate
         self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
 
     @property
     def levels(self) -> tuple[float | None, float]:
-        """rms about the mean of force (N; None where none is measured) and acceleration (m/s^2) over LEVEL_TIME."""
+        """RMS about the mean of force (N, None if not measured) and acceleration (m/s^2) over LEVEL_WINDOW."""
         wanted = round(LEVEL_WINDOW * self._rate)
         newest: list[NDArray[np.int32]] = []
         for codes in reversed(self._recent):
@@ -113,11 +113,10 @@ class LiveSignal:
         return rms[0] if len(rms) > 1 else None, rms[-1]
 
     def add(self, block: Block) -> None:
-        """Take note of a block."""
         self._recent.append(block.codes)
 
     def record(self, blocks: Iterable[Block], duration: float) -> Hit:
-        """The next blocks that make up a duration (s), as one record."""
+        """Return the next blocks of this duration (s) as one record."""
         codes, lost = [], 0
         for block in blocks:
             codes.append(block.codes[list(self.inputs.rows)])
@@ -128,30 +127,30 @@ class LiveSignal:
 
 
 def estimate_resting_rms(baseline: Hit, width: int) -> float:
-    """rms of the acceleration about its mean over `width` samples at rest, the median of all such (m/s^2)."""
+    """Return the median rms of the acceleration at rest over windows of `width` samples (m/s^2)."""
     pieces = baseline.acceleration[: max(baseline.acceleration.size // width, 1) * width]
     return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))
 
 
 RECONNECT_INTERVAL = 0.5
-"""Time between two tries to find the device again (s)."""
+"""Time between two attempts to find the device again (s)."""
 BUTTON_BOUNCE_TIME = 0.3
-"""Time after a move of the button in which a press is its bouncing (s)."""
+"""Time after a button event in which further presses are bouncing (s)."""
 
 
 class Button:
-    """The button of a device, which takes the last good hit back.
+    """Button of a device that takes back the last good hit.
 
-    Presses are told from bouncing by the clock of the device: events that wait to be read come all at once.
+    The clock of the device separates presses from bouncing: waiting events arrive all at once.
     """
 
     def __init__(self, sample_rate: float) -> None:
-        """Not pressed yet; sample_rate: of the scans that events are timed by (Hz)."""
+        """Set the rate of the scans that time the events (Hz)."""
         self._bounce = BUTTON_BOUNCE_TIME * sample_rate
         self._moved: int | None = None
 
     def count_presses(self, events: deque[Event]) -> int:
-        """Take all events that wait, and count the presses in them."""
+        """Take all waiting events and count the presses in them."""
         count = 0
         while events:
             event = events.popleft()
@@ -162,15 +161,15 @@ class Button:
 
 
 class DeviceConnection:
-    """One opened device: its scans, and what it tells beside them."""
+    """Opened device: its scans, button and faults."""
 
     def __init__(self, device: Device, quantity: ChannelQuantity = "force", direction: str = "") -> None:
-        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `select_input_channels`."""
+        """Wrap a device. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
         self._device = device
         self.direction = direction
-        """Direction that is tapped, by which one of several accelerations is chosen."""
+        """Direction that is tapped. It selects one of several accelerations."""
         self.signal = LiveSignal(device, quantity, direction)
-        """Its newest samples."""
+        """Newest samples."""
         self._button = Button(device.sample_rate)
         self._fault = ""
 
@@ -185,34 +184,33 @@ class DeviceConnection:
         return self._device.sample_rate
 
     def start(self) -> None:
-        """Begin the stream; what the button did before counts for nothing."""
+        """Start the stream. Earlier button presses do not count."""
         self._device.start()
         self._device.events.clear()
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks that the device sends from now on."""
+        """Yield the blocks that the device sends from now on."""
         for block in self._device.blocks():
             self.signal.add(block)
             yield block
 
     def count_presses(self) -> int:
-        """Number of presses of its button since this was last asked for."""
+        """Count button presses since the last call."""
         return self._button.count_presses(self._device.events)
 
     def poll_fault_text(self) -> str:
-        """Sentence on a pulled sensor cable or a missing supply, or that it is mended, where the device tells; once."""
+        """Return a sentence when a sensor fault appears or disappears, once. Empty if nothing changed."""
         before, self._fault = self._fault, self._device.fault
         if self._fault == before:
             return ""
         return self._fault or "The sensor is connected again."
 
     def close(self) -> None:
-        """Stop, and give the port back."""
         self._device.close()
 
 
 class DeviceConnector:
-    """Opens the device of a test, again and again where it must."""
+    """Opener of the device of a test, which reconnects it when needed."""
 
     def __init__(
         self,
@@ -221,13 +219,12 @@ class DeviceConnector:
         publisher: TapPublisher,
         sleep: Callable[[float], None],
     ) -> None:
-        """Nothing is opened yet."""
         self._folder, self._open_device, self._publisher, self._sleep = folder, open_device, publisher, sleep
 
     def connect(self, tap: TapInProgress) -> DeviceConnection:
-        """A started device that the hits of a test may come from.
+        """Open and start a device that fits the hits of a test.
 
-        Raises DeviceError where there is none, ValueError where it has another set-up than the test was begun with.
+        Raises DeviceError if there is none, ValueError if its set-up differs from that of earlier hits.
         """
         device = self._open_device()
         try:
@@ -242,7 +239,7 @@ class DeviceConnector:
         return connection
 
     def reconnect(self, error: DeviceError, tap: TapInProgress, serve: Callable[[], None]) -> DeviceConnection:
-        """Wait for the device, as long as it takes; `serve` is called meanwhile."""
+        """Wait for the device as long as needed. `serve` is called meanwhile."""
         while True:
             reason = f"{error.text}; plug it in: the test goes on at this hit"
             self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
@@ -257,7 +254,7 @@ class DeviceConnector:
                 return connection
 
     def _check_rate(self, device: Device) -> None:
-        """Against the clock, of a device that this machine does not know yet."""
+        """Measure the sample rate of a device that this machine does not know yet."""
         if has_clock(device) and find_stored_rate(self._folder, device) is None:
             self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
         remarks = list[Remark]()

@@ -1,29 +1,33 @@
-"""A cut on an emulated machine, heard by the accelerometer on its housing, again and again.
+"""Emulated device that records cuts with the accelerometer on the spindle housing, again and again.
 
-The spindle at speed, and the cut, differ from what was tapped and what stands in machine.toml by a hidden truth.
+Spindle and cut differ from the tapped machine and from machine.toml by a hidden truth.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import DataError, Driver, EmulationSetup, EmulatorThread, Structure
-from acquisition.emulation import Housing, HousingSignal, MillingCut, Passage, make_random_housing, simulate_cut
+from acquisition import Driver, EmulatorThread, SensorInput, Structure
+from acquisition.emulation import (
+    Housing,
+    HousingSignal,
+    MillingCut,
+    Passage,
+    SignalFunction,
+    make_random_housing,
+    simulate_cut,
+)
 from dsm import Spindle
 from lobes import Cut, Program, program_limit
 from lobewatch.cuts.learning.prior_samples import ROTATING_FORCE_PRIOR
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.emulated_spindle import (
-    EMULATED_SAMPLE_RATE,
-    build_structure,
-    get_emulated_inputs,
-    map_signal_to_inputs,
-)
+from lobewatch.tap.emulated_spindle import build_structure, emulate_device, get_spindle_table, map_signal_to_inputs
 from lobewatch.verdicts.program_samples import (
     ROTATING_DAMPING_FACTOR,
     ROTATING_FREQUENCY_FACTOR,
@@ -32,22 +36,24 @@ from lobewatch.verdicts.program_samples import (
 from modal import Mode
 
 DEFAULT_PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
-"""Air, cut, air (s), again and again."""
+"""Passage with times in air, cut and air (s), again and again."""
 MAX_MODE_STIFFNESS_RATIO, MAX_EMULATED_MODE_FREQUENCY = 100.0, 6000.0
-"""Modes so many times as stiff as the softest, or so high (Hz), are left out: a cut hardly moves them, but steps for
-them take long; chosen."""
+"""Stiffness over that of the softest mode, and frequency (Hz), above which modes are left out, chosen.
+
+A cut hardly moves them, but steps for them take long.
+"""
 HOUSING_GAIN_FREQUENCIES = np.arange(100.0, 8000.0, 2.0)
 """Frequencies of cuts and chatter (Hz)."""
 DEFAULT_FEED_SHARE = 5e-3
-"""Feed per tooth over diameter, where machine.toml does not say; chosen."""
+"""Feed per tooth over diameter if machine.toml does not state it, chosen."""
 DEFAULT_EDGE_COEFFICIENTS = (25e3, 35e3)
-"""Tangential and radial edge coefficients (N/m), where they are not known: about those of aluminium."""
+"""Tangential and radial edge coefficients (N/m) if unknown, about those of aluminium."""
 MIN_HIDDEN_FACTOR = 0.3
-"""Least share of its middle that a drawn factor falls to; chosen."""
+"""Smallest random factor as a share of its median, chosen."""
 MAX_SPEED_DEVIATION = 0.015
-"""Share by which the spindle turns slower or faster than it is told, at most; chosen."""
+"""Largest relative deviation of the spindle speed from the commanded one, chosen."""
 MAX_RUNOUT = 20e-6
-"""Largest eccentricity of a tool in its holder (m); chosen."""
+"""Largest eccentricity of a tool in its holder (m), chosen."""
 
 
 class ModeFactors(NamedTuple):
@@ -61,7 +67,7 @@ class ModeFactors(NamedTuple):
     """Factor on the stiffnesses (-)."""
 
     def apply_to(self, at_rest: Structure) -> Structure:
-        """Structure at speed, from that at rest."""
+        """Return the structure at speed from that at rest."""
         return Structure(
             at_rest.frequency * self.frequency,
             at_rest.damping_ratio * self.damping_ratio,
@@ -70,7 +76,7 @@ class ModeFactors(NamedTuple):
 
 
 class HiddenTruth(NamedTuple):
-    """Factors that nobody has measured."""
+    """Unmeasured factors of the emulated machine."""
 
     x: ModeFactors
     """Factors on the modes in x."""
@@ -79,7 +85,7 @@ class HiddenTruth(NamedTuple):
     tangential: float
     """Factor on both cutting coefficients (-)."""
     speed: float
-    """Factor on the spindle speed that is told (-)."""
+    """Factor on the commanded spindle speed (-)."""
 
     @property
     def factors(self) -> dict[str, float]:
@@ -91,7 +97,7 @@ class HiddenTruth(NamedTuple):
 
 @dataclass(frozen=True)
 class EmulatedCut:
-    """A device made of software on a housing made of numbers."""
+    """Emulated device and its hidden truth."""
 
     device: EmulatorThread
     """Emulator that serves while its context lasts."""
@@ -100,7 +106,7 @@ class EmulatedCut:
     speed_rpm: float
     """True spindle speed (rpm)."""
     limit: float
-    """Deepest stable depth at this speed, in this direction of feed, with this truth (m); inf where any is stable."""
+    """True stable depth limit at this speed and feed direction (m), inf if any depth is stable."""
 
 
 def emulate_cut(
@@ -114,36 +120,28 @@ def emulate_cut(
     spindle: Spindle | None = None,
     passage: Passage = DEFAULT_PASSAGE,
 ) -> EmulatedCut:
-    """Somebody makes this cut, again and again; the accelerometer is on the housing, the hammer lies idle.
+    """Emulate a cut that repeats, with the accelerometer on the housing and an idle hammer.
 
-    Truth, run-out and housing are those of the seed, whatever is cut; a program fed along both axes is fed along x.
-    spindle: in place of the model of the tool. DataError where machine.toml has no model of it, or lacks the sensors of
-    a device that does not describe them itself.
+    Truth, run-out and housing depend on the seed only, not on the cut. A program fed along both axes is fed along x.
+    spindle: replaces the model of the tool. DataError if machine.toml has no model of it, or lacks the sensors of a
+    device that does not describe them itself.
     """
-    if driver.emulate is None:
-        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
     motion, housing = simulate_cut(cut, passage), _normalize_gain(make_random_housing(random, cut.speed_rpm))
-    inputs = get_emulated_inputs(folder, driver)
-    bench = EmulationSetup(
-        lambda rate: map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise)),
-        inputs,
-        EMULATED_SAMPLE_RATE,
-        realtime,
-        tcp,
-        folder.machine.daq.digital_clock,
-    )
-    return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _find_true_limit(cut, setting))
+
+    def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
+        return map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
+
+    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
 
 
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
-    """Modes of the tip that a cut moves."""
-    table = folder.machine.spindle
-    if table is None:
-        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    whole = build_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
+    """Return the modes of the tip that a cut moves."""
+    damping_ratio = get_spindle_table(folder).damping_ratio
+    whole = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
     softest = int(np.argmin(whole.stiffness))
     moved = (whole.stiffness < MAX_MODE_STIFFNESS_RATIO * whole.stiffness[softest]) & (
         whole.frequency < MAX_EMULATED_MODE_FREQUENCY
@@ -153,7 +151,7 @@ def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spind
 
 
 def _normalize_gain(housing: Housing) -> Housing:
-    """Housing with a gain that its own modes do not exceed: with a sensor that chatter does not overload."""
+    """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
     loudest = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
     return replace(housing, gain=(housing.gain[0] / loudest, housing.gain[1] / loudest))
 
@@ -186,7 +184,7 @@ def _build_true_cut(
 
 
 def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
-    """Deepest stable depth, by semi-discretisation (m)."""
+    """Return the stable depth limit by semi-discretization (m)."""
     x, y = (
         [Mode(*figures) for figures in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
         for side in (cut.x, cut.y)
@@ -197,7 +195,7 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 
 
 def draw_hidden_truth(seed: int) -> HiddenTruth:
-    """Truth of a seed, the same whatever is cut; modes in x and y differ apart."""
+    """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
     x, y = (
         ModeFactors(
@@ -214,7 +212,7 @@ def draw_hidden_truth(seed: int) -> HiddenTruth:
 
 
 def draw_runout(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:
-    """Run-out of each tooth of an eccentric tool: how far it stands out (m)."""
+    """Draw the run-out of each tooth of an eccentric tool (m)."""
     angle = np.abs(cut.lead_angles) + random.uniform(0, 2 * np.pi)
     return tuple((random.uniform(0, MAX_RUNOUT) * np.cos(angle)).tolist())
 

@@ -1,4 +1,4 @@
-"""The emulated spindle: the model's modes behind an emulated DAQ. Its truth is known."""
+"""Emulated DAQ on a spindle whose modes, from the spindle model, are known."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import (
     CROSS_TAP,
@@ -30,39 +29,41 @@ from acquisition import (
 )
 from acquisition.emulation import SignalFunction
 from dsm import Spindle, modes_at, static_stiffness
+from lobewatch.arrays import Floats
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.spindle_tables import SpindleTable
 
 EMULATED_MODES = 8
-"""Number of modes integrated; all higher ones are their static flexibility."""
+"""Number of modes simulated. All higher ones are a static flexibility."""
 EMULATED_SAMPLE_RATE = 25600.0
 """Sample rate of the device (Hz)."""
 EMULATED_CHANNELS = (
     Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
     Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
 )
-"""A 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
+"""Channels of a 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
 SECOND_AXIS_FREQUENCY_SHIFT = 0.05
-"""Relative distance of the frequencies along the second axis of a spindle whose modes lie askew."""
+"""Relative frequency difference along the second principal axis of a spindle with rotated axes."""
 RIGID_STIFFNESS = 1e30
 """Modal stiffness of what does not move (N/m)."""
 HOST_WAIT_TIME = 0.2
-"""Time that a device in step waits for a host that asks for no more (s); then it sends a block all the same."""
+"""Time that a synchronized device waits for its host (s). Then it sends a block anyway."""
 
 
 @dataclass(frozen=True)
 class EmulatedMachine:
-    """A device made of software on a spindle made of numbers."""
+    """Emulated device and the true values of its first mode."""
 
     device: EmulatorThread
     """Emulator that serves while its context lasts."""
     frequency: float
-    """Natural frequency of the first mode (Hz), the truth."""
+    """True natural frequency of the first mode (Hz)."""
     stiffness: float
-    """Stiffness of the first mode at the tapped point (N/m), the truth."""
+    """True stiffness of the first mode at the tapped point (N/m)."""
 
 
 def build_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
-    """Structure that a hammer meets at a position (m from the tool tip): modes and static residual of the model."""
+    """Build the structure at a position (m from the tool tip): modes and static residual of the model."""
     frequency, stiffness = modes_at(spindle, EMULATED_MODES, position)
     return Structure(
         frequency=frequency,
@@ -73,18 +74,20 @@ def build_structure(spindle: Spindle, damping_ratio: float, position: float = 0.
 
 
 def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection) -> Structure:
-    """Structure that is met in a direction where each mode of a spindle is two, along axes square to each other.
+    """Rotate the principal directions of a spindle whose modes are pairs along two perpendicular axes.
 
-    The first axis lies `degrees` from x, towards y; along the second frequencies are `SECOND_AXIS_FREQUENCY_SHIFT`. Across, of a hit in x
-    seen in y, both show with opposite signs. Raises ValueError for an angle that is none, or that shows nothing across.
+    The first axis is `degrees` from x towards y. Along the second, frequencies are higher by
+    SECOND_AXIS_FREQUENCY_SHIFT. In a cross FRF, hit in x and measured in y, both show with opposite signs. ValueError
+    for an invalid angle, or one that gives no cross FRF.
     """
     if not 0 <= degrees <= 90:
-        raise ValueError(f"--askew {degrees:g}: is not an angle of 0 to 90 degrees")
+        raise ValueError(f"rotate_structure.degrees {degrees:g}: is not an angle of 0 to 90 degrees")
     c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
         raise ValueError(
-            f"--askew {degrees:g} --direction xy: modes along x and y show nothing across; give another angle"
+            f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: "
+            "modes along x and y show nothing across; give another angle"
         )
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     seen = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
@@ -97,14 +100,14 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
 
 
 def set_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
-    """The spindle with every bearing at this stiffness (N/m)."""
+    """Return the spindle with this stiffness of every bearing (N/m)."""
     return replace(spindle, bearings=[replace(bearing, stiffness=stiffness) for bearing in spindle.bearings])
 
 
 def make_emulator(
     structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False
 ) -> TapsEmulator:
-    """Somebody taps this structure, again and again, on a TAPS/1 device."""
+    """Make a TAPS/1 device on a structure that is tapped again and again."""
     signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering())
     return TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=realtime, tcp=tcp)
 
@@ -113,14 +116,14 @@ def make_emulator(
 def open_synchronized_device(
     structure: Structure, random: np.random.Generator, *, tcp: bool = False
 ) -> Iterator[Callable[[], TapsSource]]:
-    """Somebody taps this structure on a TAPS/1 device that waits for its host; yields what opens it.
+    """Serve a tapped structure on a TAPS/1 device that waits for its host. Yields the function that opens it.
 
-    Device and host work in turns: two threads that work at once hand the interpreter over at each step, and the reader
-    of a port takes all that comes while a hit is judged, most of which would be thrown away.
+    Device and host work in turns: two threads that work at once switch the interpreter at each step, and the reader of
+    a port would collect data during the evaluation of a hit, most of which would be discarded.
     """
     hammered, wanted = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
 
-    def signal(first_scan: int, n_scans: int) -> NDArray[np.float64]:
+    def signal(first_scan: int, n_scans: int) -> Floats:
         wanted.acquire(timeout=HOST_WAIT_TIME)
         return hammered(first_scan, n_scans)
 
@@ -129,7 +132,7 @@ def open_synchronized_device(
 
 
 class _SynchronizedSource(TapsSource):
-    """Wants another block when the one before is done with; they are longer than where somebody watches."""
+    """Source that requests a block when the previous one is processed. Its frames are longer than usual."""
 
     _frame_time = 0.06
 
@@ -158,49 +161,67 @@ def emulate_machine(
     direction: TapDirection = "x",
     askew: float | None = None,
 ) -> EmulatedMachine:
-    """Somebody taps the spindle of a machine, again and again, on a device of this kind.
+    """Emulate a device of this kind on the spindle of a machine that is tapped again and again.
 
-    spindle: in place of that of machine.toml, of the same damping. askew: angle from x (deg) at which its modes lie, as
-    `rotate_structure` has it with hammer and sensor in a direction; None: a round spindle, the same in x and y.
-    DataError where machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
+    spindle: replaces that of machine.toml, with the same damping. askew: angle from x (deg) of its principal directions
+    as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no spindle,
+    or lacks the sensors of a device that does not describe them itself.
+    """
+    built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
+    structure = _select_direction(built, askew, direction)
+
+    def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
+        is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
+        cross = [_select_cross_direction(built, askew, direction)] if is_crossed else []
+        return map_signal_to_inputs(inputs, HammeredStructure(structure, rate, random, Hammering(), cross), direction)
+
+    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
+
+
+def emulate_device(
+    folder: MachineFolder,
+    driver: Driver,
+    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
+    *,
+    realtime: bool,
+    tcp: bool,
+) -> EmulatorThread:
+    """Make an emulated device of this kind. signal_of: function of its sensors and sample rate (Hz).
+
+    DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
-    built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
-    structure = _select_direction(built, askew, direction)
     inputs = get_emulated_inputs(folder, driver)
-    beside = (
-        [_select_cross_direction(built, askew, direction)]
-        if any(_is_cross_sensor(sensor, direction) for sensor in inputs)
-        else []
+    has_clock = folder.machine.daq.digital_clock
+    return driver.emulate(
+        EmulationSetup(lambda rate: signal_of(inputs, rate), inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock)
     )
-    bench = EmulationSetup(
-        lambda rate: map_signal_to_inputs(
-            inputs, HammeredStructure(structure, rate, random, Hammering(), beside), direction
-        ),
-        inputs,
-        EMULATED_SAMPLE_RATE,
-        realtime,
-        tcp,
-        folder.machine.daq.digital_clock,
-    )
-    return EmulatedMachine(driver.emulate(bench), float(structure.frequency[0]), float(structure.stiffness[0]))
+
+
+def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
+    """Return [spindle] of machine.toml. DataError if there is none."""
+    if folder.machine.spindle is None:
+        raise DataError(
+            f"{folder.toml}: no model to {purpose}: "
+            "add a [spindle] table (or use folder_files.make_machine_folder.template)"
+        )
+    return folder.machine.spindle
 
 
 def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
-    spindle = folder.machine.spindle
-    if spindle is None:
-        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    return build_structure(replacement or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
+    table = get_spindle_table(folder)
+    return build_structure(replacement or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
 def _select_direction(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
-    """What hammer and sensor meet in a direction."""
+    """Return the structure between hammer and sensor in a direction."""
     return built if askew is None and direction != CROSS_TAP else rotate_structure(built, askew or 0.0, direction)
 
 
 def _select_cross_direction(built: Structure, askew: float | None, direction: TapDirection) -> Structure:
-    """What a second sensor, square to the first, feels of the same blows: nothing where no mode lies askew."""
+    """Return the structure between hammer and a perpendicular sensor: rigid without rotated axes."""
     if direction == CROSS_TAP:
         return _select_direction(built, askew, "x")
     if askew is None or not 0 < askew < 90:
@@ -211,9 +232,9 @@ def _select_cross_direction(built: Structure, askew: float | None, direction: Ta
 def map_signal_to_inputs(
     inputs: Sequence[SensorInput], signal: SignalFunction, direction: TapDirection | Literal[""] = ""
 ) -> SignalFunction:
-    """A signal of force and acceleration as these sensors feel it, a row each.
+    """Return the signal function of these inputs, one row each, from one of force and acceleration.
 
-    direction: that of a tap whose signal has, as a third row, what is felt square to it.
+    direction: of a tap whose signal has the cross acceleration as third row.
     """
     kinds = ("force", "acceleration")
     rows = [kinds.index(sensor.channel.quantity) + _is_cross_sensor(sensor, direction) for sensor in inputs]
@@ -221,12 +242,12 @@ def map_signal_to_inputs(
 
 
 def _is_cross_sensor(sensor: SensorInput, direction: str) -> bool:
-    """Whether a sensor lies square to the one that a tap in a direction is seen by."""
+    """Return whether a sensor is perpendicular to that of the tapped direction."""
     return bool(direction and sensor.channel.direction and sensor.channel.direction != direction[-1])
 
 
 def get_emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:
-    """Sensors on an emulated device; DataError where machine.toml lacks those that the device does not describe."""
+    """Return the sensors of an emulated device. DataError if machine.toml lacks those it does not describe."""
     if driver.sensor_data is not None:
         channels = EMULATED_CHANNELS[1:] if folder.machine.tap.hammer == "none" else EMULATED_CHANNELS
         return tuple(SensorInput(number, channel) for number, channel in enumerate(channels))

@@ -14,16 +14,16 @@ from lobewatch.tap.state import TapState
 from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
 
 MIN_HITS_FOR_MEAN = 3
-"""Hits in a mean that others are compared with."""
+"""Hits in a mean with which others are compared."""
 
 
 class EvaluatedHits:
-    """The spooled hits of a test, and their mean, which always is that of the good ones."""
+    """Stored hits of a test and their mean, which is always that of the good ones."""
 
     def __init__(self, tap: TapInProgress, machine: Machine) -> None:
-        """Go on with what is spooled."""
+        """Resume with the stored hits."""
         self.tap = tap
-        """The hits on the disk."""
+        """Stored hits."""
         self.wanted = machine.tap.hits
         """Number of good hits needed."""
         self.mean = RunningMean()
@@ -35,7 +35,7 @@ class EvaluatedHits:
 
     @property
     def missing(self) -> int:
-        """Number of good hits still to come."""
+        """Number of good hits still needed."""
         return max(self.wanted - self.tap.good, 0)
 
     @property
@@ -44,16 +44,15 @@ class EvaluatedHits:
         return f"{self.tap.good} of {self.wanted} good hits"
 
     def evaluate(self, hit: Hit) -> HitVerdict:
-        """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter; a good one is
-        in the mean when this returns."""
+        """Evaluate a hit, also against the mean if that has enough hits. A good one is then part of the mean."""
         return evaluate_safely(lambda: self._judge(hit))
 
     def add(self, hit: Hit, verdict: HitVerdict) -> None:
-        """Keep a hit; on the disk when this returns."""
+        """Store a hit. It is on the disk when this returns."""
         self.tap.add(hit, verdict.flags, verdict.text)
 
     def undo(self) -> int | None:
-        """Take back the last good hit and return its index; None where there is none."""
+        """Take back the last good hit and return its index. None if there is none."""
         good = [i for i, flags in enumerate(self.tap.flags) if not flags]
         if not good:
             return None
@@ -61,9 +60,9 @@ class EvaluatedHits:
         return good[-1]
 
     def recheck_first_hits(self) -> tuple[int, HitVerdict] | None:
-        """Judge the first hits, which had no mean to be compared with, against the mean of all others.
+        """Compare the first hits, which had no mean yet, with the mean of all others.
 
-        Takes the first of them that does not fit out of the mean, and returns its index and why.
+        Takes the first one that does not fit out of the mean, and returns its index and the reason.
         """
         if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(self.mean.hits) <= 2 * MIN_HITS_FOR_MEAN:
             return None
@@ -83,7 +82,7 @@ class EvaluatedHits:
         return verdict
 
     def _compare(self, hit: Hit) -> HitVerdict:
-        """Verdict on a hit of the mean against the others; all else about it was judged when it came."""
+        """Compare a hit of the mean with the others. All else was evaluated when it came."""
         return HitVerdict.from_findings(evaluate_spectrum(hit, self.mean.estimate_without(hit)))
 
     def _take_out(self, number: int, verdict: HitVerdict) -> None:
@@ -92,40 +91,43 @@ class EvaluatedHits:
 
 
 class LiveState(Protocol):
-    """Picture of a live test: a frozen dataclass."""
+    """State of a live test: a frozen dataclass."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def revision(self) -> int:
-        """Number that rises with every change."""
+        """Number that increases with every change."""
 
 
 State = TypeVar("State", bound=LiveState)
 
 
 class StatePublisher(Generic[State]):
-    """The newest picture: only replaced, never changed, by the thread of the test; any thread may read it."""
+    """Publisher of the state of a live test.
+
+    The thread of the test replaces the state, never changes it. Any thread may read it.
+    """
 
     def __init__(self, first: State, clock: Callable[[], float]) -> None:
-        """clock: seconds that never go back."""
+        """Publish the first state. clock: monotonic time (s)."""
         self._state: State = first
         self._clock, self._shown_at = clock, clock()
         self.wakes: set[Callable[[], None]] = set()
-        """Functions that are called after every change, by the thread that has made it; none may take time."""
+        """Functions called after every change by the thread of the test. None may take time."""
 
     @property
     def state(self) -> State:
-        """The newest picture."""
+        """Newest state."""
         return self._state
 
     @property
     def age(self) -> float:
-        """Time for which it has stood (s)."""
+        """Time since the last change (s)."""
         return self._clock() - self._shown_at
 
     def show(self, **changes: Any) -> None:
-        """Replace the picture by one with these fields of it."""
+        """Replace the state by one with these changed fields."""
         self._state = replace(self._state, revision=self._state.revision + 1, **changes)
         self._shown_at = self._clock()
         for wake in tuple(self.wakes):
@@ -133,10 +135,10 @@ class StatePublisher(Generic[State]):
 
 
 class TapPublisher(StatePublisher[TapState]):
-    """The pictures of a test."""
+    """Publisher of the state of a tap test."""
 
     def show_hits(self, hits: EvaluatedHits, **changes: Any) -> None:
-        """The list of hits, what follows from it, and other fields with it."""
+        """Publish the list of hits, what follows from it, and other fields."""
         mean = hits.mean
         self.show(
             hits=hits.tap.taken,

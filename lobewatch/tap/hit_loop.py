@@ -19,28 +19,26 @@ from lobewatch.tap.tap_in_progress import evaluate_safely
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
-"""Time for which a verdict is shown at least (s); the trigger may be armed before."""
+"""Time for which a verdict is shown at least (s). The trigger may be armed before."""
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
 
 class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
-    """The operator ended the test before enough hits were good; they stay in the spool, the next test goes on."""
+    """Raised when the operator ends the test early. The hits stay stored, and the next test resumes with them."""
 
 
 class OperatorRequests:
-    """Undo and stop, said by any thread and heard by that of the test."""
+    """Requests to undo or stop, made by any thread and handled by that of the test."""
 
     def __init__(self) -> None:
-        """Nothing is asked for."""
         self._undos, self._stopping = threading.Semaphore(0), threading.Event()
 
     def undo(self) -> None:
-        """Take back the last good hit; again: the one before."""
+        """Request to take back the last good hit. Again: the one before."""
         self._undos.release()
 
     def stop(self) -> None:
-        """End the test."""
         self._stopping.set()
 
     @property
@@ -49,22 +47,22 @@ class OperatorRequests:
         return self._stopping.is_set()
 
     def take_undo(self) -> bool:
-        """Whether one more hit is to be taken back; each wish is told once."""
+        """Return whether one more hit is to be taken back. Each request counts once."""
         return self._undos.acquire(blocking=False)
 
 
 class HitLoop:
-    """Finds hits, judges and shows them, and serves what is asked for between two blocks."""
+    """Loop that captures, evaluates and shows hits, and handles requests between two blocks."""
 
     def __init__(self, hits: EvaluatedHits, publisher: TapPublisher, wishes: OperatorRequests, *, guided: bool) -> None:
-        """guided False leaves out the curves and the time to take back the last hit."""
+        """Set up the loop. guided False omits the curves and the time to take back the last hit."""
         self._hits, self._publisher, self._wishes, self._guided = hits, publisher, wishes, guided
         self._verdict = TapStep.TAP
         self._heard = 0
         self._verdict_at: int | None = None
 
     def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
-        """Blocks that the device sends; wishes are served and levels shown in between."""
+        """Yield the blocks of the device. Handle requests and show levels in between."""
         for block in connection.blocks():
             self._heard += block.codes.shape[1]
             for _ in range(connection.count_presses()):
@@ -79,14 +77,14 @@ class HitLoop:
             raise DataError(f"the samples have ended with {self._hits.progress}; record more of them")
 
     def handle_requests(self) -> None:
-        """Do what other threads have asked for; TapStopped where that is the end."""
+        """Do what other threads have requested. TapStopped if that ends the test."""
         if self._wishes.stopping:
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
         while self._wishes.take_undo():
             self._undo()
 
     def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
-        """Hits as they come, and None after every block; the word follows the trigger."""
+        """Yield hits as they come, and None after every block. The shown step follows the trigger."""
         search = HitSearch(connection.channels, connection.sample_rate, trigger, connection.direction)
         early = 0
         for block in self.blocks(connection):
@@ -100,7 +98,7 @@ class HitLoop:
             self._follow(search, connection.sample_rate)
 
     def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
-        """Hits until enough are good, and time has passed to take the last one back."""
+        """Take hits until enough are good and the time to take back the last one has passed."""
         grace = LAST_HIT_UNDO_TIME if self._guided else 0.0
         for hit in self.hits(connection, trigger):
             if self._hits.missing and hit is not None:
@@ -109,12 +107,12 @@ class HitLoop:
                 return
 
     def show_verdict(self, flags: HitFlags, reason: str, *, trial: bool = False) -> None:
-        """Say at once what became of a hit."""
+        """Show the verdict on a hit."""
         self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._heard
         self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
 
     def show_curves(self, hit: Hit) -> None:
-        """The curves of a hit and of the mean; none where they cannot be worked out."""
+        """Show the curves of a hit and of the mean, none if they cannot be computed."""
         if not self._guided:
             return
         try:
@@ -124,11 +122,11 @@ class HitLoop:
         self._publisher.show(plots=plots)
 
     def _verdict_age(self, sample_rate: float) -> float:
-        """Time for which the verdict has been shown (s); inf where none is."""
+        """Return how long the verdict has been shown (s), inf if none is."""
         return float("inf") if self._verdict_at is None else (self._heard - self._verdict_at) / sample_rate
 
     def _follow(self, search: HitSearch, sample_rate: float) -> None:
-        """The word for where the trigger stands."""
+        """Show the step that matches the trigger."""
         word = TapStep.TAP if search.armed else TapStep.WAIT
         fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._hits.missing
         if self._verdict_at is not None and fresh and not search.recording:
@@ -137,7 +135,7 @@ class HitLoop:
             self._publisher.show(word=word)
 
     def _take(self, hit: Hit) -> None:
-        """Judge a hit and show the verdict at once; it is counted when it is on the disk."""
+        """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
         verdict = self._hits.evaluate(hit)
         self.show_verdict(verdict.flags, verdict.text)
         self._hits.add(hit, verdict)
@@ -155,7 +153,7 @@ class HitLoop:
             self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
-        """A hit that was good counts no more: the word GOOD must not stand there any longer."""
+        """Show that a good hit no longer counts. The word GOOD must disappear."""
         self._verdict_at = None
         word = self._publisher.state.word
         word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
@@ -164,22 +162,22 @@ class HitLoop:
 
 
 SELF_CHECK_DURATION = 1.0
-"""Time for which the self-check listens (s)."""
+"""Length of the record of the self-check (s)."""
 
 
 class TapPhases:
-    """Self-check, trial hits, hits that count; each goes on where it stood when the device went away."""
+    """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away."""
 
     def __init__(
         self, folder: MachineFolder, hits: EvaluatedHits, loop: HitLoop, publisher: TapPublisher, *, guided: bool
     ) -> None:
-        """guided False leaves out the self-check where no trial hits need it, and re-arming by decay."""
+        """Set up the phases. guided False omits re-arming by decay, and the self-check if no trial hits need it."""
         self._folder, self._hits, self._loop, self._publisher = folder, hits, loop, publisher
         self._tap, self._guided = hits.tap, guided
         self._trial: TrialHits | None = None
 
     def run(self, connector: DeviceConnector) -> None:
-        """All of them, with as many connections as it takes; DeviceError where the first one cannot be made."""
+        """Run all phases, reconnecting as often as needed. DeviceError if the first connection fails."""
         connection = connector.connect(self._tap)
         while True:
             try:
@@ -194,7 +192,7 @@ class TapPhases:
                 connection = connector.reconnect(error, self._tap, self._loop.handle_requests)
 
     def _check(self, connection: DeviceConnection) -> None:
-        """The self-check, once a session."""
+        """Run the self-check, once per session."""
         machine = self._folder.machine
         trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
@@ -215,13 +213,13 @@ class TapPhases:
         self._publisher.show(checks=checks, reason=" ".join(failed))
 
     def _hearing(self, baseline: Hit) -> tuple[Check, ...]:
-        """What the sensor can hear, where it is all there is."""
+        """Check the detectable band if there is no force sensor."""
         if baseline.has_force:
             return ()
         return (check_detectable_band(baseline, self._folder.machine, self._tap.circumstances.tool),)
 
     def _try(self, connection: DeviceConnection) -> None:
-        """Trial hits, where machine.toml leaves something open."""
+        """Take trial hits if machine.toml leaves a trigger setting open."""
         tap, setup = self._tap, self._folder.machine.tap
         tap.trigger = tap.trigger or trigger_from_setup(setup, connection.sample_rate)
         if tap.trigger is not None or tap.baseline is None:
@@ -240,7 +238,7 @@ class TapPhases:
             asked = self._take_trial_hit(connection, trial)
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
-        """Whether the next hit is of use."""
+        """Take a trial hit and return whether it was usable."""
         hits = self._loop.hits(connection, self._at_rest(trial.trigger))
         hit = next(hit for hit in hits if hit is not None)
         verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
@@ -256,14 +254,14 @@ class TapPhases:
         self._loop.take_hits(connection, self._at_rest(trigger))
 
     def _at_rest(self, trigger: Trigger) -> Trigger:
-        """Trigger that is armed only while the structure is at rest, where somebody taps by hand."""
+        """Return a trigger that is armed only at rest, if somebody taps by hand."""
         if not self._guided or self._tap.baseline is None:
             return trigger
         return replace(trigger, rest_rms=estimate_resting_rms(self._tap.baseline, trigger.pre_trigger))
 
 
 def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
-    """As `run_self_check`; where that fails, one line that says so."""
+    """Run the self-check. If it fails, return one line that says so."""
     try:
         return run_self_check(baseline, level, free_bytes)
     except Exception as error:  # noqa: BLE001 - a check warns and ends no test

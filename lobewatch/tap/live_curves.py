@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 from acquisition import Frf, Hit, RunningMean, compute_cross_spectra, extract_free_decay
 from acquisition.estimation.estimate_frf import estimate_frf_from_spectra
 from acquisition.hits.pulse import find_pulse
+from lobewatch.arrays import Floats, Integers
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import LiveCurves
 from modal import decay_spectra
 
 CURVE_BINS = 400
-"""Number of bins of a curve; the highest and the lowest sample of every bin are shown."""
+"""Number of bins of a curve. The highest and lowest sample of every bin are shown."""
 SPECTRUM_BAND_FACTOR = 1.25
-"""Spectra are shown up to this many times the upper end of the usable band."""
+"""Upper end of shown spectra over that of the usable band."""
 MIN_DECAY_CURVE_FREQUENCY = 50.0
-"""Frequency from which on the spectrum of a decay is shown (Hz): below it noise over its square is all."""
+"""Lowest shown frequency of a decay spectrum (Hz). Below it noise over frequency squared dominates."""
 DECAY_PEAK_RECEPTANCE = 1e-6
-"""Receptance that the highest line of a decay is shown as, for its force is not known (m/N)."""
+"""Receptance at which the highest line of a decay is shown, as its force is unknown (m/N)."""
 MIN_HITS_FOR_COHERENCE = 3
-"""Under so many hits coherence says nothing."""
+"""Hits needed for a meaningful coherence."""
 
 
 def build_curves(hit: Hit, mean: RunningMean) -> LiveCurves:
-    """Curves that the screen shows after a hit, good or not."""
+    """Build the curves shown after a hit, good or not."""
     if not hit.has_force:
         return _build_decay_curves(hit)
     shown = _select_samples(hit)
@@ -58,7 +59,7 @@ def build_curves(hit: Hit, mean: RunningMean) -> LiveCurves:
 
 
 def _build_decay_curves(hit: Hit) -> LiveCurves:
-    """The acceleration of a hit, and the spectrum of its free decay as the receptance of an unknown force."""
+    """Build the curves of a hit without force: its free decay as receptance of an unknown force."""
     shown = find_extremes([hit.acceleration], hit.acceleration.size)
     (spectrum,) = decay_spectra(extract_free_decay(hit), hit.sample_rate)
     size = np.abs(spectrum.receptance)
@@ -80,21 +81,21 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
     )
 
 
-def _get_coherence(frf: Frf | None) -> NDArray[np.float64] | None:
+def _get_coherence(frf: Frf | None) -> Floats | None:
     return None if frf is None or frf.n_averages < MIN_HITS_FOR_COHERENCE else frf.coherence
 
 
-def _pick_lines(curve: NDArray[np.float64] | None, lines: NDArray[np.int64]) -> NDArray[np.float64] | None:
+def _pick_lines(curve: Floats | None, lines: Integers) -> Floats | None:
     return None if curve is None else curve[lines]
 
 
-def _to_decibels(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """dB below the largest value, at most 100."""
+def _to_decibels(power: Floats) -> Floats:
+    """Return dB below the largest value, at most 100."""
     return np.asarray(10 * np.log10(np.maximum(power / np.max(power), 1e-10)))
 
 
-def _select_samples(hit: Hit) -> NDArray[np.int64]:
-    """Samples to show: all around the pulse, elsewhere the extremes of every bin."""
+def _select_samples(hit: Hit) -> Integers:
+    """Select the samples to show: all around the pulse, the extremes of every bin elsewhere."""
     kept = find_extremes([hit.force, hit.acceleration], hit.force.size)
     pulse = find_pulse(hit)
     if pulse is None:
@@ -104,8 +105,8 @@ def _select_samples(hit: Hit) -> NDArray[np.int64]:
     return np.union1d(kept, around[:: around.size // CURVE_BINS + 1])
 
 
-def find_extremes(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
-    """Indices below `end` at which a curve is highest or lowest in its bin, rising."""
+def find_extremes(curves: Sequence[NDArray[Any]], end: int) -> Integers:
+    """Return increasing indices below `end` at which a curve is highest or lowest in its bin."""
     width = max(-(-end // CURVE_BINS), 1)
     if width == 1 or not curves:
         return np.arange(0, end, width)

@@ -11,39 +11,40 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
 from dsm import format_rounded, natural_frequencies
+from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
 
 QUIET_PIECE_TIME = 0.01
-"""Length of the pieces by which a quiet stretch is found (s)."""
+"""Length of the pieces by which a quiet part is found (s)."""
 QUIET_RMS_FACTOR = 3.0
-"""A piece is quiet where its rms is at most this many times that of the quietest fifth."""
+"""Largest rms of a quiet piece over that of the quietest fifth."""
 MIN_QUIET_TIME = 0.1
-"""A quiet stretch is at least so long (s)."""
+"""Shortest quiet part (s)."""
 MIN_TRIGGER_NOISE_RATIO = 6.0
-"""The trigger level should be this many times the rms of the force at rest."""
+"""Smallest trigger level over the rms of the force at rest."""
 MAX_RESPONSE_NOISE_SHARE = 0.02
-"""The noise of the response should stay below this share of its range."""
+"""Largest noise of the response as a share of its range."""
 CHECKED_MAINS_FREQUENCIES = (50.0, 60.0)
 """Mains frequencies (Hz)."""
 CHECKED_MAINS_HARMONICS = 6
-"""Lines of the mains looked at."""
+"""Number of mains harmonics checked."""
 MIN_HUM_POWER_SHARE = 0.5
-"""Share of the power at rest in the lines of the mains that is called hum; chosen."""
+"""Share of the power at rest in mains lines that is reported as hum, chosen."""
 MIN_SPINDLE_POWER_SHARE = 0.5
-"""Share of the power at rest in another single line that is called a turning spindle; chosen."""
+"""Share of the power at rest in another single line that is reported as a turning spindle, chosen."""
 MIN_LINE_CODES = 3.0
-"""Steps of the converter below which the rms of such lines is nothing; chosen."""
+"""RMS of such lines (converter steps) below which they are ignored, chosen."""
 MIN_DISK_RESERVES = 4
-"""Free bytes of the disk over those that a test reserves, at least; chosen."""
+"""Free disk space over that reserved by a test, at least, chosen."""
 SENSOR_ERROR_CODES = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-wrong"})
-"""Codes of what cannot be, and is to be put right before a sensor or a DAQ is worked with."""
+"""Codes of impossible values that must be corrected before a sensor or DAQ is used."""
 
 
 def find_quiet_part(record: Hit) -> Hit:
-    """The longest part of a record without hits and their ringing; all of it where no part is quiet."""
+    """Return the longest part of a record without hits and their decay, or all of it if no part is quiet."""
     size = max(round(QUIET_PIECE_TIME * record.sample_rate), 1)
     count = record.acceleration.size // size
     if count < 2:
@@ -60,8 +61,10 @@ def find_quiet_part(record: Hit) -> Hit:
 
 
 def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
-    """One line each on samples, sensors, noise, hum, spindle and disk; level: of the trigger (N), None where trial
-    hits choose it. baseline: a record from a DAQ in which nobody taps."""
+    """Check samples, sensors, noise, hum, spindle and disk, one line each.
+
+    baseline: a record of a DAQ while nobody taps. level: trigger level (N), None if trial hits choose it.
+    """
     if baseline.codes is None or baseline.channels is None:
         raise ValueError("the self-check needs a record with converter codes and channels")
     return (
@@ -76,13 +79,13 @@ def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple
 
 
 def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
-    """Sensitivities and calibration dates."""
+    """Check sensitivities and calibration dates."""
     doubts = sensor_remarks(channels, datetime.now(UTC).date(), interval_months)
     return Check("calibration", not doubts, "; ".join(map(str, doubts)) or "dates known and not too old")
 
 
 def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
-    """Sensitivities and ranges that are not believed, calibrations that are old, not known or of an impossible day."""
+    """Return remarks on implausible sensitivities and ranges and on old, unknown or impossible calibrations."""
     doubts: list[Remark] = []
     for channel in channels:
         doubts += channel_remarks(channel)
@@ -99,7 +102,7 @@ def _check_samples(baseline: Hit) -> Check:
 
 
 def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
-    """Codes and channel of all that felt it, that across last."""
+    """Yield codes and channel of all sensors, the cross sensor last."""
     if baseline.codes is not None and baseline.channels is not None:
         yield from zip(baseline.codes, baseline.channels, strict=True)
     if baseline.cross_hit is not None:
@@ -120,7 +123,8 @@ def _check_force_noise(rms: float, level: float | None) -> Check:
     if level is None or level >= MIN_TRIGGER_NOISE_RATIO * rms:
         against = "" if level is None else f", trigger at {level:g} N"
         return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
-    cure = f"set trigger_n above {format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)}, or find the source of the noise"
+    least = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
+    cure = f"set trigger_n above {least}, or find the source of the noise"
     return Check(
         "force noise", False, f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}"
     )
@@ -135,26 +139,26 @@ def _check_response_noise(rms: float, channel: Channel) -> Check:
     return Check("response noise", False, f"{text}, {100 * rms / scale:.2g} % of the range: {cure}")
 
 
-def _power_spectrum(signal: NDArray[np.float64], rate: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies (Hz) and power of a Hann-windowed record; the sum of the power is its mean square."""
+def _power_spectrum(signal: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return frequencies (Hz) and power of a Hann-windowed record. The powers add up to its mean square."""
     window = np.hanning(signal.size)
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
     return np.arange(power.size) * rate / signal.size, 2 * power / (signal.size * np.sum(window**2))
 
 
-def _select_line(frequency: NDArray[np.float64], line: float) -> NDArray[np.bool_]:
-    """The lines that a Hann window spreads one frequency over."""
+def _select_line(frequency: Floats, line: float) -> Flags:
+    """Select the lines over which a Hann window spreads one frequency."""
     return np.asarray(np.abs(frequency - line) <= 2 * frequency[1])
 
 
-def _select_mains_lines(frequency: NDArray[np.float64], mains: float) -> NDArray[np.bool_]:
+def _select_mains_lines(frequency: Floats, mains: float) -> Flags:
     return np.asarray(
         np.any([_select_line(frequency, mains * k) for k in range(1, CHECKED_MAINS_HARMONICS + 1)], axis=0)
     )
 
 
 def _check_hum(baseline: Hit) -> Check:
-    """Mains lines in either channel."""
+    """Check for mains lines in each channel."""
     texts = []
     for channel, signal, unit in _list_signals(baseline):
         frequency, power = _power_spectrum(signal, baseline.sample_rate)
@@ -170,7 +174,7 @@ def _check_hum(baseline: Hit) -> Check:
 
 
 def _check_spindle(baseline: Hit) -> Check:
-    """One strong line in the response that is not of the mains."""
+    """Check for one strong line in the response that is not mains hum."""
     channel, signal, unit = _list_signals(baseline)[-1]
     frequency, power = _power_spectrum(signal, baseline.sample_rate)
     off_mains = np.where(
@@ -184,7 +188,7 @@ def _check_spindle(baseline: Hit) -> Check:
     return Check("spindle", True, "no steady vibration")
 
 
-def _list_signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
+def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:
     if baseline.channels is None:
         return []
     units = {"force": "N", "acceleration": "m/s^2"}
@@ -204,21 +208,21 @@ def _slice_record(record: Hit, start: int, end: int) -> Hit:
         record.codes[:, start:end],
         None if record.cross_hit is None else _slice_record(record.cross_hit, start, end),
     )
-    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, beside=beside)
+    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, cross_hit=beside)
 
 
 REFERENCE_HITS = 10
-"""Hits that the error is told of."""
+"""Number of hits for which the error is stated."""
 TARGET_FREQUENCY_ERROR = 1e-3
-"""Standard error of f_n, relative, that such a test should reach: a third of its usual scatter."""
+"""Relative standard error of f_n that such a test should reach, a third of its usual scatter."""
 FIT_ERROR_FACTOR = 2.0
-"""Error of our fit, which leaves residual terms open, over the least that is possible: 1.3 to 2.2 in simulations."""
+"""Error of the fit with residual terms over the smallest possible one, 1.3 to 2.2 in simulations."""
 ASSUMED_DAMPING_RATIO = 0.03
-"""Damping ratio that is taken for it where there is no model."""
+"""Damping ratio assumed without a model."""
 
 
 def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
-    """Band and noise of the sensor, against the mode that is followed where the model or [mode] band_hz tells it.
+    """Compare band and noise of the sensor with the followed mode, if the model or [mode] band_hz tells it.
 
     baseline: a record at rest.
     """
@@ -232,15 +236,16 @@ def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
         return Check("band", False, f"{heard}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
     least = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
-    error = f"{REFERENCE_HITS} hits that ring at {format_rounded(least, digits=2)} m/s^2 tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
+    needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(least, digits=2)} m/s^2"
+    error = f"{needed} tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
     return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
 
 
 def min_decay_amplitude(frequency: float, damping_ratio: float, density: float) -> float:
-    """Amplitude (m/s^2) of free decays, ten of them, whose frequency white noise leaves known to GOOD_ERROR.
+    """Return the amplitude (m/s^2) of ten free decays whose frequency white noise leaves known to the target.
 
     density: of the noise (m/s^2 per square root of Hz), its rms over the square root of the band that it fills.
-    OF_THE_FIT times the Cramer-Rao bound of A exp(-a t) cos(w t + phase) in noise of density n:
+    FIT_ERROR_FACTOR times the Cramer-Rao bound of A exp(-a t) cos(w t + phase) in noise of density n:
     var(w) = 8 n^2 a^3 / A^2.
     Source: Kay, Fundamentals of Statistical Signal Processing (1993), ch. 3, for this signal.
     """
@@ -250,7 +255,7 @@ def min_decay_amplitude(frequency: float, damping_ratio: float, density: float) 
 
 
 def _find_expected_frequency(machine: Machine, tool: str) -> tuple[float | None, str]:
-    """Frequency of the mode that is followed (Hz), and who says so."""
+    """Return the frequency of the followed mode (Hz) and its source."""
     try:
         spindle = machine.model(tool)
     except (DataError, ValueError):

@@ -1,4 +1,4 @@
-"""A live tap test from the self-check to the result: one thread runs it, any thread may look and take a hit back."""
+"""Live tap test from the self-check to the result."""
 
 from __future__ import annotations
 
@@ -38,7 +38,33 @@ from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
 
 
 class TapSession:
-    """One tap test of one machine: `run` it in one thread; `state`, `undo` and `stop` are for every thread."""
+    """Tap test of one machine. `run` it in one thread. `state`, `undo` and `stop` are for every thread.
+
+    Parameters
+    ----------
+    folder
+        Machine folder.
+    open_device
+        Function that opens the device.
+    circumstances
+        Operator, machine, tool, direction and time.
+    resume
+        Whether to resume an interrupted test of the same tool and direction.
+    guided
+        Whether a person taps. False omits self-check, re-arming by decay, curves, the time to take back the last hit,
+        and the outcome.
+    accept
+        Codes of questions about the recording that are answered already.
+    clock
+        Function that returns a monotonic time (s).
+    sleep
+        Function that waits (s).
+
+    Raises
+    ------
+    ValueError
+        A code in `accept` does not exist.
+    """
 
     def __init__(
         self,
@@ -52,9 +78,6 @@ class TapSession:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
-        curves, the time to take back the last hit, and the outcome. accept: questions about the recording that are
-        answered already, by code; ValueError for one that there is not."""
         self._accept = check_question_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
@@ -63,47 +86,67 @@ class TapSession:
         self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
         self.unasked: Sequence[str] = ()
-        """Codes of `accept_questions` that the finished test does not ask."""
+        """Codes of `accept` that the finished test does not ask."""
         self.saved: Sequence[str] = ()
-        """Identities of what the finished test has saved: its own, then that of the tap across."""
+        """Ids of what the finished test has saved: its own, then that of the cross tap."""
         self.across: CrossTapResult | None = None
-        """Tap across that the same hits tell; None where no second sensor felt them."""
+        """Cross tap that the same hits give, None if no second sensor recorded them."""
 
     @property
     def state(self) -> TapState:
-        """The newest picture of the test; never changed, only replaced."""
+        """Newest state of the test, replaced and never changed."""
         return self._publisher.state
 
     @property
     def wakes(self) -> set[Callable[[], None]]:
-        """Functions that are called after every new picture, by the thread of the test; none may take time."""
+        """Functions called after every change by the thread of the test. None may take time."""
         return self._publisher.wakes
 
     @property
     def measurement(self) -> Measurement:
-        """Measurement that the finished test gives of the spindle; ValueError before the end."""
+        """Measurement of the finished test. ValueError before the end."""
         if self._measurement is None:
             raise ValueError("the tap test is not finished; there is no measurement before run() has returned")
         return self._measurement
 
     def undo(self) -> None:
-        """Take back the last good hit; again: the one before."""
+        """Take back the last good hit. Again: the one before."""
         self._wishes.undo()
 
     def stop(self) -> None:
-        """End the test now; `run` raises TapStopped, the hits so far stay in the spool."""
+        """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
         self._wishes.stop()
 
     def choose(self, key: str, tool: str = "") -> None:
-        """Refuse a choice: after a test alone nothing comes; ValueError."""
+        """Reject a choice: nothing comes after a single test.
+
+        Parameters
+        ----------
+        key
+            Key of a choice.
+        tool
+            Name of a tool.
+
+        Raises
+        ------
+        ValueError
+            Always.
+        """
         raise ValueError(f"{f'{key} {tool}'.strip()!r} cannot be chosen: this is one test alone")
 
     def run(self) -> TapTest:
-        """Take hits until enough are good, commit the test and return it; blocks.
+        """Take hits until enough are good, commit the test and return it.
 
-        Raises DeviceError where there is no device at the start (later it is waited for), DataError where another
-        program writes to the folder or the disk is full, ValueError where the interrupted test was recorded with
-        another set-up, TapStopped after stop().
+        Raises
+        ------
+        DeviceError
+            There is no device at the start. Later it is awaited.
+        DataError
+            Another program writes to the folder, or the disk is full.
+        ValueError
+            The interrupted test was recorded with another set-up.
+        TapStopped
+            `stop` was called.
         """
         try:
             with self._folder.locked(), DiskReserve(self._folder.path) as reserve:
@@ -124,7 +167,7 @@ class TapSession:
             raise failure from error
 
     def _begin(self) -> EvaluatedHits:
-        """Hits of an interrupted test, or none yet."""
+        """Return the hits of an interrupted test, or none yet."""
         hits = EvaluatedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
         texts = []
         if hits.tap.hits:
@@ -138,7 +181,7 @@ class TapSession:
         return hits
 
     def _finish(self, hits: EvaluatedHits) -> TapTest:
-        """Average, commit, and say what it means."""
+        """Average, commit and evaluate the test."""
         self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
@@ -158,15 +201,14 @@ class TapSession:
 
 
 def _explain_no_result(error: Exception, remarks: Sequence[Remark]) -> str:
-    """Reason why a saved tap test has no result; remarks: about its file."""
+    """Explain why a saved tap test has no result. remarks: on its file."""
     if isinstance(error, OSError) and error.errno:
         return format_os_error(error)
     return "; ".join(map(str, remarks)) or str(error)
 
 
 def _to_operator_error(error: Exception) -> Exception:
-    """Error that the operator can act on: one that says so itself, else a failure of the system (a full disk) or of
-    the program in a sentence."""
+    """Return an error that the operator can act on, also for a failure of the system or the program."""
     if isinstance(error, DeviceError | ValueError):
         return error
     kept = "the hits so far are kept: the same command goes on with them"
@@ -177,9 +219,9 @@ def _to_operator_error(error: Exception) -> Exception:
 
 
 def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapResult | None = None) -> Outcome:
-    """The standing of the machine after a test, what was measured, and the next step, for the one who tapped.
+    """Build the result of a test for the operator: machine status, measured values and next step.
 
-    across: what became of the tap across that its hits tell.
+    across: result of the cross tap that its hits give.
     """
     standing = logbook.status(measurement.time)
     series = standing.series_of(measurement.tool, measurement.direction)
@@ -228,14 +270,41 @@ def plan_session(
     accept: Sequence[str] = (),
     conditions: Conditions = UNKNOWN_CONDITIONS,
 ) -> TapSession:
-    """A session of today; what is left empty is taken from machine.toml. ValueError where that names no port either.
+    """Plan a session of today. machine.toml supplies what is left empty.
 
-    conditions: those of today; what they leave open, machine.toml says too.
+    Parameters
+    ----------
+    folder
+        Machine folder.
+    port
+        Port of the device.
+    tool
+        Name of the tool.
+    direction
+        Direction: "x", "y" or "xy".
+    operator
+        Name of the operator.
+    resume
+        Whether to resume an interrupted test of the same tool and direction.
+    accept
+        Codes of questions about the recording that are answered already.
+    conditions
+        Conditions of today.
+
+    Returns
+    -------
+    TapSession
+        Session that is ready to run.
+
+    Raises
+    ------
+    ValueError
+        There is no port, or the direction needs a force sensor.
     """
     machine = folder.machine
     port = port or machine.daq.port
     if not port:
-        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port: give plan_session.port, or port in [daq] of {folder.toml}")
     tool, wanted = tool or machine.tap.tool, parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")

@@ -1,6 +1,6 @@
-"""Hits of an interrupted test, read back from its spool; damaged files are set aside, not lost.
+"""Read back the hits of an interrupted test. Damaged files are set aside, not lost.
 
-A hit file ends with its SHA-256, the set-up holds a CRC-32: what does not fit never reaches HDF5 or the test.
+A hit file ends with its SHA-256 and the set-up holds a CRC-32, so that no damaged data reaches HDF5 or the test.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.unverified_tap import has_readable_hits
 
 MAX_RESUME_AGE = timedelta(hours=12)
-"""Age from which an interrupted test is not gone on with."""
+"""Age up to which an interrupted test is resumed."""
 TEMPORARY_FILE_PATTERNS = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp", ".lock.holder.*.tmp")
-"""Temporary names of what is written under the lock."""
+"""Temporary file names of what is written under the lock."""
 SETUP_FILE_NAME = "setup.json"
-"""File with the trigger of a test."""
+"""File with the trigger settings of a test."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpooledHit:
-    """One hit from its file."""
+    """Hit from its file."""
 
     number: int
     """Number in the name of its file."""
     hit: Hit
-    """Hit as it was recorded."""
+    """Hit as recorded."""
     flags: HitFlags
-    """Verdict of then."""
+    """Flags given then."""
     circumstances: Circumstances
     """Circumstances of the test."""
 
 
 def read_spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
-    """The sound hits of a test, oldest first; a damaged file is set aside, and where to is added to `damaged`.
+    """Yield the intact hits of a test, oldest first. Damaged files are set aside and added to `damaged`.
 
     A file under the name of another one is damaged too: no hit counts twice.
     """
@@ -56,7 +56,7 @@ def read_spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]
 
 
 def count_interrupted_hits(folder: MachineFolder) -> dict[str, int]:
-    """Hits on the disk of interrupted tests of the tool of machine.toml that START would go on with, by direction."""
+    """Count the stored hits of resumable tests of the tool of machine.toml, by direction."""
     counts: dict[str, int] = {}
     for path in sorted(folder.spool.iterdir()) if folder.spool.is_dir() else []:
         files = sorted(path.glob("[0-9]*.h5"))
@@ -69,13 +69,13 @@ def count_interrupted_hits(folder: MachineFolder) -> dict[str, int]:
 
 
 def write_setup(folder: Path, trigger: Trigger) -> None:
-    """Keep how the hits are recorded; on the disk when this returns."""
+    """Store the trigger settings. They are on the disk when this returns."""
     fields = asdict(trigger)
     atomic_write(folder / SETUP_FILE_NAME, json.dumps(fields | {"crc": _compute_crc(fields)}).encode())
 
 
 def read_spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
-    """Trigger by which the hits were recorded; None where it was not kept, or is damaged and set aside."""
+    """Read the trigger settings of the hits. None if they were not stored, or are damaged and set aside."""
     path = folder / SETUP_FILE_NAME
     try:
         fields = json.loads(read_regular_file(path, MAX_SETTINGS_FILE_SIZE))
@@ -91,9 +91,9 @@ def read_spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
 
 
 def clean_spool(folder: MachineFolder) -> None:
-    """Remove what an ended program leaves of no use: half-written files and empty folders; under the lock.
+    """Remove half-written files and empty folders of an ended program, under the lock.
 
-    Half-written files that programs without the lock may be writing just now are left alone.
+    Half-written files that programs without the lock may be writing are left alone.
     """
     for path in [path for names in TEMPORARY_FILE_PATTERNS for path in folder.path.glob(names)]:
         path.unlink(missing_ok=True)
@@ -111,7 +111,7 @@ def _compute_crc(fields: object) -> int:
 
 
 def _read_spooled_hit(path: Path) -> SpooledHit | None:
-    """A hit; None where its file is damaged."""
+    """Read a hit. None if its file is damaged."""
     try:
         if not has_valid_checksum(read_regular_file(path)) and not has_readable_hits(path):
             return None
@@ -128,7 +128,7 @@ def _read_spooled_hit(path: Path) -> SpooledHit | None:
 
 
 def _set_aside(path: Path) -> Path:
-    """Out of the folder, which is removed when the test is committed, under a name that nothing has there."""
+    """Move a file out of the folder, which is removed on commit, under an unused name."""
     name, number = f"{path.parent.name}-{path.name}", 1
     while (aside := path.parent.with_name(f"{name}.damaged")).exists():
         number += 1

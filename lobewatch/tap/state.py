@@ -1,4 +1,4 @@
-"""What the operator is shown during a tap test: one immutable picture of it, the same for browser and terminal."""
+"""State of a tap test as the operator sees it, the same for browser and terminal."""
 
 from __future__ import annotations
 
@@ -7,143 +7,141 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from acquisition import HitFlags
+from lobewatch.arrays import Floats
 
 
 class TapStep(enum.StrEnum):
-    """The word that can be read from 3 m."""
+    """Step of a tap test, as a word that can be read from 3 m."""
 
     CHECKING = "CHECKING"
     """The self-check before the first hit runs."""
     TAP = "TAP"
-    """Armed: the next hit is waited for."""
+    """Armed: the next hit is awaited."""
     WAIT = "WAIT"
     """The structure still rings, or a record is being taken."""
     GOOD = "GOOD"
     """The last hit was accepted."""
     REFUSED = "REFUSED"
-    """The last hit was refused; the screen shows its verdict instead of this word."""
+    """The last hit was rejected. The screen shows its verdict instead of this word."""
     NO_DEVICE = "NO DEVICE"
-    """The DAQ was unplugged or fell silent; the test goes on at the same hit when it is back."""
+    """The DAQ was unplugged or fell silent. The test resumes at the same hit when it is back."""
     MOVE = "MOVE SENSOR"
-    """One direction is tapped; hammer and sensor are to be turned to the other."""
+    """One direction is tapped. Hammer and sensor must be turned to the other."""
     DONE = "DONE"
-    """Enough good hits; the result is there or being worked out."""
+    """Enough good hits. The result is there or being computed."""
     FAILED = "FAILED"
-    """The test cannot go on; the reason says why, the cure what to do."""
+    """The test cannot go on. The reason says why and what to do."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the self-check before hit 1."""
+    """Result of one check before the first hit."""
 
     name: str
-    """Name of the check, e.g. "noise floor"."""
+    """Name of the check, e.g. "force noise"."""
     passed: bool
-    """Whether all is well; a failed check warns and does not stop the test."""
+    """Whether all is well. A failed check warns and does not stop the test."""
     text: str
-    """Finding with its unit, and the cure where it failed."""
+    """Finding with its unit, and the remedy if the check failed."""
     is_notable: bool = False
-    """Whether the finding is worth a line where all is well, too."""
+    """Whether the finding deserves a line even if all is well."""
 
 
 @dataclass(frozen=True)
 class ListedHit:
-    """One hit in the list of the screen."""
+    """Hit in the list of the screen."""
 
     number: int
     """Number of the hit, from 1."""
     flags: HitFlags
-    """Verdict on the hit; falsy where it is averaged."""
+    """Flags of the hit, falsy if it is averaged."""
     peak: str
-    """Largest force, or largest acceleration where no force was measured, with its unit."""
+    """Largest force, or largest acceleration without a force sensor, with its unit."""
     undone: bool = False
     """Whether the operator took it back."""
     reason: str = ""
-    """Sentence with figures: what was wrong with it; empty where it is averaged."""
+    """Sentence with numbers on what is wrong with it, empty if it is averaged."""
     earlier: bool = False
     """Whether it was taken before the test was interrupted."""
 
 
 @dataclass(frozen=True, eq=False)
 class LiveCurves:
-    """The curves of the screen, thinned to what a screen can show."""
+    """Curves of the screen, reduced to what a screen can show."""
 
-    time: NDArray[np.float64]
+    time: Floats
     """Time from the trigger of the last hit (s), shape (n,)."""
-    force: NDArray[np.float64] | None
-    """Force of the last hit (N), shape (n,); None where none was measured."""
-    acceleration: NDArray[np.float64]
+    force: Floats | None
+    """Force of the last hit (N), shape (n,). None if not measured."""
+    acceleration: Floats
     """Acceleration of the last hit (m/s^2), shape (n,)."""
-    frequency: NDArray[np.float64]
+    frequency: Floats
     """Frequencies (Hz), shape (m,)."""
-    mean: NDArray[np.float64] | None
-    """Magnitude of the receptance of the mean of the good hits (m/N), shape (m,); None before the first good one."""
-    last: NDArray[np.float64] | None
-    """Magnitude of the receptance of the last hit (m/N), shape (m,); None where it had no pulse; without a force that
-    of its free decay, up to a factor."""
-    coherence: NDArray[np.float64] | None
-    """Coherence of the good hits (-), shape (m,); None under 3 of them."""
-    force_spectrum: NDArray[np.float64] | None
+    mean: Floats | None
+    """Receptance magnitude of the mean of the good hits (m/N), shape (m,). None before the first good one."""
+    last: Floats | None
+    """Receptance magnitude of the last hit (m/N), shape (m,). None without a pulse. Without a force that of its
+    free decay, up to a factor.
+    """
+    coherence: Floats | None
+    """Coherence of the good hits (-), shape (m,). None for fewer than 3."""
+    force_spectrum: Floats | None
     """Spectrum of the force of the last hit (dB below its largest value), shape (m,)."""
     usable_band: tuple[float, float] | None
-    """Band in which the force reaches (Hz)."""
+    """Band that the force excites (Hz)."""
 
 
 class Choice(NamedTuple):
-    """What a person can choose between two tests."""
+    """Choice between two tests."""
 
     key: str
-    """Key that stands for it: "x", "y", "tool" or "done"."""
+    """Key of the choice: "x", "y", "tool" or "done"."""
     text: str
-    """Words on its button."""
+    """Text of its button."""
 
 
 class ProgramVerdict(NamedTuple):
-    """A program and the word on it."""
+    """Program and its verdict."""
 
     program: str
     """Name, speed and depth."""
     word: str
-    """Word on it."""
+    """Verdict word."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result as it stands at the end."""
+    """Result of a finished test."""
 
     status: str
-    """Light of the machine: "good", "warn" or "alarm", against the baseline and the limits of machine.toml."""
+    """Status of the machine: "good", "warn" or "alarm", against the baseline and the limits of machine.toml."""
     texts: Sequence[str]
     """Result in sentences."""
     next_step: str
     """Sentence on what to do now."""
     is_early: bool = False
-    """Whether the alarm is that of a fall short of every limit."""
+    """Whether the alarm is for a frequency drop short of every limit."""
     programs: Sequence[ProgramVerdict] = ()
-    """Programs with the words on them."""
+    """Programs with their verdicts."""
     needs_cross_tap: bool = False
-    """Whether a tap across, hit in x and seen in y, would settle what x and y leave open of the tool."""
+    """Whether a cross tap, hit in x and measured in y, would settle what x and y leave open."""
 
 
 @dataclass(frozen=True, eq=False)
 class TapState:
-    """One picture of a tap test."""
+    """State of a tap test."""
 
     revision: int
-    """Number that rises with every change."""
+    """Number that increases with every change."""
     word: TapStep
-    """Word that can be read from 3 m."""
+    """Step."""
     title: str
     """Machine, tool and direction."""
     direction: str = ""
-    """Direction to be tapped: "x", "y" or "xy"; empty where it does not matter."""
+    """Direction to tap: "x", "y" or "xy", empty if it does not matter."""
     resumed: str = ""
-    """Interrupted test that is gone on with, how many good hits it had, and damaged files that were set aside; empty
-    for a new one."""
+    """Interrupted test that is resumed, its good hits, and damaged files set aside. Empty for a new test."""
     device: str = ""
     """DAQ, port and rate."""
     verdict: str = ""
@@ -151,33 +149,33 @@ class TapState:
     trial: bool = False
     """Whether the last hit was a trial hit, which does not count."""
     reason: str = ""
-    """Sentence with figures: what was wrong with the last hit, or why the test stands still."""
+    """Sentence with numbers on what was wrong with the last hit, or why the test waits."""
     good: int = 0
-    """Hits averaged so far."""
+    """Number of hits averaged so far."""
     wanted: int = 10
-    """Hits to be averaged."""
+    """Number of hits to average."""
     hits: tuple[ListedHit, ...] = ()
     """All hits, oldest first."""
     mean_change: float | None = None
-    """Share by which the last good hit moved the mean (-); None under 2 of them."""
+    """Relative change of the mean by the last good hit (-). None for fewer than 2."""
     settled: bool = False
     """Whether the mean has settled (a hint: the wanted number stays the rule)."""
     levels: tuple[float | None, float] | None = None
-    """Root mean squares of force (N; None where not measured) and acceleration (m/s^2) over the last 50 ms."""
+    """RMS of force (N, None if not measured) and acceleration (m/s^2) over the last 50 ms."""
     checks: tuple[Check, ...] = ()
     """Lines of the self-check."""
     plots: LiveCurves | None = None
     """Curves of the last hit and the mean."""
     outcome: Outcome | None = None
-    """Result; None before the end."""
+    """Result, None before the end."""
     choices: tuple[Choice, ...] = ()
-    """What can be chosen now; empty while a test runs."""
+    """Choices available now, empty while a test runs."""
     sensor_stays: bool = False
-    """Whether the hammer alone is to be moved: the sensor feels x and y."""
+    """Whether only the hammer must be moved: the sensors measure x and y."""
 
     @property
     def shown_word(self) -> str:
-        """Word as a screen shows it: the verdict in place of REFUSED, and what is to be moved."""
+        """Word as a screen shows it: the verdict instead of REFUSED, and what must be moved."""
         if self.word is TapStep.MOVE and self.sensor_stays:
             return "MOVE HAMMER"
         if self.word is not TapStep.REFUSED or not self.verdict:

@@ -27,6 +27,7 @@ from acquisition import (
 )
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
+from acquisition.hit_fault import HIT_FAULTS
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.tap.spool import (
@@ -41,49 +42,48 @@ from lobewatch.tap.state import ListedHit
 
 
 def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
-    """What `evaluate_program` says of a hit; where it fails, that the hit is refused as NOT_JUDGED, and why it failed."""
+    """Call `evaluate`. If it fails, reject the hit as NOT_JUDGED with the reason: one hit must not end a test."""
     try:
         return judge()
     except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
-        return HitVerdict.from_findings(
-            {HitFlags.NOT_EVALUATED: f"Judging it failed ({type(error).__name__}: {error})"}
-        )
+        failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
+        return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
 
 
 DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT)
-"""Errors of a disk without room."""
+"""Error numbers of a full disk."""
 
 
 @dataclass
 class TapInProgress:
-    """Hits so far, kept on disk one by one, so that a crash or an unplugged cable costs none of them."""
+    """Tap test in progress. Each hit is stored at once, so that a crash or an unplugged cable loses none."""
 
     id: str
-    """Identity of the tap test to be."""
+    """Id of the future tap test."""
     circumstances: Circumstances
-    """Circumstances of the test: who, what, when."""
+    """Circumstances of the test: operator, machine, time."""
     folder: Path
-    """Folder in which its hits are spooled."""
+    """Folder in which its hits are stored."""
     hits: list[Hit] = field(default_factory=list)
     """All hits so far."""
     flags: list[HitFlags] = field(default_factory=list)
-    """Verdict on each; UNDONE where the operator took a good one back."""
+    """Flags of each hit. UNDONE if the operator took a good one back."""
     reasons: list[str] = field(default_factory=list)
-    """Sentence on what was wrong with each; empty where it is averaged."""
+    """Sentence on what is wrong with each hit, empty if it is averaged."""
     numbers: list[int] = field(default_factory=list)
-    """Number of each, in the name of its file."""
+    """Number of each hit in the name of its file."""
     n_resumed: int = 0
-    """Number of hits that were there when it was gone on with."""
+    """Number of hits that an interrupted test already had."""
     trigger: Trigger | None = None
-    """Trigger by which its hits are recorded; None until that is chosen."""
+    """Trigger settings of its hits, None until chosen."""
     baseline: Hit | None = None
-    """Record at rest; None until the self-check has run."""
+    """Record at rest, None before the self-check."""
     damaged: list[Path] = field(default_factory=list)
-    """Files of an interrupted test that could not be read, where they were set aside."""
+    """Unreadable files of an interrupted test, where they were set aside."""
     not_resumed: list[str] = field(default_factory=list)
-    """Interrupted tests that are not gone on with, a sentence each."""
+    """Interrupted tests that are not resumed, one sentence each."""
     reserve: DiskReserve | None = None
-    """Room on the disk that is held for it."""
+    """Disk space reserved for it."""
 
     @property
     def good(self) -> int:
@@ -100,7 +100,7 @@ class TapInProgress:
         )
 
     def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
-        """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
+        """Note the set-up of the coming hits. ValueError if earlier hits have another one."""
         earlier = self.hits[-1] if self.hits else self.baseline
         if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
             raise self.make_setup_error()
@@ -108,32 +108,32 @@ class TapInProgress:
             self.circumstances = replace(self.circumstances, device=description)
 
     def make_setup_error(self) -> ValueError:
-        """The refusal to mix hits of two set-ups."""
+        """Return the error that rejects mixing hits of two set-ups."""
         return ValueError(
             f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
-            "begin anew with --new"
+            "begin anew with plan_session.resume=False"
         )
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
-        """Keep a hit; on the disk when this returns."""
+        """Store a hit. It is on the disk when this returns."""
         number = max(self.numbers, default=-1) + 1
         self._store(number, hit, flags)
         self._append(number, hit, flags, reason)
 
     def add_spooled(self, spooled: SpooledHit) -> None:
-        """Go on with a hit that is on the disk already."""
+        """Resume with a hit that is already on the disk."""
         verdict = evaluate_safely(lambda: evaluate_hit(spooled.hit))
         self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
         self.circumstances = spooled.circumstances
         self.n_resumed = len(self.hits)
 
     def exclude(self, number: int, flags: HitFlags, reason: str) -> None:
-        """Refuse a good hit (by its index) afterwards; it stays stored."""
+        """Reject a good hit (by its index) afterwards. It stays stored."""
         self._store(self.numbers[number], self.hits[number], flags)
         self.flags[number], self.reasons[number] = flags, reason
 
     def finish(self) -> TapTest:
-        """The averaged tap test; ValueError where no hit is good."""
+        """Return the averaged tap test. ValueError if no hit is good."""
         return average_hits(self.id, self.circumstances, self.hits, self.flags)
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
@@ -143,7 +143,7 @@ class TapInProgress:
         self.reasons.append(reason)
 
     def _store(self, number: int, hit: Hit, flags: HitFlags) -> None:
-        """Write a hit, which is on the disk when this returns; where that is full, in the room that was held."""
+        """Write a hit to the disk. If that is full, use the reserved space."""
         try:
             self._write(number, hit, flags)
         except OSError as error:
@@ -159,21 +159,24 @@ class TapInProgress:
 
 
 def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
-    """The tap test of hits with the verdict on each, each as one sensor felt it; ValueError where none is good."""
+    """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
     good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
     frf = estimate_frf(good) if good[0].has_force else None
     return TapTest(tap_id, about, frf, tuple(replace(hit, cross_hit=None) for hit in hits), tuple(flags))
 
 
 def format_peak(hit: Hit) -> str:
-    """Largest force of a hit, or without one its largest acceleration, with the unit."""
+    """Format the largest force of a hit, or without a force sensor its largest acceleration, with the unit."""
     if hit.has_force:
         return f"{hit.force.max():.0f} N"
     return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"
 
 
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
-    """A new tap test, or the interrupted one of the same tool and direction; DataError where the journal is damaged."""
+    """Begin a tap test, or resume the interrupted one of the same tool and direction.
+
+    DataError if the journal is damaged.
+    """
     folder.refuse_damage()
     clean_spool(folder)
     _remove_committed(folder)
@@ -186,7 +189,7 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 
 
 def _remove_committed(folder: MachineFolder) -> None:
-    """Hits that an ended program has left behind though their tap test is committed; kept where its file is damaged."""
+    """Remove hits left behind though their tap test is committed. Keep them if its file is damaged."""
     begun = [path for path in folder.spool.iterdir() if path.is_dir()] if folder.spool.is_dir() else []
     if begun:
         stored = {entry.id for entry in folder.taps()}
@@ -198,7 +201,7 @@ def _remove_committed(folder: MachineFolder) -> None:
 def _find_interrupted(
     folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], left: list[str]
 ) -> TapInProgress | None:
-    """The newest test of the same tool and direction to go on with, if that is wished; `left`: all others."""
+    """Return the newest test of the same tool and direction, if wished. Add all others to `left`."""
     committed, newest = folder.committed_ids, None
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
@@ -222,24 +225,24 @@ def _find_interrupted(
 
 
 MIN_CROSS_TAP_HITS = 3
-"""Good hits that a tap across is made of at least; chosen: with fewer nothing is known of their scatter."""
+"""Good hits needed for a cross FRF, chosen: fewer do not show their scatter."""
 
 
 @dataclass(frozen=True, eq=False)
 class CrossTapResult:
-    """What became of the tap across."""
+    """Result of the cross tap test that the same hits give."""
 
     tap_id: str | None
-    """Identity of the tap test that was saved; None where none was."""
+    """Id of the saved tap test, None if it was not saved."""
     text: str
-    """Sentence on it for the one who tapped."""
+    """Sentence for the operator."""
 
 
 def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> CrossTapResult | None:
-    """Save the tap across of a finished test of a driving point; None where no second sensor felt it.
+    """Save the cross tap test of a finished test of a driving point. None if no second sensor recorded it.
 
-    Its hits are those that are good at the driving point and in the second sensor. Whatever goes wrong with it is said
-    and costs the other one nothing.
+    It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
+    affect the other test.
     """
     felt = [(hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None]
     if not felt:
@@ -265,5 +268,5 @@ def _make_unsaved_result(why: str) -> CrossTapResult:
 
 
 def _evaluate_cross_hit(hit: Hit) -> HitVerdict:
-    """Verdict on a hit as the second sensor felt it."""
+    """Evaluate a hit as the second sensor recorded it."""
     return HitVerdict(HitFlags.NOT_EVALUATED) if np.ptp(hit.acceleration) == 0 else evaluate_hit(hit)

@@ -11,52 +11,52 @@ from acquisition import Channel, Hit, HitFlags, Remark, Trigger, check_hit, esti
 from lobewatch.machine.settings.setup_tables import TapTable
 
 MIN_RECORD_TIME = 0.25
-"""Shortest record chosen, and that of the first trial hit (s); alike from month to month."""
+"""Shortest record, and that of the first trial hit (s). It is the same from month to month."""
 MAX_RECORD_TIME = 4.0
-"""Longest record chosen (s)."""
+"""Longest record (s)."""
 RECORD_TIME_CONSTANTS = 6
-"""Time constants of the slowest mode that a record holds (ISO 7626-5: then the cut-off part is < 0.5 %)."""
+"""Time constants of the slowest mode in a record (ISO 7626-5: then the cut-off part is < 0.5 %)."""
 RECORD_TIME_STEP = 0.05
-"""A longer record is a multiple of this (s)."""
+"""Step of longer records (s)."""
 TRIGGER_PEAK_SHARE = 0.1
-"""Trigger level over the median peak of the trial hits; chosen."""
+"""Trigger level over the median peak of the trial hits, chosen."""
 TRIGGER_NOISE_RATIO = 10.0
-"""Trigger level over the rms of the force at rest, where that is the larger one; chosen."""
+"""Trigger level over the rms of the force at rest, if that is larger, chosen."""
 MAX_TRIGGER_PEAK_SHARE = 0.5
-"""Trigger level over the softest trial hit, at most; chosen."""
+"""Largest trigger level over the softest trial hit, chosen."""
 FIRST_TRIGGER_RANGE_SHARE = 0.005
-"""Trigger level of the first trial hit over the range of the force, at least; chosen."""
+"""Smallest trigger level of the first trial hit over the range of the force, chosen."""
 MIN_RANGE_SHARE, MAX_RANGE_SHARE = 0.02, 0.9
-"""Shares of its range that a channel should stay between; chosen."""
+"""Shares of its range between which the peaks of a channel should stay, chosen."""
 RANGE_HEADROOM = 2
-"""Range to choose over the peaks of the hits; chosen."""
+"""Suggested range over the peaks of the hits, chosen."""
 MAX_TRIAL_HITS = 3
-"""Trial hits at most."""
+"""Largest number of trial hits."""
 CHANNEL_UNITS = {"force": "N", "acceleration": "m/s^2"}
 _RANGE_FLAGS = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 _USABLE_FLAGS = HitFlags.NOT_DECAYED | _RANGE_FLAGS
-"""Flags that a trial hit may have: to find them out is what trial hits are for."""
+"""Flags that a trial hit may have: trial hits are there to find them."""
 
 
 def trigger_from_setup(setup: TapTable, sample_rate: float) -> Trigger | None:
-    """Trigger and record as machine.toml sets them; None where it leaves one of them open."""
+    """Return the trigger settings of machine.toml, None if one is open."""
     if setup.trigger_n is None or setup.record_s is None:
         return None
     return Trigger(setup.trigger_n, round(setup.record_s * sample_rate), round(setup.pre_trigger_s * sample_rate))
 
 
 class TrialHits:
-    """The trial hits so far, and what they say."""
+    """Trial hits so far, and the settings they give."""
 
     def __init__(self, setup: TapTable, baseline: Hit) -> None:
-        """baseline: a record at rest."""
+        """Begin without hits. baseline: a record at rest."""
         self._setup, self._baseline = setup, baseline
         self._hits: list[Hit] = []
         self._record = setup.record_s or MIN_RECORD_TIME
 
     @property
     def trigger(self) -> Trigger:
-        """Trigger and record as they are known by now."""
+        """Trigger settings known so far."""
         rate = self._baseline.sample_rate
         samples = round(self._record * rate)
         before, quantity = round(self._setup.pre_trigger_s * rate), self._setup.quantity
@@ -64,13 +64,13 @@ class TrialHits:
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is open any more: two hits of the length that stands, or three."""
+        """Whether nothing is open: two hits of the chosen length, or three."""
         length = self.trigger.n_samples
         return len(self._hits) >= MAX_TRIAL_HITS or sum(hit.acceleration.size == length for hit in self._hits) >= 2
 
     @property
     def text(self) -> str:
-        """Sentence on what to do; when done, on what was chosen, and which range to choose."""
+        """Sentence on what to do. When done, on what was chosen and which range to choose."""
         if not self.is_done:
             return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
         slowest = max(estimate_decay_time(hit) for hit in self._hits)
@@ -80,13 +80,13 @@ class TrialHits:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """One for each channel whose range the trial hits do not fit into."""
+        """Remark on each channel whose range does not fit the trial hits."""
         channels = self._hits[0].channels or () if self._hits else ()
         remarks = (_range_remark(self._hits, i, channel) for i, channel in enumerate(channels))
         return tuple(remark for remark in remarks if remark is not None)
 
     def add(self, hit: Hit) -> HitFlags:
-        """Take a trial hit; returns why it is no use, falsy where it is."""
+        """Add a trial hit and return why it is unusable, falsy if it is usable."""
         flags = check_hit(hit) & ~_USABLE_FLAGS
         if flags:
             return flags
@@ -107,17 +107,17 @@ class TrialHits:
         return float(f"{level:.2g}")
 
     def _offset(self) -> float:
-        """Value at rest that the trigger level counts from: that of the acceleration, which may feel gravity."""
+        """Return the value at rest from which the trigger level counts. The acceleration may include gravity."""
         return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
 
 
 def _find_trigger_peak(hit: Hit, offset: float) -> float:
-    """Largest value of what triggers."""
+    """Return the largest value of the triggering signal."""
     return float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - offset)))
 
 
 def _choose_record_time(time_constant: float, before: float) -> float:
-    """Length of a record (s) that holds enough time constants after its pre-trigger part."""
+    """Return a record length (s) with enough time constants after its pre-trigger part."""
     needed = min(before + RECORD_TIME_CONSTANTS * time_constant, MAX_RECORD_TIME)
     return max(MIN_RECORD_TIME, RECORD_TIME_STEP * math.ceil(needed / RECORD_TIME_STEP - 1e-9))
 
@@ -131,7 +131,7 @@ def _format_time_constants(record: float, time_constant: float) -> str:
 
 
 def _get_trigger_range(hit: Hit) -> float:
-    """Largest value of the channel that triggers (N or m/s^2)."""
+    """Return the largest value of the triggering channel (N or m/s^2)."""
     return _get_full_scale(hit.channels[0]) if hit.channels else float("inf")
 
 

@@ -1,4 +1,4 @@
-"""A visit to a machine: tapped in x, then in y, then as the person who taps says; one thread runs it."""
+"""Visit to a machine: tap tests in x, in y, then as the operator chooses, run by one thread."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ VISIT_DIRECTIONS = [choice.key for choice in (TAP_X_CHOICE, TAP_Y_CHOICE, CROSS_
 
 
 def choose_first_direction(folder: MachineFolder, tool: str) -> TapDirection:
-    """Direction to begin with: x, but y where only a test in y was interrupted."""
+    """Return the direction to begin with: x, but y if only a test in y was interrupted."""
     interrupted = count_interrupted_hits(folder) if tool == folder.machine.tap.tool else {}
     return "y" if interrupted.keys() == {"y"} else "x"
 
 
 class TapVisit:
-    """Tap tests one after the other: `run` them in one thread; all else is for every thread."""
+    """Sequence of tap tests. `run` is for one thread, all else for every thread."""
 
     def __init__(
         self,
@@ -37,38 +37,41 @@ class TapVisit:
         leads: bool = True,
         after: Callable[[TapSession], None],
     ) -> None:
-        """plan: a test of a tool in a direction. leads False: that of `direction` alone. after: what is done with each
-        finished test."""
+        """Plan the first test.
+
+        plan: makes a test of a tool in a direction. leads: False for one test in `direction` only. after: called with
+        each finished test.
+        """
         self._plan, self._after, self._leads = plan, after, leads
         self._tool, self._direction = tool, direction
         self._session = plan(tool, direction)
         self._pause: TapState | None = None
         self._answers = queue.SimpleQueue[tuple[str, str]]()
         self.wakes: set[Callable[[], None]] = set()
-        """Functions that are called after every new picture, by the thread of the test; none may take time."""
+        """Functions called after every change by the thread of the test. None may take time."""
 
     @property
     def state(self) -> TapState:
-        """The newest picture; between two tests with what can be chosen."""
+        """Newest state, between two tests with the choices."""
         return self._pause or self._session.state
 
     @property
     def is_waiting(self) -> bool:
-        """Whether no test runs and a person is waited for."""
+        """Whether no test runs and a choice is awaited."""
         return self._pause is not None and bool(self._pause.choices)
 
     def undo(self) -> None:
-        """Take back the last good hit; again: the one before."""
+        """Take back the last good hit. Again: the one before."""
         if not self.is_waiting:
             self._session.undo()
 
     def stop(self) -> None:
-        """End the test that runs, or the visit between two tests."""
+        """End the running test, or the visit between two tests."""
         self._answers.put((DONE_CHOICE.key, ""))
         self._session.stop()
 
     def choose(self, key: str, tool: str = "") -> None:
-        """Say what comes next, by the key of a choice; tool: name of the next one. ValueError where it cannot be."""
+        """Choose what comes next by the key of a choice. tool: name of the next one. ValueError if not possible."""
         if not self.is_waiting or key not in [choice.key for choice in self.state.choices]:
             raise ValueError(f"{key!r} cannot be chosen now; the page shows what can")
         if key == NEXT_TOOL_CHOICE.key and not tool.strip():
@@ -76,7 +79,7 @@ class TapVisit:
         self._answers.put((key, tool.strip()))
 
     def run(self) -> None:
-        """Tap until the person is done; raises what `TapSession.run` raises."""
+        """Tap until the operator is done. Raises what `TapSession.run` raises."""
         tapped = set[TapDirection]()
         while True:
             self._session.wakes.add(self._wake)
@@ -96,7 +99,7 @@ class TapVisit:
             self._show(None)
 
     def _wait(self, tapped: set[TapDirection]) -> tuple[str, str]:
-        """Show the result, or that the sensor is to be moved first, and wait for what is chosen."""
+        """Show the result, or that the sensor must be moved first, and wait for a choice."""
         state, felt = self._session.state, self._session.across
         missing = [direction for direction in DIRECTION_CHOICES if direction not in tapped]
         if missing:

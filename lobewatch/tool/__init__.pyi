@@ -1,4 +1,4 @@
-"""A tool in the spindle as it was tapped: its series, its mounting, x and y together, a prediction, its lobes."""
+"""Tool in the spindle: series of tap tests, assembly in x and y, prediction, and lobes."""
 
 from .assembly import DIRECTION_CODES, Assembly, compute_lobes, speed_grid
 from .lobe_chart import DynamicsSource, LobeChart, LobeMethod, compute_lobe_chart

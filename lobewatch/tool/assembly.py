@@ -27,19 +27,19 @@ from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, in
 from modal import Mode
 
 MAX_CROSS_FREQUENCY_DISTANCE = 0.01
-"""Relative distance of a cross mode from the nearest mode of x or y, beyond which it is of another clamping; chosen."""
+"""Relative distance of a cross mode from all modes of x and y that proves another clamping; chosen."""
 MAX_CROSS_RESIDUE_RATIO = 1.5
-"""Largest cross residue over sqrt(Rx Ry): above 1 by more than the errors of three stiffnesses it cannot be."""
+"""Largest cross residue over sqrt(Rx Ry); above 1 by more than the errors of three stiffnesses."""
 SAME_STIFFNESS_TOLERANCE = 0.1
-"""Relative difference of stiffnesses below which a cross mode is that of x or y; chosen: three times the scatter."""
+"""Relative difference of stiffnesses of the same mode; chosen: three times the scatter."""
 MIN_CROSS_PEAK_RATIO = 0.3
-"""Peak of a cross mode over the largest peak, from which on it is asked where it belongs."""
+"""Peak of a checked cross mode over the largest peak."""
 
 
 def check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipModes, tuple[Remark, ...]]:
-    """The modes of a cross tap where they go with those of x and y; else None, and a remark that says why.
+    """Return the cross FRF modes if they fit those of x and y; else None with a remark.
 
-    None where one of the three is not known.
+    None without a remark if one of the three is missing.
     """
     if not x or not y or cross is None:
         return None, ()
@@ -51,7 +51,6 @@ def check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipModes
 
 
 def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode]) -> Iterator[str]:
-    """What of it does not go with them."""
     loudest = max((1 / (abs(mode.stiffness) * mode.damping_ratio) for mode in cross), default=0.0)
     loud = [mode for mode in cross if 1 / (abs(mode.stiffness) * mode.damping_ratio) >= MIN_CROSS_PEAK_RATIO * loudest]
     for name, side in (("x", x), ("y", y)):
@@ -68,70 +67,67 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
-    """Whether two modes are one, sign and size of the stiffness included."""
-    return (
-        abs(other.frequency / mode.frequency - 1) < MAX_CROSS_FREQUENCY_DISTANCE
-        and abs(other.stiffness / mode.stiffness - 1) < SAME_STIFFNESS_TOLERANCE
-    )
+    frequency, stiffness = abs(other.frequency / mode.frequency - 1), abs(other.stiffness / mode.stiffness - 1)
+    return frequency < MAX_CROSS_FREQUENCY_DISTANCE and stiffness < SAME_STIFFNESS_TOLERANCE
 
 
 DIRECTION_CODES = ("one-direction", "older-direction")
-"""Codes of the remarks on what is known in x and y."""
+"""Codes of the remarks on missing or older directions."""
 UNUSABLE_TAP_REASONS = {
     NO_FORCE_CODE: ("no force was measured, K is not known", "tap {} with a hammer that measures its force"),
     "no-lobes-driving-point": ("not a driving point", "hit and measure at one point in {} and tap again"),
     "no-lobes-beside-tip": ("not at the tool tip", "tap {} at the tip, or add a [spindle]"),
 }
-"""Why a tap test gives no modes at the tip, and what to do in its direction, by the code of its remark ..."""
+"""Reason and remedy of a tap test without modes at the tip, by the code of its remark."""
 NO_MODE_REASON = ("no mode in the band", "tap {} again")
-"""... and without such a remark."""
+"""Reason and remedy without such a remark."""
 MAX_DIRECTION_AGE = timedelta(hours=24)
-"""Time between the taps in x and y beyond which the older one is moved, and called so; chosen."""
+"""Age difference of x and y above which the older one is shifted; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """A tool in the spindle as tapped: what its lobes and verdicts are computed from."""
+    """Tool in the spindle as measured or predicted, the input of lobes and verdicts."""
 
     tool: str
     """Tool in the spindle."""
     time: datetime
-    """Time of its newest tap test; of the one that the bearings come from where it is predicted."""
+    """Time of its newest tap test, or of the one behind a prediction."""
     tap_id: str
-    """Identity of that tap test, or where the prediction comes from."""
+    """Identity of that tap test, or the origin of the prediction."""
     x: TipModes
-    """Modes at the tool tip in x of the machine; like y where x was not tapped."""
+    """Modes at the tool tip in x; those of y if x was not tapped."""
     y: TipModes
-    """Modes at the tool tip in y; like x where y was not tapped."""
+    """Modes at the tool tip in y; those of x if y was not tapped."""
     directions: tuple[str, ...]
-    """Directions that are known; the other one is taken like it, never as rigid."""
+    """Known directions; an unknown one is taken like the other, never as rigid."""
     calibration: Calibration | None
-    """The model with the newest bearings."""
+    """Model with the newest bearings."""
     taps: Mapping[str, str]
-    """Tap test by direction; empty where it is predicted."""
+    """Tap test by direction; empty for a prediction."""
     predicted: bool
-    """Whether all of it comes from the model, for a tool that was never tapped."""
+    """Whether the model predicts the tool."""
     remarks: tuple[Remark, ...]
-    """Remarks on what is not known, and what is in doubt."""
+    """Remarks on missing and doubtful results."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
-    """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
+    """Followed modes of the tool up to then by direction; empty for a prediction."""
     unusable: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """Why a tap test gives no modes at the tip, and what to do, by its direction."""
+    """Reason and remedy of a tap test without modes at the tip, by direction."""
     cross: TipModes = None
-    """Modes at the tool tip hit in x and seen in y, signed; None where that was not tapped."""
+    """Signed modes at the tool tip, hit in x and measured in y; None without a cross FRF."""
     without_stiffness: Mapping[str, Mode] = field(default_factory=dict)
-    """Modes followed in tap tests without force, whose stiffness is not known, by direction."""
+    """Followed modes of tap tests without force, by direction."""
     questions: tuple[Remark, ...] = ()
-    """Questions about these tap tests that nobody has answered; until then nothing is sure."""
+    """Open questions about these tap tests."""
 
     @property
     def is_complete(self) -> bool:
-        """Whether both directions are known, from tap tests that nothing is asked about."""
+        """Whether both directions are known from tap tests without open questions."""
         return len(self.directions) == 2 and not self.questions
 
     @property
     def missing_direction(self) -> tuple[str, str]:
-        """Which direction is not known, in words, and what to do, where one is not."""
+        """Text on the missing direction, and its remedy."""
         missing = "y" if "x" in self.directions else "x"
         if missing not in self.unusable:
             return f"direction {missing} was not tapped", f"tap direction {missing} of tool {self.tool!r} too"
@@ -145,17 +141,23 @@ class Assembly:
 
     @property
     def principal_directions(self) -> PrincipalDirections:
-        """Axes of the modes of x, then of y, and what is open of them."""
+        """Principal directions of the modes of x, then of y, with their uncertainty."""
         return find_principal_directions(self.x or (), self.y or (), self.cross)
 
     def check(self) -> Assembly:
-        """Itself; DataError with the reason where no modes at the tip are known in either direction."""
+        """Return itself; DataError without modes at the tip."""
         if not self.directions:
             raise DataError(f"{self.tap_id}: {'; '.join(map(str, self.remarks))}")
         return self
 
     def scatter(self, direction: str) -> Scatter | None:
-        """Scatter from tap test to tap test; None where there are too few."""
+        """Return the scatter from test to test; None for too few tests.
+
+        Parameters
+        ----------
+        direction
+            Direction at the tool tip, "x" or "y".
+        """
         return compute_scatter(self.series.get(direction, ()))
 
 
@@ -165,10 +167,11 @@ def assemble(
     series: Mapping[str, Sequence[FollowedMode]],
     cross: Measurement | None = None,
 ) -> Assembly:
-    """The tool by its newest tap test and the newest one across, in the other direction, where there is one.
+    """Assemble a tool from its newest tap test and the newest one in the other direction.
 
-    series: tap tests of both directions up to the newest; cross: the newest cross tap, where there is one. The
-    frequencies of an older direction, however old, are moved by as much as those of the newest one have changed since.
+    series: tap tests of both directions up to the newest; cross: newest cross FRF. The frequencies of an older
+    direction
+    are shifted by the change of the newest one since.
     """
     taps = [newest, *([across] if across is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
@@ -213,7 +216,7 @@ def _unusable_reason(tap: Measurement) -> tuple[str, str]:
 
 
 def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
-    """Remark that one direction alone is known; unusable: why the tap test of the other one is not, and what to do."""
+    """Return the remark on a missing direction; unusable: reason and remedy of its tap test."""
     missing = "y" if tapped == "x" else "x"
     text = f"modes in the {tapped} direction alone, {missing} taken like {tapped}"
     if unusable is None:
@@ -222,7 +225,7 @@ def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = N
 
 
 def _frequency_change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
-    """Frequency of the newest test of a series over that at a time."""
+    """Return the frequency of the newest test of a series over that at a time, or None."""
     frequency = interpolate_frequency(series, time)
     return None if frequency is None else series[-1].frequency / frequency
 
@@ -243,8 +246,20 @@ def _direction_remarks(
 
 
 def speed_grid(machine: Machine) -> NDArray[np.float64]:
-    """The common speeds of all diagrams of a machine (rpm), shape ([speed] steps,).
+    """Return the speeds of all diagrams of a machine.
 
+    Parameters
+    ----------
+    machine
+        Machine with its [speed].
+
+    Returns
+    -------
+    ndarray, shape ([speed] steps,)
+        Spindle speeds (rpm).
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from lobewatch.machine import MachineFolder, make_machine_folder
@@ -258,9 +273,19 @@ def speed_grid(machine: Machine) -> NDArray[np.float64]:
 
 
 def compute_lobes(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
-    """Diagrams by zero order, by name of the cut: the reference cut and every program of the tool. A chart, no verdict.
+    """Compute the stability lobes of all cuts of a tool by zero order, for charts only.
 
-    Each shows the lower one of its directions of feed. Empty where no modes are known.
+    Parameters
+    ----------
+    assembly
+        Tool with its modes.
+    machine
+        Machine with its cuts and speeds.
+
+    Returns
+    -------
+    dict of str to StabilityLobes
+        Lowest lobes over the feed directions by name of the cut; empty without modes.
     """
     return compute_tip_lobes(assembly.tool, assembly.x, assembly.y, machine, cross=assembly.cross)
 
@@ -268,7 +293,7 @@ def compute_lobes(assembly: Assembly, machine: Machine) -> dict[str, StabilityLo
 def compute_tip_lobes(
     tool: str, x: TipModes, y: TipModes, machine: Machine, names: Collection[str] | None = None, cross: TipModes = None
 ) -> dict[str, StabilityLobes]:
-    """Diagrams of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
+    """Compute the lobes of modes at the tip by name of the cut, once for equal cuts; names: selected cuts."""
     if not x and not y:
         return {}
     speeds, diagrams = speed_grid(machine), dict[tuple[Cut, ...], StabilityLobes]()

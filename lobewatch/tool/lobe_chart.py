@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle_lobes, lower_envelope, stability_boundary, zero_order_lobes
 from lobes.tip_response import TipData
-from lobewatch.machine import REFERENCE_CUT, CutTable, Machine
+from lobewatch.machine import CutTable, Machine
 from lobewatch.tool.assembly import Assembly
 
 MAX_CHART_SPEEDS = 400
 """Largest number of speeds of a chart by semi-discretisation."""
 MAX_CHART_DEPTH_RATIO = 12.0
-"""Depth up to which it looks, as a multiple of the lowest limit by zero order."""
+"""Depth of a chart over the lowest limit by zero order."""
 
 
 class LobeMethod(StrEnum):
-    """Method by which limits are found."""
+    """Method of stability limits."""
 
     ZERO_ORDER = "zero-order"
     """`lobes.zero_order_lobes`."""
@@ -33,51 +33,64 @@ class LobeMethod(StrEnum):
 
 
 class DynamicsSource(StrEnum):
-    """Dynamics that lobes are computed from."""
+    """Dynamics behind lobes."""
 
     MODES = "modes"
     """Fitted modes."""
     FRF = "frf"
-    """The measured FRF itself."""
+    """Measured FRF."""
 
 
 @dataclass(frozen=True, eq=False)
 class LobeChart:
-    """The lobes of one cut, and what they came from."""
+    """Stability lobes of one cut with their inputs."""
 
     name: str
     """Name of the cut."""
     table: CutTable
-    """The cut as it stands in machine.toml."""
+    """Cut of machine.toml."""
     assembly: Assembly
-    """The tool in the spindle, as measured or predicted."""
+    """Tool in the spindle, measured or predicted."""
     source: DynamicsSource
-    """Dynamics of it that were used."""
+    """Dynamics that were used."""
     x: TipData | None
-    """Dynamics at the tool tip in the feed direction; None where they are not known."""
+    """Dynamics at the tool tip along the feed; None if unknown."""
     y: TipData | None
-    """Dynamics at the tool tip normal to the feed; None where they are not known."""
+    """Dynamics at the tool tip normal to the feed; None if unknown."""
     cuts: tuple[Cut, ...]
-    """The cut in SI units, one a direction of feed."""
+    """Cut in SI units, one per feed direction."""
     lobes: StabilityLobes
-    """Limits of the cut."""
+    """Stability limits of the cut."""
 
 
 def find_cut_table(machine: Machine, name: str) -> CutTable:
-    """The reference cut or a program by its name; KeyError for one that is not there."""
-    for table in machine.program:
-        if table.name == name:
-            return table
-    if name != REFERENCE_CUT or machine.reference_cut is None:
-        raise KeyError(name)
-    return machine.reference_cut
+    """Return the reference cut or a program by name; KeyError for another name."""
+    return machine.cut_tables[name]
 
 
 def compute_lobe_chart(
     method: LobeMethod, x: TipData | None, y: TipData | None, cuts: Sequence[Cut], speed_rpm: NDArray[np.float64]
 ) -> StabilityLobes:
-    """The lowest lobes of a cut in its directions of feed over speeds (rpm), fewer of them by semi-discretisation.
+    """Compute the lowest lobes of a cut over its feed directions.
 
+    Parameters
+    ----------
+    method
+        Method of the limits.
+    x, y
+        Dynamics at the tool tip along and normal to the feed; None for a rigid direction.
+    cuts
+        Cut in SI units, one per feed direction.
+    speed_rpm
+        Spindle speeds (rpm), shape (n,); semi-discretisation uses at most 400 of them.
+
+    Returns
+    -------
+    StabilityLobes
+        Limiting depth and chatter frequency over speed.
+
+    Examples
+    --------
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> lobes = compute_lobe_chart(LobeMethod.ZERO_ORDER, [mode], [mode], [slot], np.array([9000.0, 15000.0]))
@@ -96,7 +109,9 @@ def _compute_cut_lobes(
     if method is LobeMethod.ZERO_ORDER:
         return mean
     if isinstance(x, Frf) or isinstance(y, Frf):
-        raise ValueError("--method semi-discretisation works from the modes; leave --source frf out")
+        raise ValueError(
+            "compute_lobe_chart.method semi-discretisation works from the modes; leave LobeChart.source frf out"
+        )
     speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MAX_CHART_SPEEDS, speed_rpm.size))
     lowest = mean.minimum.depth
     return stability_boundary(x, y, cut, speeds, MAX_CHART_DEPTH_RATIO * lowest if np.isfinite(lowest) else 0.1)

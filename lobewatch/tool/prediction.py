@@ -1,4 +1,4 @@
-"""One tap, every tool: what the calibrated model says of a tool that was never tapped."""
+"""Prediction of an untapped tool by the calibrated model."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ from lobewatch.tool.principal_directions import TipModes
 from modal import Mode
 
 PREDICTED_MODE_COUNT = 8
-"""Number of modes worked out; those in which the tip is next to at rest are left out."""
+"""Number of computed modes."""
 MAX_PREDICTED_STIFFNESS_RATIO = 50.0
-"""Stiffness at the tip over that of the softest mode, beyond which a mode does not move a limit by more than a few
-percent."""
+"""Stiffness over that of the softest mode above which a mode changes limits by only a few percent and is left out."""
 
 
 def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
-    """A tool as the model has it, in each direction with the bearings of the newest calibrated measurement of it.
+    """Predict a tool in each direction, with the bearings of the newest calibrated measurement.
 
-    newest: those measurements, the newest of all first. The damping ratio is that of the mode followed, and so is the
-    phase of the softest mode, since the same bearings and joints damp it; the others are real, as the model has them.
-    DataError where there is no model of the tool, or no tap test that the bearings could be found from.
+    newest: those measurements, newest first. The damping ratio is that of the followed mode, and so is the phase of the
+    softest mode, since the same bearings and joints damp it. Raises DataError without a model of the tool or a tap
+    test.
     """
     if not newest:
         build_model_state(machine, None, tool)
@@ -52,7 +51,7 @@ def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str)
 
 
 def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
-    """The modes that the model shows in the band that was looked at, moved along with the softest one."""
+    """Return the modes of the model in the measured band, shifted with the softest one."""
     state, followed = build_model_state(machine, tap, tool), tap.followed
     if followed is None:
         raise DataError(f"{tap.tap_id}: no mode is followed")
@@ -62,14 +61,10 @@ def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[l
     if machine.mode.band_hz is not None:
         low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
         shown &= (frequency >= low) & (frequency <= high)
-    modes = [
-        Mode(
-            float(frequency[i]),
-            followed.damping_ratio,
-            float(stiffness[i]),
-            method=f"model, bearings of {tap.tap_id}",
-            phase_deg=followed.phase_deg if i == softest else 0.0,
-        )
-        for i in np.flatnonzero(shown).tolist()
-    ]
+    origin = f"model, bearings of {tap.tap_id}"
+    modes = list[Mode]()
+    for i in np.flatnonzero(shown).tolist():
+        phase = followed.phase_deg if i == softest else 0.0
+        values = float(frequency[i]), followed.damping_ratio, float(stiffness[i])
+        modes.append(Mode(*values, method=origin, phase_deg=phase))
     return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

@@ -18,63 +18,64 @@ from lobes import Cut, StabilityLobes, lower_envelope, project_modes, zero_order
 from modal import Mode
 
 MAX_PAIR_FREQUENCY_DISTANCE = 0.05
-"""Relative distance of two frequencies in x and y up to which they may be those of one mode."""
+"""Relative distance up to which frequencies in x and y may be of one mode."""
 MAX_SIBLING_FREQUENCY_DISTANCE = 0.2
-"""Relative distance of two modes that may be a pair with axes square to each other ..."""
+"""Relative distance of two modes that may be a pair with perpendicular directions."""
 MAX_SIBLING_STIFFNESS_RATIO = 3.0
-"""... and largest ratio of their stiffnesses."""
+"""Largest ratio of the stiffnesses of such a pair."""
 HIDDEN_PEAK_RATIO = 0.03
-"""Share of the tallest peak that a fit overlooks in another direction; chosen, from fits of synthetic FRFs. It grows
-with the square of the damping ratio over the distance of the frequencies, once these are nearer than that."""
+"""Share of the tallest peak that a fit overlooks in another direction; chosen from fits of synthetic FRFs. It
+grows with the square of the damping ratio over the distance of the frequencies, once these are nearer than
+that."""
 CLAMPING_FREQUENCY_TOLERANCE = 0.003
-"""Relative distance of two frequencies that counts for nothing."""
+"""Relative distance of two frequencies that reclamping explains."""
 MAX_OPEN_SIGNS = 3
-"""Open signs of which all combinations are looked at; the others are positive."""
+"""Largest number of unknown signs whose combinations are all computed; the others are positive."""
 
 Floats = NDArray[np.float64]
 
 
 class ModePair(NamedTuple):
-    """A mode tapped in x with the one tapped in y that belongs to it."""
+    """Mode of x with the mode of y that belongs to it."""
 
     x: int
-    """Number of the mode of x."""
+    """Index of the mode of x."""
     y: int
-    """Number of the mode of y, after those of x."""
+    """Index of the mode of y, after those of x."""
     correlation: float
-    """Cross residue over sqrt(Rx Ry): 1 or -1 where both are one mode that lies askew, 0 where they are two."""
+    """Cross residue over sqrt(Rx Ry): 1 or -1 for one mode in a rotated direction, 0 for two modes."""
     sign: int
-    """Number of the open sign of that residue; -1 where it is known, or there is none."""
+    """Index of the unknown sign of that residue; -1 without one."""
     max_rotation: float
-    """Angle up to which both may be turned in the plane (rad)."""
+    """Largest rotation of both in the plane (rad)."""
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalDirections:
-    """Axes of n modes, those tapped in x before those tapped in y, and what is open of them."""
+    """Principal directions of n modes, those of x before those of y, with their uncertainty."""
 
     stiffness: Floats
-    """Stiffness of each as tapped (N/m), shape (n,)."""
+    """Measured stiffness (N/m), shape (n,)."""
     is_y: NDArray[np.bool_]
-    """Whether each was tapped in y, shape (n,)."""
+    """Whether each mode was measured in y, shape (n,)."""
     pairs: tuple[ModePair, ...]
     """Modes of x with those of y that belong to them."""
     max_cross_share: Floats
-    """Largest part in the other direction that a mode without partner may have, over its own, shape (n,)."""
+    """Largest share of a mode without partner in the other direction, shape (n,)."""
 
     @property
     def sign_count(self) -> int:
-        """Number of open signs."""
+        """Number of unknown signs."""
         return 1 + max((pair.sign for pair in self.pairs), default=-1)
 
     @property
     def are_uncertain(self) -> bool:
-        """Whether anything is open of them."""
+        """Whether the directions are uncertain."""
         return bool(np.any(self.max_cross_share)) or any(pair.max_rotation or pair.sign >= 0 for pair in self.pairs)
 
     @property
     def sign_patterns(self) -> list[Floats | None]:
-        """Vectors (n, 2) of the modes for each combination of open signs; None where all lie along x and y."""
+        """Mode vectors (n, 2) for each combination of unknown signs; None if all are along x and y."""
         if not any(pair.correlation for pair in self.pairs):
             return [None]
         open_ones = min(self.sign_count, MAX_OPEN_SIGNS)
@@ -84,7 +85,7 @@ class PrincipalDirections:
         return list(self._vectors(signs, nothing[:, : len(self.pairs)], nothing))
 
     def sample(self, count: int, seed: int) -> Floats:
-        """Vectors within what is open, shape (count, n, 2); the same for a seed."""
+        """Return random mode vectors within the uncertainty, shape (count, n, 2), reproducible by the seed."""
         random = np.random.default_rng((seed, 2))
         signs = random.choice([-1.0, 1.0], (count, self.sign_count))
         turn = random.uniform(-1, 1, (count, len(self.pairs))) * [pair.max_rotation for pair in self.pairs]
@@ -93,7 +94,7 @@ class PrincipalDirections:
         )
 
     def _vectors(self, signs: Floats, turn: Floats, lean: Floats) -> Floats:
-        """Vectors (c, n, 2) for signs (c, signs), turns (c, pairs) in rad and leans (c, n)."""
+        """Return vectors (c, n, 2) for signs (c, signs), rotations (c, pairs) in rad and cross shares (c, n)."""
         own = np.eye(2)[self.is_y.astype(int)]
         vectors = own + lean[..., np.newaxis] * own[:, ::-1]
         for k, pair in enumerate(self.pairs):
@@ -104,9 +105,9 @@ class PrincipalDirections:
 
 
 def _pair_vectors(stiff_x: float, stiff_y: float, correlation: Floats, turn: Floats) -> Floats:
-    """Vectors (c, 2, 2) of two modes, in columns, that show Rx and Ry directly, and their correlation across.
+    """Return the vectors (c, 2, 2) of two modes, in columns, with residues Rx and Ry and a correlation.
 
-    The root of the matrix of residues, turned: what the taps at one frequency show does not change with the turn.
+    They are the rotated root of the residue matrix: a rotation does not change what the taps at one frequency measure.
     """
     residues = np.array([1 / stiff_x, 1 / stiff_y])
     cross = correlation * np.sqrt(residues[0] * residues[1])
@@ -122,11 +123,12 @@ def _pair_vectors(stiff_x: float, stiff_y: float, correlation: Floats, turn: Flo
 def find_principal_directions(
     x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode] | None = None
 ) -> PrincipalDirections:
-    """Axes of the modes tapped in x and in y; cross: those hit in x and seen in y, signed; None where not tapped.
+    """Find the principal directions of the modes measured in x and in y.
 
-    Peaks of x and y belong together in the order of their frequencies. Where another such pair of like stiffness is
-    near, each is one mode that lies askew, the two square to each other; alone it is the two of a round spindle, which
-    may be turned as far as the taps would not have shown it. A cross tap says which.
+    cross: signed modes hit in x and measured in y. Peaks of x and y are matched in the order of their frequencies. With
+    a
+    neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other. A
+    single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF decides.
     """
     modes = [*x, *y]
     stiffness = np.array([mode.stiffness for mode in modes])
@@ -148,7 +150,7 @@ def find_principal_directions(
 
 
 def _match_modes(x: Sequence[Mode], y: Sequence[Mode]) -> list[tuple[int, int]]:
-    """Modes of x and y, each in the order of its frequencies, that belong together: nearest in all, none crossing."""
+    """Match modes of x and y with the smallest total distance and without crossing."""
     order_x, order_y = (np.argsort([mode.frequency for mode in modes]) for modes in (x, y))
     at_x, at_y = (np.log([mode.frequency for mode in modes]) for modes in (x, y))
     distance = np.abs(at_x[order_x, np.newaxis] - at_y[order_y])
@@ -170,7 +172,7 @@ def _match_modes(x: Sequence[Mode], y: Sequence[Mode]) -> list[tuple[int, int]]:
 
 
 def _pair_without_cross_tap(modes: Sequence[Mode], matched: Sequence[tuple[int, int]]) -> list[ModePair]:
-    """What direct taps alone say of modes that belong together."""
+    """Return the pairs that direct taps imply."""
     pairs, sign = list[ModePair](), itertools.count()
     number, direction = -1, 1.0
     for k, (i, j) in enumerate(matched):
@@ -186,14 +188,14 @@ def _pair_without_cross_tap(modes: Sequence[Mode], matched: Sequence[tuple[int, 
 def _other_modes(
     modes: Sequence[Mode], matched: Sequence[tuple[int, int]], own: tuple[int, int]
 ) -> Iterator[tuple[int, ...]]:
-    """All other modes: those that belong together, and those without partner."""
+    """Yield all other modes, matched pairs and single ones."""
     yield from (pair for pair in matched if pair != own)
     with_partner = {number for pair in matched for number in pair}
     yield from ((number,) for number in range(len(modes)) if number not in with_partner)
 
 
 def _are_siblings(modes: Sequence[Mode], first: tuple[int, ...], second: tuple[int, ...]) -> bool:
-    """Whether two may be one pair of modes with axes square to each other."""
+    """Tell whether two modes may be a pair with perpendicular directions."""
     frequency = [np.mean([modes[i].frequency for i in numbers]) for numbers in (first, second)]
     stiffness = [1 / sum(1 / modes[i].stiffness for i in numbers) for numbers in (first, second)]
     return bool(
@@ -203,7 +205,7 @@ def _are_siblings(modes: Sequence[Mode], first: tuple[int, ...], second: tuple[i
 
 
 def _max_rotation(x: Mode, y: Mode) -> float:
-    """Angle up to which two modes may be turned before the other tap would show it (rad)."""
+    """Return the largest rotation of two modes that the other tap would not show (rad)."""
     apart = max(abs(np.log(x.frequency / y.frequency)) - CLAMPING_FREQUENCY_TOLERANCE, 1e-9)
     share = HIDDEN_PEAK_RATIO * max(1.0, (np.sqrt(x.damping_ratio * y.damping_ratio) / apart) ** 2)
     return float(np.arctan(np.sqrt(share))) if share < 1 else np.pi / 2
@@ -217,7 +219,7 @@ def _cross_correlation(
     matched: Sequence[tuple[int, int]],
     cross: Sequence[Mode],
 ) -> float:
-    """Cross residue of two modes that belong together over sqrt(Rx Ry), by the cross modes nearest to them."""
+    """Return the cross residue of a pair over sqrt(Rx Ry), from the nearest cross modes."""
     middle = {pair: np.mean([np.log(modes[i].frequency) for i in pair]) for pair in matched}
     total = 0.0
     for mode in cross:
@@ -228,13 +230,13 @@ def _cross_correlation(
 
 
 TipModes = Sequence[Mode] | None
-"""Modes of one direction at the tool tip; None where neither direction is known."""
+"""Modes of one direction at the tool tip; None if no direction is known."""
 
 
 def lowest_zero_order_lobes(
     x: TipModes, y: TipModes, cuts: Sequence[Cut], speed_rpm: ArrayLike, cross: TipModes = None
 ) -> StabilityLobes:
-    """The lowest limits of a cut in its directions of feed, and over the axes that taps in x, in y and across leave."""
+    """Return the lowest limits of a cut over feed directions and possible principal directions."""
     tips: list[tuple[TipModes, TipModes, TipModes]] = [(x, y, None)]
     if x and y:
         patterns = find_principal_directions(x, y, cross).sign_patterns

@@ -18,31 +18,30 @@ from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Remark
 from lobewatch.machine import TapEntry
 
 SERIES_CONDITIONS = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")}
-"""Conditions that divide series, each with its name and how a value is told."""
+"""Conditions that begin a new series, with label and format."""
 
 
 @dataclass(frozen=True)
 class ToolMounting:
-    """A tool as it is mounted in one series."""
+    """Mounting of a tool in one series."""
 
     first: TapEntry
     """First tap test of the series."""
     conditions: Conditions
-    """Conditions that were stated of it so far."""
+    """Conditions stated so far."""
 
 
 class MountingTracker:
-    """The series of tap tests that are shown in order of time; what nobody said divides none."""
+    """Assigns tap tests in order of time to series; unstated conditions begin none."""
 
     def __init__(self) -> None:
-        """None yet."""
         self._mountings: dict[str, list[ToolMounting]] = {}
         """By tool, the current one last."""
         self._drawbar: dict[str, float] = {}
         self._hours: float | None = None
 
     def assign(self, tap: TapEntry) -> tuple[str, tuple[Remark, ...]]:
-        """Identity of the first test of the series of a test, and what is to be said of it."""
+        """Return the first test of the series of a tap test, and remarks on changes."""
         mountings = self._mountings.setdefault(tap.tool, [])
         if mountings and tap.conditions is UNKNOWN_CONDITIONS:
             return mountings[-1].first.id, ()
@@ -81,21 +80,16 @@ class MountingTracker:
 
 
 def _is_same_mounting(first: Conditions, second: Conditions) -> bool:
-    """Whether they differ in nothing that is stated of both and divides."""
     return not _differing_conditions(first, second)
 
 
 def _differing_conditions(first: Conditions, second: Conditions) -> list[str]:
-    stated, also_stated = first.specified, second.specified
-    return [
-        name
-        for name in SERIES_CONDITIONS
-        if name in stated and name in also_stated and stated[name] != also_stated[name]
-    ]
+    values, others = first.specified, second.specified
+    return [name for name in SERIES_CONDITIONS if name in values and name in others and values[name] != others[name]]
 
 
 def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: ToolMounting | None) -> Remark:
-    """Remark on a tool that is mounted otherwise than before; earlier: its series, where it was mounted so once."""
+    """Return the remark on a changed mounting; earlier: former series with that mounting."""
     changed = {name: SERIES_CONDITIONS[name] for name in _differing_conditions(before.conditions, now)}
     change = ", ".join(
         f"{label} {value.format(getattr(now, name))} after {value.format(getattr(before.conditions, name))}"
@@ -108,32 +102,30 @@ def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: Tool
 
 
 class TapPlace(msgspec.Struct, frozen=True, gc=False):
-    """One tap test among all of a machine."""
+    """Tap test with its place among all of a machine."""
 
     number: int
-    """Number from 0, the oldest."""
+    """Number from 0, oldest first."""
     entry: TapEntry
-    """Tap test as it stands in the journal."""
+    """Journal entry."""
     previous: int | None
-    """Place of the one before it of the same series and direction."""
+    """Number of the previous test of the same series and direction."""
     other_direction: int | None
-    """Place of the newest one before it of the same series in another direction, x or y."""
+    """Number of the newest earlier test of the same series in the other direction, x or y."""
     baseline: datetime | None = None
-    """The event before it from which on all comparing begins anew; nothing before that is built on."""
+    """Newest baseline before it; earlier tests are not compared."""
     series: str = ""
-    """Identity of the first tap test of its series: of one tool with one stick-out in one state, both directions, since
-    the baseline."""
+    """Identity of the first tap test of its series: same tool, stick-out, state and baseline, both directions."""
     cross: int | None = None
-    """Place of the newest cross tap of the same series, itself where it is; None without any."""
+    """Number of the newest cross FRF of the same series, itself included; None without one."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks where the series or the drawbar force is not that of the test before."""
+    """Remarks on a new series or a changed drawbar force."""
 
 
 class TapOrder:
-    """The places of tap tests that are shown in order of time."""
+    """Places of tap tests in order of time."""
 
     def __init__(self, baselines: Sequence[datetime] = ()) -> None:
-        """baselines: oldest first. None is shown yet."""
         self.places: list[TapPlace] = []
         """Places of those that were shown."""
         self._baselines = baselines
@@ -141,7 +133,7 @@ class TapOrder:
         self._mountings = MountingTracker()
 
     def add(self, tap: TapEntry) -> None:
-        """The next one."""
+        """Add the next tap test."""
         number, baseline = len(self.places), _find_baseline(tap, self._baselines) if self._baselines else None
         if self.places and self.places[-1].baseline != baseline:
             self._newest, self._mountings = {}, MountingTracker()
@@ -157,7 +149,7 @@ class TapOrder:
 
 
 def order_taps(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list[TapPlace]:
-    """taps, baselines: oldest first."""
+    """Return the places of tap tests; taps and baselines oldest first."""
     order = TapOrder(baselines)
     for tap in taps:
         order.add(tap)
@@ -170,20 +162,20 @@ def _find_baseline(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | N
 
 
 def iterate_earlier(place: TapPlace, among: Sequence[TapPlace]) -> Iterator[int]:
-    """Numbers of the tap tests of the same series and direction before it, the newest first."""
+    """Yield the numbers of the earlier tests of the same series and direction, newest first."""
     while place.previous is not None:
         place = among[place.previous]
         yield place.number
 
 
 MIN_TAPS_FOR_SCATTER = 8
-"""Number of tap tests from which on a series tells its own scatter."""
+"""Smallest number of tap tests for the scatter of a series."""
 MAX_TAPS_FOR_DROP_RATE = 12
-"""Largest number of tap tests that the rate of the fall is taken from; three at least."""
+"""Largest number of tap tests for the rate of the frequency drop; the smallest is 3."""
 
 
 class FollowedMode(NamedTuple):
-    """The mode followed in one tap test."""
+    """Followed mode of one tap test."""
 
     time: datetime
     """Time of the tap test."""
@@ -192,13 +184,13 @@ class FollowedMode(NamedTuple):
     damping_ratio: float
     """Damping ratio (-)."""
     stiffness: float
-    """Modal stiffness (N/m); NaN where no force was measured."""
+    """Modal stiffness (N/m); NaN without force."""
     phase_deg: float = 0.0
     """Phase of the modal constant (degrees)."""
 
 
 class Scatter(NamedTuple):
-    """Half-widths that 95 % of tap tests stay within of the next, relative but for the phase."""
+    """Half-widths of 95 % between successive tap tests, relative except for the phase."""
 
     frequency: float
     """Half-width of the natural frequency."""
@@ -211,8 +203,10 @@ class Scatter(NamedTuple):
 
 
 def compute_scatter(series: Sequence[FollowedMode]) -> Scatter | None:
-    """Scatter from the steps between neighbours, so that a slow fall does not count; None below 8 tap tests that know
-    the stiffness."""
+    """Compute the scatter from successive differences, so that a slow drop does not count.
+
+    None below 8 tap tests with stiffness.
+    """
     known = [point for point in series if math.isfinite(point.stiffness)]
     if len(known) < MIN_TAPS_FOR_SCATTER:
         return None
@@ -222,23 +216,20 @@ def compute_scatter(series: Sequence[FollowedMode]) -> Scatter | None:
 
 
 def compute_frequency_scatter(series: Sequence[FollowedMode]) -> float | None:
-    """Half-width that 95 % of natural frequencies stay within of the next, relative; None below 8 tap tests."""
+    """Compute the relative half-width of 95 % of the frequency between successive tests; None below 8 tests."""
     if len(series) < MIN_TAPS_FOR_SCATTER:
         return None
     return float(_half_widths(np.log([[point.frequency] for point in series]))[0])
 
 
 def _half_widths(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half-widths of 95 % from the steps between neighbours; values of shape (n, k)."""
+    """Return the half-widths of 95 % from successive differences of values, shape (n, k)."""
     steps = np.diff(values, axis=0)
     return np.asarray(np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975))
 
 
 def expected_frequency_drop(series: Sequence[FollowedMode], days: float) -> float | None:
-    """Relative fall of the frequency within so many days at the rate of the last tests; None where it is not known.
-
-    A rise counts as none.
-    """
+    """Return the relative frequency drop within some days at the recent rate; None if unknown, 0 for a rise."""
     recent = series[-MAX_TAPS_FOR_DROP_RATE:]
     if len(recent) < 3:
         return None
@@ -250,7 +241,7 @@ def expected_frequency_drop(series: Sequence[FollowedMode], days: float) -> floa
 
 
 def interpolate_frequency(series: Sequence[FollowedMode], time: datetime) -> float | None:
-    """Natural frequency (Hz) at a time, linear between the tests before and after; None before the first."""
+    """Interpolate the natural frequency (Hz) at a time; None before the first test."""
     behind = bisect_right(series, time, key=lambda point: point.time)
     if not behind:
         return None

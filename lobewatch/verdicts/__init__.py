@@ -1,4 +1,4 @@
-"""What a tool allows: doubt, word and limit of each program, why, and settings that would be safe."""
+"""Verdicts on cutting programs: uncertainty, stability and limits, and settings that would be stable."""
 
 import lazy_loader
 

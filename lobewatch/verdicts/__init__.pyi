@@ -1,4 +1,4 @@
-"""What a tool allows: doubt, word and limit of each program, why, and settings that would be safe."""
+"""Verdicts on cutting programs: uncertainty, stability and limits, and settings that would be stable."""
 
 from .recommendation import Advice, advise, find_stable_pockets
 from .setting_robustness import Setting

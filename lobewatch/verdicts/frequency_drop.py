@@ -8,17 +8,17 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Remark
 from dsm import Calibration, calibrate
 from lobes.cut import CHECKED_DEPTH_SHARES
+from lobewatch.arrays import Floats
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
 
 CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
-"""Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
+"""Frequency drop for which the model is recalibrated; between them its stiffness is interpolated."""
 N_DROP_STEPS = 101
 """Number of looks between no fall and the largest of them ..."""
 N_DROP_PARTS = 8
@@ -30,51 +30,51 @@ StiffnessAt = Callable[[float], float]
 
 
 def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
-    """Stiffness over that of now as a function of the fall of the frequency, and the assumption in words.
+    """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
 
-    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a model
-    it stays.
+    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a
+    model it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
     clause = "stiffness does not (no model)"
     if ratios.size > 1:
-        fall, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {fall:.0f} %)"
+        drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
+        clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {drop:.0f} %)"
     text = f"fall left: all modes fall alike, damping does not change, {clause}"
 
-    def stiffness_at(fall: float) -> float:
-        return float(np.interp(fall, CALIBRATED_DROPS[: ratios.size], ratios))
+    def stiffness_at(drop: float) -> float:
+        return float(np.interp(drop, CALIBRATED_DROPS[: ratios.size], ratios))
 
     return stiffness_at, Remark("decay-assumption", assembly.tool, text)
 
 
 @lru_cache(maxsize=MAX_CACHED_CALIBRATIONS)
-def _stiffness_ratios(calibration: Calibration) -> NDArray[np.float64]:
-    """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
+def _stiffness_ratios(calibration: Calibration) -> Floats:
+    """Return the modal stiffness at the tip for each of `CALIBRATED_DROPS` over that for none."""
     stiffness: list[float] = []
-    for fall in CALIBRATED_DROPS:
+    for drop in CALIBRATED_DROPS:
         try:
-            softer = calibrate(calibration.spindle, calibration.frequency * (1 - fall), mode=calibration.mode)
+            softer = calibrate(calibration.spindle, calibration.frequency * (1 - drop), mode=calibration.mode)
             stiffness.append(softer.modal_stiffness_after)
         except (ValueError, ArithmeticError):
             break
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
 
 
-def apply_drops(draws: ProgramSamples, falls: NDArray[np.float64], stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws with all frequencies fallen by each of these shares (k,), one after the other."""
-    return draws.sweep(np.ones(falls.size), 1 - falls, np.array([stiffness_at(fall) for fall in falls.tolist()]))
+def apply_drops(samples: ProgramSamples, drops: Floats, stiffness_at: StiffnessAt) -> ProgramSamples:
+    """Apply each of some frequency drops (k,) to all samples, one after the other."""
+    return samples.sweep(np.ones(drops.size), 1 - drops, np.array([stiffness_at(drop) for drop in drops.tolist()]))
 
 
-def find_tolerable_drop(draws: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
-    """Largest fall of the frequency, relative, up to which a depth (m) stays stable in the middle of the doubt.
+def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
+    """Find the largest relative drop up to which a depth (m) stays stable in the median.
 
     0.0 where it is unstable now, inf where nothing happens down to 80 %. Looks every 0.2 % of fall.
     """
-    falls, worst = np.linspace(0, CALIBRATED_DROPS[-1], N_DROP_STEPS), np.empty(0)
-    for part in np.array_split(falls, N_DROP_PARTS):
-        middle = apply_drops(draws[np.array([0])], part, stiffness_at)
-        worst = np.append(worst, np.max(middle.growth(depth * np.array(CHECKED_DEPTH_SHARES)), axis=1))
+    drops, worst = np.linspace(0, CALIBRATED_DROPS[-1], N_DROP_STEPS), np.empty(0)
+    for part in np.array_split(drops, N_DROP_PARTS):
+        median = apply_drops(samples[np.array([0])], part, stiffness_at)
+        worst = np.append(worst, np.max(median.growth(depth * np.array(CHECKED_DEPTH_SHARES)), axis=1))
         if np.any(worst >= 0):
             break
     else:
@@ -83,51 +83,51 @@ def find_tolerable_drop(draws: ProgramSamples, depth: float, stiffness_at: Stiff
     if first == 0:
         return 0.0
     before, after = worst[first - 1], worst[first]
-    return float(falls[first - 1] + (falls[first] - falls[first - 1]) * before / (before - after))
+    return float(drops[first - 1] + (drops[first] - drops[first - 1]) * before / (before - after))
 
 
 DROP_SEARCH_STEP = 0.0125
-"""Step of the fall at which all draws are looked at."""
+"""Step of the fall at which all samples are checked."""
 DROP_SLOPE_STEP = 1e-3
 """Step of the fall over which the growth is taken to be straight."""
 DROP_HALVINGS = 4
 """Halvings between the two looks at which the first of them chatters."""
 N_DROP_ERROR_SAMPLES = 12
-"""Number of draws of damping and stiffness that the error of the fall comes from."""
+"""Number of samples of damping and stiffness that the error of the fall comes from."""
 
 
 def find_critical_drop(verdict: Verdict) -> CriticalDrop:
-    """Falls of the frequency that change the word on a program; one beyond 20 % is not looked at."""
-    draws = verdict.samples
-    if verdict.assembly is None or draws is None or verdict.stability is Stability.UNKNOWN:
+    """Find the frequency drops that change the stability of a program, up to 20 %."""
+    samples = verdict.samples
+    if verdict.assembly is None or samples is None or verdict.stability is Stability.UNKNOWN:
         return CriticalDrop(math.nan, math.nan, math.nan)
     if verdict.stability is Stability.NOT_STABLE:
         return CriticalDrop(0.0, 0.0, 0.0)
     stiffness_at, _ = model_softening(verdict.assembly)
     depth = verdict.program.depth_mm / 1e3
-    last = find_tolerable_drop(draws, depth, stiffness_at)
-    first = _first_doubtful_drop(draws, depth, last, stiffness_at) if verdict.stability is Stability.STABLE else 0.0
+    last = find_tolerable_drop(samples, depth, stiffness_at)
+    first = _first_doubtful_drop(samples, depth, last, stiffness_at) if verdict.stability is Stability.STABLE else 0.0
     return CriticalDrop(
-        min(first, last), last, _drop_error(draws, depth, last, stiffness_at) if last < math.inf else 0.0
+        min(first, last), last, _drop_error(samples, depth, last, stiffness_at) if last < math.inf else 0.0
     )
 
 
-def build_stored_verdict(verdict: Verdict, falls: bool) -> StoredVerdict:
-    """What the history keeps of a verdict; falls: with the critical ones, which take as long as the verdict itself."""
-    return verdict.stored._replace(critical=find_critical_drop(verdict)) if falls else verdict.stored
+def build_stored_verdict(verdict: Verdict, drops: bool) -> StoredVerdict:
+    """Build the stored verdict; drops: with the critical frequency drops, which take as long as the verdict itself."""
+    return verdict.stored._replace(critical=find_critical_drop(verdict)) if drops else verdict.stored
 
 
-def is_verdict_missing(ruling: StoredVerdict | None, falls: bool) -> bool:
-    """Whether a program has to be judged to know its ruling; falls: with the critical ones."""
-    return ruling is None or (falls and ruling.critical is None)
+def is_verdict_missing(ruling: StoredVerdict | None, drops: bool) -> bool:
+    """Return whether a program has to be evaluated for its stored verdict; drops: with the critical drops."""
+    return ruling is None or (drops and ruling.critical is None)
 
 
-def _first_doubtful_drop(draws: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Largest fall up to which no draw chatters."""
+def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
+    """Return the largest drop up to which no sample chatters."""
     most = min(last, float(CALIBRATED_DROPS[-1]))
 
-    def chatters(fall: float) -> bool:
-        return bool(np.any(apply_drops(draws, np.array([fall]), stiffness_at).growth(depth) >= 0))
+    def chatters(drop: float) -> bool:
+        return bool(np.any(apply_drops(samples, np.array([drop]), stiffness_at).growth(depth) >= 0))
 
     good = 0.0
     for bad in np.linspace(0, most, math.ceil(most / DROP_SEARCH_STEP) + 1)[1:].tolist():
@@ -137,18 +137,18 @@ def _first_doubtful_drop(draws: ProgramSamples, depth: float, last: float, stiff
     else:
         return last
     for _ in range(DROP_HALVINGS):
-        middle = (good + bad) / 2
-        good, bad = (good, middle) if chatters(middle) else (middle, bad)
+        median = (good + bad) / 2
+        good, bad = (good, median) if chatters(median) else (median, bad)
     return good
 
 
-def _drop_error(draws: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Error of the fall at which the middle chatters, from its growth with damping and stiffness of some draws."""
-    rows, middle = draws.rows[np.arange(1, N_DROP_ERROR_SAMPLES + 1)], draws[np.array([0])]
-    alike = draws.rows[np.zeros(N_DROP_ERROR_SAMPLES, dtype=np.intp)]
-    scattered = replace(draws, rows=replace(alike, damping_ratio=rows.damping_ratio, stiffness=rows.stiffness))
+def _drop_error(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
+    """Return the error of the drop at which the median chatters, from damping and stiffness of some samples."""
+    rows, median = samples.rows[np.arange(1, N_DROP_ERROR_SAMPLES + 1)], samples[np.array([0])]
+    alike = samples.rows[np.zeros(N_DROP_ERROR_SAMPLES, dtype=np.intp)]
+    scattered = replace(samples, rows=replace(alike, damping_ratio=rows.damping_ratio, stiffness=rows.stiffness))
     spread = np.std(apply_drops(scattered, np.array([last]), stiffness_at).growth(depth))
-    before, after = apply_drops(middle, last + np.array([-DROP_SLOPE_STEP, DROP_SLOPE_STEP]), stiffness_at).growth(
+    before, after = apply_drops(median, last + np.array([-DROP_SLOPE_STEP, DROP_SLOPE_STEP]), stiffness_at).growth(
         depth
     )[:, 0]
     return float(spread * 2 * DROP_SLOPE_STEP / abs(after - before)) if after != before else 0.0

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows, Program, ProgramLimit, StabilityLobes
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
-from lobewatch.machine import Machine, ProgramTable
+from lobewatch.arrays import Flags, Floats
+from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.lobe_chart import find_cut_table
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import (
     ProgramSamples,
     build_median_row,
-    build_program,
-    cutting_conditions_of,
     draw_samples,
     find_worst_limit,
 )
@@ -27,37 +26,35 @@ from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
-"""Shares of the limit in the middle, as its own cutting coefficient moves it, at which each draw is looked at ..."""
+"""Shares of the median limit, as its own cutting coefficient moves it, at which each sample is checked ..."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
 """... and shares at which those are looked at that are stable at all of these."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
-"""Shares of the deepest of interest where there is no limit in the middle."""
+"""Shares of the deepest of interest where there is no median limit."""
 N_REFINED_EXTREMES = 9
 """Number of the lowest and of the highest limits that are then refined, in all directions of feed that count."""
 LIMIT_REFINEMENT_STEPS = 3
 """Steps of that refinement."""
 SIMILAR_FEED_LIMIT = 1.15
-"""Directions of feed whose limit is at most so many times the lowest one count ..."""
+"""Directions of feed whose limit is at most this many times the lowest one count ..."""
 MAX_SIMILAR_FEEDS = 3
 """... the lowest of them."""
 
 RECHECKED_LIMIT_SHARES = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
-"""Shares of the limit of each draw at which it is looked at once more ..."""
+"""Shares of the limit of each sample at which it is checked once more ..."""
 WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
 """... in the directions of feed whose limit is at most so many times the lowest one, the lowest of them."""
 
-Floats = NDArray[np.float64]
 
+def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
+    """Find the deepest stable depth of each sample (m), shape (samples,); inf beyond the tried depths.
 
-def find_sample_limits(draws: ProgramSamples, depth: float) -> Floats:
-    """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
-
-    Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
+    Of the other samples than the lowest and highest it is the first change between the depths that are checked,
     linearly interpolated. depth: that of the program (m).
     """
-    limit, worst = float(draws.limits[0]), draws.with_lowest_cuts(0.0)
-    near = draws.with_lowest_cuts(SIMILAR_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS)
-    softness = (draws.rows.tangential[0] / draws.rows.tangential)[:, np.newaxis]
+    limit, worst = float(samples.limits[0]), samples.with_lowest_cuts(0.0)
+    near = samples.with_lowest_cuts(SIMILAR_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS)
+    softness = (samples.rows.tangential[0] / samples.rows.tangential)[:, np.newaxis]
     tried = (
         softness * limit * TRIED_LIMIT_SHARES
         if np.isfinite(limit)
@@ -82,16 +79,16 @@ def find_sample_limits(draws: ProgramSamples, depth: float) -> Floats:
     return limits
 
 
-def refine_sample_limits(draws: ProgramSamples, limits: Floats) -> Floats:
-    """Limits (m) as `find_sample_limits` gives them, each in the direction of feed that is worst for that very draw.
+def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
+    """Refine limits (m) of `find_sample_limits` in the feed direction that is worst for each sample.
 
-    For numbers of single draws, such as ratios of two cuts on the same spindle.
+    For numbers of single samples, such as ratios of two cuts on the same spindle.
     """
     settled, finite = limits.copy(), np.flatnonzero(np.isfinite(limits))
     if not finite.size:
         return settled
     tried = limits[finite, np.newaxis] * RECHECKED_LIMIT_SHARES
-    near = draws.with_lowest_cuts(WIDER_FEED_LIMIT * float(draws.limits[0]), MAX_WIDER_FEEDS)[finite]
+    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * float(samples.limits[0]), MAX_WIDER_FEEDS)[finite]
     low, high, at_low, at_high = _bracket_limits(tried, near.growth(tried))
     crossing = _interpolate_limits(low, high, at_low, at_high)
     settled[finite] = np.where(np.isfinite(crossing), crossing, limits[finite])
@@ -99,7 +96,7 @@ def refine_sample_limits(draws: ProgramSamples, limits: Floats) -> Floats:
 
 
 def _bracket_limits(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Depths on both sides of the first change to growth in each row, and growth there; inf where there is none."""
+    """Return depths on both sides of the first change to growth in each row, and the growth there."""
     depth = np.pad(tried, ((0, 0), (1, 1)))
     depth[:, -1] = np.inf
     value = np.pad(grown, ((0, 0), (1, 1)), constant_values=1.0)
@@ -109,105 +106,96 @@ def _bracket_limits(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Float
 
 
 def _interpolate_limits(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
-    """Depths at which growth is zero on a line."""
+    """Interpolate the depths at which growth is zero."""
     share = -at_low / (at_high - at_low)
     return np.where(np.isfinite(high), low + share * (np.where(np.isfinite(high), high, low) - low), np.inf)
 
 
 LIMIT_QUANTILES = (0.01, 0.99)
-"""Quantiles of the limit over the doubt that a band reaches between."""
+"""Quantiles of the limit over the uncertainty that a band reaches between."""
 SKIPPED_CUT_MARGIN = 1.15
-"""Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed over,
-unless the middle chatters in it at a depth so much larger somewhere within the doubt of the speed ..."""
+"""Factor that the limit of a cut on its path, were it as doubtful as the lowest, has of margin where it is passed
+over, unless the middle chatters in it at a depth this much larger somewhere within the uncertainty of the speed ..."""
 SKIPPED_SAMPLE_MARGIN = 1.6
 """... and that of one draw in such a cut. Both are for the share of draws that chatter: before `stable` is said every
-draw is looked at in every cut. In 408 judgements of random cuts, each fed in up to 24 ways, EACH missed 6 draws."""
+sample is checked in every cut. In 408 results of random cuts, each fed in up to 24 ways, it missed 6 samples."""
 
 
 class MonteCarloResult(NamedTuple):
-    """What the word on a program rests on."""
+    """What the verdict on a program rests on."""
 
     median: ProgramLimit
-    """Limit in the middle of the doubt."""
+    """Limit in the median estimate."""
     lowest: float
     """Lowest limit of any of the spindles (m)."""
     low: float
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     high: float
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     samples: ProgramSamples
-    """Spindles that it was judged on."""
-    chatters: NDArray[np.bool_]
-    """Whether each draw chatters, without the middle, shape (DRAWS,)."""
+    """Spindles that it was evaluated on."""
+    chatters: Flags
+    """Whether each sample chatters, without the middle, shape (samples,)."""
     axes_ratio: float
-    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
 
     @property
     def is_stable_throughout(self) -> bool:
-        """Whether it is stable in the middle and on every draw."""
+        """Whether it is stable in the median and on every sample."""
         return self.median.stable and not np.any(self.chatters)
 
 
 class SampledProgram(NamedTuple):
-    """A program on all the spindles that it may be run on, before these are looked at."""
+    """A program on all the spindles that it may be run on, before these are checked."""
 
     depth: float
     """Its depth (m)."""
     median: ProgramLimit
-    """Limit in the middle of the doubt."""
+    """Limit in the median estimate."""
     samples: ProgramSamples
-    """Spindles from all of the doubt."""
+    """Spindles from all of the uncertainty."""
     axes_ratio: float
-    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
 
 
-def run_monte_carlo(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed
-) -> MonteCarloResult:
-    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
-    return evaluate_samples(sample_program(table, assembly, machine, at_speed))
+def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
+    """Evaluate a program on all its samples by semi-discretization."""
+    return evaluate_samples(sample_program(case))
 
 
-def sample_program(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
-) -> SampledProgram:
-    """A program with the coefficients that were learnt; either: milled up and down, the worse counts."""
-    program, spindle = build_program(table, machine), at_speed.scale_modes(assembly)
-    cuts = cutting_conditions_of(table, machine, spindle, either)
-    middle, axes, across = find_worst_limit(program, spindle, cuts)
-    doubt = at_speed.uncertainty or uncertainty_of(assembly, table, machine)
-    return SampledProgram(program.depth, middle, draw_samples(program, middle, cuts, spindle, doubt, axes), across)
+def sample_program(case: ProgramCase) -> SampledProgram:
+    """Find the median limit of a program and sample its samples."""
+    median, axes, axes_ratio = find_worst_limit(case)
+    return SampledProgram(case.depth, median, draw_samples(case, median, axes), axes_ratio)
 
 
 def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
-    """What is seen of a program on all spindles that it may be run on."""
-    depth, middle, draws, across = program
-    limits = find_sample_limits(draws, depth)[1:]
+    """Evaluate all samples of a program: limits, quantiles, samples that chatter."""
+    depth, median, samples, across = program
+    limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
-    below = SKIPPED_CUT_MARGIN * depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
-    around = draws.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
-    near = (draws.limits <= below) | around
-    chatters = _find_chattering(draws, near, around, limits, depth)
-    return MonteCarloResult(middle, float(np.min(limits)), float(low), float(high), draws, chatters, across)
+    below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
+    around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
+    near = (samples.limits <= below) | around
+    chatters = _find_chattering(samples, near, around, limits, depth)
+    return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, across)
 
 
-def _find_chattering(
-    draws: ProgramSamples, near: NDArray[np.bool_], around: NDArray[np.bool_], limits: Floats, depth: float
-) -> NDArray[np.bool_]:
-    """Whether each draw chatters at a depth (m) in any of the cuts, shape (DRAWS,); where none does, that is exact.
+def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:
+    """Find the samples that chatter at a depth (m) in any of the cuts; exact where none does.
 
-    limits: of the draws in the worst cut (m), shape (DRAWS,). In another cut that is near (cuts,) a draw is looked at
-    where its limit, were it as far off the middle as in the worst, has less than EACH to spare, and where the middle
-    chatters around (cuts,). Only where none of these chatters all others are looked at, in all cuts.
+    limits: of the samples in the worst cut (m), shape (samples,). In another cut that is near (cuts,), a sample is
+    checked if its limit, scaled as in the worst cut, has less than `SKIPPED_SAMPLE_MARGIN`, and if the median chatters
+    around it (cuts,). All others are checked only if none of these chatters, in all cuts.
     """
     chatters = limits <= depth
-    softness = limits / draws.limits[0] if np.isfinite(draws.limits[0]) else np.ones(limits.size)
-    likely = np.multiply.outer(draws.limits, softness) <= SKIPPED_SAMPLE_MARGIN * depth
+    softness = limits / samples.limits[0] if np.isfinite(samples.limits[0]) else np.ones(limits.size)
+    likely = np.multiply.outer(samples.limits, softness) <= SKIPPED_SAMPLE_MARGIN * depth
     likely = (likely | around[:, np.newaxis]) & near[:, np.newaxis]
     likely[0] = True
     for wanted in (likely, ~likely):
         cut, draw = np.nonzero(wanted & ~chatters)
-        grown = draws.growth_in_cuts(cut, draw + 1, np.full((cut.size, 1), depth))[:, 0]
+        grown = samples.growth_in_cuts(cut, draw + 1, np.full((cut.size, 1), depth))[:, 0]
         chatters[draw[grown >= 0]] = True
         if np.any(chatters):
             break
@@ -215,7 +203,7 @@ def _find_chattering(
 
 
 N_BAND_SAMPLES = 64
-"""Number of draws from the doubt."""
+"""Number of samples from the uncertainty."""
 N_BAND_SPEEDS = 81
 """Number of speeds of their diagrams."""
 UNLIMITED_DEPTH = 1e3
@@ -224,7 +212,7 @@ UNLIMITED_DEPTH = 1e3
 
 @dataclass(frozen=True, eq=False)
 class LimitBand:
-    """Band between 1 and 99 % of the limits over the doubt, at the speeds of a diagram."""
+    """Band between 1 and 99 % of the limits over the uncertainty, at the speeds of a diagram."""
 
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (n,)."""
@@ -237,22 +225,23 @@ class LimitBand:
 def compute_limit_band(
     line: StabilityLobes, cut: str, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS
 ) -> LimitBand:
-    """The band around the line of a cut (its name), by draws from the doubt.
+    """Compute the uncertainty band around the limits of a cut (its name) by samples.
 
-    Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
-    the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
-    order, and for any method as to spindle speed, cutting coefficient, and changes that all modes share.
+    Each sample is worked out by the zero-order approximation. Of a line by another method it is the same line at the
+    speed that belongs to the frequency of the sample, times what zero-order approximation says of the rest: that
+    holds to a per cent for a line by zero order, and for any method as to spindle speed, cutting coefficient, and
+    changes that all modes share.
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))
-    doubt = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
-    draws = doubt.sample(rows, N_BAND_SAMPLES)
+    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
+    samples = uncertainty.sample(rows, N_BAND_SAMPLES)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
-    moved = (draws.speed_rpm / (draws.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
+    moved = (samples.speed_rpm / (samples.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
     low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))
-    speeds, middle = np.geomspace(low, high, N_BAND_SPEEDS), rows[np.zeros(N_BAND_SAMPLES, np.intp)]
-    depths = _band_depths(draws, cuts, draws.speed_rpm[:, np.newaxis] * speeds)
-    ratios = depths / _band_depths(middle, cuts, np.clip(moved * speeds, low, high))
+    speeds, median = np.geomspace(low, high, N_BAND_SPEEDS), rows[np.zeros(N_BAND_SAMPLES, np.intp)]
+    depths = _band_depths(samples, cuts, samples.speed_rpm[:, np.newaxis] * speeds)
+    ratios = depths / _band_depths(median, cuts, np.clip(moved * speeds, low, high))
     order = np.argsort(line.speed_rpm)
     rising = line.speed_rpm[order], np.minimum(line.depth[order], UNLIMITED_DEPTH)
     limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *rising)
@@ -266,6 +255,6 @@ def compute_limit_band(
 
 
 def _band_depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
-    """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
+    """Return the limit of each row in the worst cut at its own speeds (rpm) (r, s)."""
     depths = [ZeroOrderBatch.of(rows.with_cut(cut)).limits(speed_rpm)[0] for cut in cuts]
     return np.asarray(np.minimum(np.min(depths, axis=0), UNLIMITED_DEPTH))

@@ -1,8 +1,8 @@
 """Unequal pitches for one cut at one speed: what they gain over equal ones, over all that is not known.
 
-The closed form of the best difference between neighbours says which patterns are looked at; zero order after Altintas,
-Engin & Budak, over few draws, says how deep they may go; the multipliers of the same draws say which of each kind is
-best; and what is said of that is the judge's, draw by draw beside equal pitch.
+The closed form of the best difference between neighbours says which patterns are checked; zero-order approximation
+after Altintas, Engin & Budak, over few samples, says how deep they may go; the multipliers of the same samples say
+which of each kind is best; and what is said of that is the evaluation's, sample by sample beside equal pitch.
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError
 from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
+from lobewatch.arrays import Floats, Indices
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.safe_depth_estimates import find_deepest_stable
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
@@ -27,45 +28,44 @@ from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, e
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 N_LOWEST_PITCH_SAMPLES, PITCH_SAMPLE_STEP = 8, 40
-"""Number of draws, those that equal pitch has the lowest limits in, and step between others, in which patterns are
-compared before the best are judged ..."""
+"""Number of samples, those that equal pitch has the lowest limits in, and step between others, in which patterns are
+compared before the best are evaluated ..."""
 N_PITCH_FEEDS = 2
 """... in so many ways of the cut, the worst ..."""
 PITCH_DEPTH_FACTOR = 2.0
 """... down to so many times their lowest limit by zero order."""
 MAX_PITCH_TRIES, MIN_CONFIRMED_SHARE = 3, 0.9
-"""Number of patterns of a kind that are judged, and share of the depth that few draws allow, as much of which is good
-enough: below it the draws that chatter first join the few."""
+"""Number of patterns of a kind that are evaluated, and share of the depth that few samples allow, as much of which
+is good enough: below it the samples that chatter first join the few."""
 N_ADDED_SAMPLES = 8
-"""Number of draws that do."""
+"""Number of samples that do."""
 MIN_PITCH_GAIN = 1.05
 """Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class PitchEvaluation:
-    """Pitches of a cutter with what the judge says of the cut."""
+    """Pitches of a cutter with what the evaluation says of the cut."""
 
     pattern: PitchPattern
     """Pitches."""
     stability: Stability
-    """Word on the cut at its depth."""
+    """Stability of the cut at its depth."""
     limit: float
-    """Deepest stable depth in the middle of the doubt (m); inf where there is none as deep as the tool cuts."""
+    """Deepest stable depth in the median estimate (m); inf where there is none as deep as the tool cuts."""
     low: float
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     high: float
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     gain: float
-    """Limit over that of equal pitch, less 1, in the middle of the doubt."""
+    """Limit over that of equal pitch, less 1, in the median estimate."""
     gain_low: float
-    """1 % quantile of the gain over the doubt: both cutters on the same spindle and material, draw by draw."""
+    """1 % quantile of the gain over the uncertainty: both cutters on the same spindle and material, sample by
+    sample."""
     gain_high: float
-    """99 % quantile of the gain over the doubt."""
+    """99 % quantile of the gain over the uncertainty."""
     share_worse: float
-    """Share of the doubt in which equal pitch has the higher limit."""
+    """Share of the uncertainty in which equal pitch has the higher limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +91,20 @@ class PitchProposal:
 def propose_pitch(
     table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS
 ) -> PitchProposal:
-    """Pitches for a cut at its speed; limits are looked for up to 20 times its depth.
+    """Propose pitches for a cut at its speed; limits are searched up to 20 times its depth.
 
-    DataError where the cut cannot be judged, ValueError for less than two teeth.
+    DataError where the cut cannot be evaluated, ValueError for less than two teeth.
     """
     equal = equal_pitch(table.teeth)
-    verdict = evaluate_program(_with_pitch(table, equal), assembly, machine, at_speed)
+    verdict = evaluate_program(msgspec.structs.replace(table, pitch_deg=equal.pitch_deg), assembly, machine, at_speed)
     if verdict.stability is Stability.UNKNOWN or verdict.samples is None:
         raise DataError("; ".join(str(remark) for remark in verdict.remarks))
-    table = at_speed.apply_coefficients(table)
-    limits, half_wave = _pitch_limits(verdict.samples, table), half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
-    search = PitchSearch(table, assembly, machine, at_speed, verdict.samples, limits)
+    case = ProgramCase(at_speed.apply_coefficients(table), assembly, machine, at_speed)
+    limits, half_wave = (
+        _pitch_limits(verdict.samples, case.depth),
+        half_wave_deg(table.speed_rpm, verdict.chatter_frequency),
+    )
+    search = PitchSearch(case, verdict.samples, limits)
     unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
     if present := machine.build_cut(table).pitch:
         pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
@@ -117,28 +120,22 @@ def propose_pitch(
 
 @dataclass(frozen=True, eq=False)
 class PitchSearch:
-    """Looking for pitches of one cut."""
+    """Search for pitches of one cut."""
 
-    table: ProgramTable
-    """Cut, with the coefficients that were learnt; its own pitch does not count."""
-    assembly: Assembly
-    """Tool as tapped."""
-    machine: Machine
-    """Machine."""
-    at_speed: SpindleAtSpeed
-    """Spindle as test cuts have taught it."""
+    case: ProgramCase
+    """Cut and tool; the pitch of the cut does not count."""
     samples: ProgramSamples
-    """Draws of the cut with equal pitch."""
+    """Samples of the cut with equal pitch."""
     equal_limits: Floats
     """Their limits (m), the middle first."""
 
     def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
-        """The pattern of each kind with the highest low end of its limit, as far as few draws tell before the judge."""
-        kinds = itertools.groupby(pitch_patterns(self.table.teeth, half_wave), key=lambda pattern: pattern.name)
+        """Find the pattern of each kind with the highest 1 % limit."""
+        kinds = itertools.groupby(pitch_patterns(self.case.table.teeth, half_wave), key=lambda pattern: pattern.name)
         return [self._find_best(list(patterns)) for _, patterns in kinds]
 
     def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
-        """The best of one kind."""
+        """Find the best pattern of one kind."""
         places = [
             *np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist(),
             *range(0, self.equal_limits.size, PITCH_SAMPLE_STEP),
@@ -156,41 +153,36 @@ class PitchSearch:
             patterns = [pattern for pattern in patterns if calm[pattern] > judged[likely].low]
         return max(judged.values(), key=lambda judged: judged.low)
 
-    def _stable_depth(self, pattern: PitchPattern, places: NDArray[np.intp]) -> float:
-        """The deepest (m) at which the draws at some places are stable."""
+    def _stable_depth(self, pattern: PitchPattern, places: Indices) -> float:
+        """Return the deepest (m) at which selected samples are stable."""
         cuts, limits = self.samples.cuts[:N_PITCH_FEEDS], self.samples.limits[:N_PITCH_FEEDS]
         few = replace(self.samples[places], cuts=tuple(with_pitch_pattern(cut, pattern) for cut in cuts), limits=limits)
         speeds = few.rows.speed_rpm[:, np.newaxis]
         mean = min(float(np.min(ZeroOrderBatch.of(few.rows.with_cut(cut)).limits(speeds)[0])) for cut in few.cuts)
         return find_deepest_stable(
-            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.table.depth_mm / 1e3)
+            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.case.table.depth_mm / 1e3)
         )
 
     def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
-        """Pitches by the judge, and the limit of each draw (m), the middle first."""
-        table = _with_pitch(self.table, pattern)
-        judgement = run_monte_carlo(table, self.assembly, self.machine, self.at_speed)
-        band = judgement.median.limit, judgement.low, judgement.high
-        word, limits = classify_stability(table, judgement, self.assembly), _pitch_limits(judgement.samples, table)
+        """Evaluate a pattern; return its evaluation and the limit of each sample (m), the median first."""
+        case = self.case.with_changes(pitch_deg=pattern.pitch_deg)
+        result = run_monte_carlo(case)
+        band = result.median.limit, result.low, result.high
+        word, limits = classify_stability(case, result), _pitch_limits(result.samples, case.depth)
         return _build_evaluation(pattern, word, band, limits, self.equal_limits), limits
 
 
-def _with_pitch(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
-    return msgspec.structs.replace(table, pitch_deg=pattern.pitch_deg)
-
-
-def _pitch_limits(draws: ProgramSamples, table: ProgramTable) -> Floats:
-    """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
-    depth = table.depth_mm / 1e3
-    limits = refine_sample_limits(draws, find_sample_limits(draws, depth))
-    limits[0] = draws.limits[0]
+def _pitch_limits(samples: ProgramSamples, depth: float) -> Floats:
+    """Return the limit of each sample (m), the median first."""
+    limits = refine_sample_limits(samples, find_sample_limits(samples, depth))
+    limits[0] = samples.limits[0]
     return np.minimum(limits, MAX_PROGRAM_DEPTH_RATIO * depth)
 
 
 def _build_evaluation(
     pattern: PitchPattern, word: Stability, band: tuple[float, float, float], limits: Floats, equal: Floats
 ) -> PitchEvaluation:
-    """Pitches from the limits of their draws and those of equal pitch (m), the middle first."""
+    """Build an evaluation from sample limits and those of equal pitch (m), the median first."""
     gains = limits / equal - 1
     low, high = np.quantile(gains[1:], LIMIT_QUANTILES)
     return PitchEvaluation(

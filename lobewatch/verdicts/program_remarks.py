@@ -11,9 +11,10 @@ import numpy as np
 from acquisition import Remark
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
-from lobewatch.verdicts.program_samples import FEED_ANGLE_STEP, N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.uncertainty_causes import UNCERTAINTY_CAUSES, UNTAPPED
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -26,7 +27,7 @@ TOOL_MAKER_KEYS = (MissingToolData.CUTTING_SPEED, MissingToolData.FEED_PER_TOOTH
 
 
 def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
-    """Speed and feed per tooth of a program that its tool does not bear, with what it does and the source."""
+    """Yield remarks on speed and feed per tooth outside the limits of the tool."""
     limits = find_tool_limits(machine, table)
     if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
         reach = CutRange(machine, table, limits)
@@ -36,13 +37,14 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
         yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
-        text = f"feed_per_tooth_mm = {feed:g} is outside {_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
+        allowed = f"{_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
+        text = f"feed_per_tooth_mm = {feed:g} is outside {allowed}"
         cure = "feed within that, or enter what its maker says as feed_per_tooth_mm"
         yield _tool_limit_remark(table, f"{text} ({borne.source})", cure)
 
 
 def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
-    """Question for what advice on a program would have to know of its tool."""
+    """Ask for tool data that advice on a program needs."""
     if limits.is_guessed:
         whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
         asked = " and ".join(text for unknown, text in MISSING_TOOL_FACTS.items() if unknown in limits.missing)
@@ -67,7 +69,7 @@ def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
 
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
-    """Who bears that, in words."""
+    """Who allows that, in verdicts."""
     tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
     where = "in a slot" if limits.cut == "slot" else "at the side"
     return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
@@ -95,15 +97,16 @@ MIN_CROSS_LIMIT_RATIO = 1.04
 """Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
 
 
-def assumption_remarks(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Iterator[Remark]:
-    """Remarks on what is assumed because the program does not say it."""
+def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[Remark]:
+    """Warn about defaults assumed for missing program settings."""
+    table = case.table
     if (
         table.immersion < NARROW_CUT_IMMERSION
         and table.corner_radius_mm is None
         and not isinstance(table.radial_depth_mm, tuple)
     ):
-        yield _corner_remark(table, machine, judgement)
-    if machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
+        yield _corner_remark(case, result)
+    if case.machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
         yield Remark(
             "helix-not-written",
             table.name,
@@ -111,21 +114,22 @@ def assumption_remarks(table: ProgramTable, machine: Machine, judgement: MonteCa
             "0.7 to 1.7 times the limit",
             "write helix_deg, 0 for straight edges",
         )
-    if judgement.axes_ratio > MIN_CROSS_LIMIT_RATIO:
+    if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
         yield Remark(
             CROSS_NOT_TAPPED_CODE,
             table.name,
             "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
-            f"its limit by up to {100 * (judgement.axes_ratio - 1):.0f} %",
-            "tap --direction xy: hit in x, sensor in y",
+            f"its limit by up to {100 * (result.axes_ratio - 1):.0f} %",
+            "tap Circumstances.direction xy: hit in x, sensor in y",
         )
 
 
-def _corner_remark(table: ProgramTable, machine: Machine, judgement: MonteCarloResult) -> Remark:
+def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
+    table = case.table
     radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
     inside, radial = table.corner_immersion(radius), table.radial_mm[1]
-    limit = _limit_at_immersion(inside, table, machine, judgement.samples)
-    share = f", {100 * limit / judgement.median.limit:.0f} % of it" if limit < judgement.median.limit < math.inf else ""
+    limit = _limit_at_immersion(inside, case, result.samples)
+    share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
     return Remark(
         "one-engagement",
         table.name,
@@ -136,68 +140,47 @@ def _corner_remark(table: ProgramTable, machine: Machine, judgement: MonteCarloR
     )
 
 
-def _limit_at_immersion(immersion: float, table: ProgramTable, machine: Machine, draws: ProgramSamples) -> float:
-    """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
-    cut, middle = replace(machine.build_cut(table), immersion=immersion), draws.rows[np.array([0])]
+def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSamples) -> float:
+    """Return the median limit (m) by the zero-order approximation at another immersion, in the worst feed direction."""
+    cut, median = replace(case.program.cut, immersion=immersion), samples.rows[np.array([0])]
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
-    speed = np.array([table.speed_rpm])
-    return min(float(ZeroOrderBatch.of(middle.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
+    speed = np.array([case.table.speed_rpm])
+    return min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
 
 
 N_CAUSE_SAMPLES = 60
-"""Number of draws that chatter, of which it is seen what each lacks to be stable."""
+"""Number of samples that chatter, of which it is seen what each lacks to be stable."""
 
 
-def find_decisive_cause(judgement: MonteCarloResult, depth: float) -> str:
-    """The cause without which most of the draws that chatter at a depth (m) would not.
+def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
+    """Find the cause of uncertainty without which most chattering samples would be stable at a depth (m).
 
     Where none of them chatters a direction that was not tapped is all that is left open.
     """
-    draws, doubt = judgement.samples, judgement.samples.uncertainty
-    if "untapped" in doubt.modes or not np.any(judgement.chatters):
-        return "untapped"
-    places, middle = np.flatnonzero(judgement.chatters)[:N_CAUSE_SAMPLES], draws.rows[np.array([0])]
+    samples, uncertainty = result.samples, result.samples.uncertainty
+    if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
+        return UNTAPPED.name
+    places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
-    for cause in doubt.causes:
-        rows = doubt.sample(middle, N_PROGRAM_SAMPLES, without=cause)[places]
-        shares[cause] = float(np.mean(replace(draws, rows=rows).growth(depth) < 0))
+    for cause in uncertainty.causes:
+        rows = uncertainty.sample(median, N_PROGRAM_SAMPLES, without=cause)[places]
+        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(depth) < 0))
     return max(shares, key=lambda cause: shares[cause])
 
 
-def uncertainty_advice(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
-    """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else.
-
-    cuts: number of test cuts that have taught of it.
-    """
-    text, cure = {
-        "coefficients": (
-            f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
-            "measure them" if table.material else "measure them, or name the material",
-        ),
-        "speed": ("the spindle speed decides", "run it in the middle of a window of speeds"),
-        "clamping": (
-            "the scatter from tap test to tap test decides",
-            "tap again: from 8 tests on the scatter of this very tool counts",
-        ),
-        "tap": ("the error of the tap test decides", "tap again with more hits"),
-        "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
-        "wear": (
-            f"wear decides: chatters above Kt {tangential / 1e6:.0f} N/mm2",
-            'run it with new edges and write wear = "new"',
-        ),
-        "workpiece": (
-            "the wall that is cut is thin: it gives way, and its modes are not known",
-            "support it and take thin = true out, or find the depth by test cuts",
-        ),
-        "cuts": (
-            f"the spindle at speed decides, as {cuts} test cuts have left it open",
-            f"make the next test cut: lobewatch suggest names it for {table.name!r}",
-        ),
-        "cross": ("the axes of the modes decide, which taps in x and in y leave open", "tap --direction xy"),
-        "question": (
-            f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
-            "answer the question, or tap again",
-        ),
-        "untapped": assembly.missing_direction,
-    }[cause]
-    return Remark("doubt-decides", table.name, text, cure)
+def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) -> Remark:
+    """Name the decisive cause of uncertainty, and what would reduce it."""
+    table, assembly, record = case.table, case.assembly, UNCERTAINTY_CAUSES[cause]
+    missing, missing_remedy = assembly.missing_direction
+    tangential = result.median.limit / case.depth * case.program.cut.tangential
+    values = {
+        "kt": f"{tangential / 1e6:.0f}",
+        "tool": repr(table.tool),
+        "program": repr(table.name),
+        "n_cuts": case.at_speed.n_cuts,
+        "coefficients_remedy": "measure them" if table.material else "measure them, or name the material",
+        "questions": ", ".join(dict.fromkeys(question.code for question in assembly.questions)),
+        "missing": missing,
+        "missing_remedy": missing_remedy,
+    }
+    return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import (
     Cut,
-    Direction,
     MillingRows,
     Program,
     ProgramLimit,
@@ -26,93 +22,48 @@ from lobes import (
 )
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engagement
-from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.uncertainty import Uncertainty
 
-MAX_OBLIQUE_FEED_IMMERSION = 0.5
-"""Radial depth over diameter below which a cut in both directions is worst at angles between x and y, always ..."""
-EQUAL_DIRECTION_TOLERANCES = (0.02, 0.1, 0.1)
-"""... and from which on it is only where f_n, zeta or K in x and y differ by more than this, relatively, or modes lie
-askew. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
-MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
-"""Directions that a cut may be milled in; a slot is both at once."""
-FEED_ANGLE_STEP = math.pi / 12
-"""Step of the angles between x and y (rad)."""
-
-
-def cutting_conditions_of(
-    table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
-) -> tuple[Cut, ...]:
-    """Cuts that a program makes on its way, in no order; either: milled up and down, whatever the table says.
-
-    In a corner the feed turns, whatever axis it follows on the straight.
-    """
-    differ = not are_directions_equal(spindle.x, spindle.y) or spindle.principal_directions.sign_patterns[0] is not None
-    return tuple(
-        replace(cut, feed_angle=angle, direction=direction)
-        for cut in machine.engaged_cuts(table)
-        for direction in (MILLING_DIRECTIONS if either and cut.immersion < 1 else (cut.direction,))
-        for angle in _feed_angles_of(table, cut.immersion, differ)
-    )
-
-
-def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:
-    """Directions of feed as angles from x (rad): half a turn apart they are alike."""
-    if table.feed != "both" and table.corner_radius_mm is None:
-        return (FEED_ANGLES[table.feed],)
-    if immersion < MAX_OBLIQUE_FEED_IMMERSION or differ:
-        return tuple(i * FEED_ANGLE_STEP for i in range(round(math.pi / FEED_ANGLE_STEP)))
-    return tuple(FEED_ANGLES.values())
-
-
-def are_directions_equal(x: TipModes, y: TipModes) -> bool:
-    """Whether the modes of both directions are the same, as those of a round spindle or a direction taken for both."""
-    if x is None or y is None or len(x) != len(y):
-        return False
-    numbers = np.array([[(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in side] for side in (x, y)])
-    return bool(np.all(np.abs(numbers[1] / numbers[0] - 1) <= EQUAL_DIRECTION_TOLERANCES))
-
-
 N_PROGRAM_SAMPLES = 300
-"""Number of draws: as many stable ones say, with 95 % confidence, that no more than 1 % of the doubt chatters."""
+"""Number of samples: as many stable ones say, with 95 % confidence, that no more than 1 % of the uncertainty
+chatters."""
 ROTATING_SEED = 1
-"""Seed of the draws for the turning spindle."""
+"""Seed of the samples for the rotating spindle."""
 ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
 """Middle and standard deviation of f_n, zeta and K in the cut over those at rest; chosen: plausible, not measured."""
 ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD = 1.0, 0.30
 """Middle and standard deviation of Kt in the cut over that of the table; chosen, as those. The prior of the learning
-begins 10 % higher (`priors.FORCE`), since cuts then correct it; nothing corrects the chance made here."""
+begins 10 % higher (`ROTATING_FORCE_PRIOR`), since cuts then correct it; nothing corrects the chance made here."""
 FREQUENCY_MARGIN, N_MARGIN_SPEEDS = 0.003, 7
-"""Relative distance of the frequency that is looked at beside the doubt of the speed, and number of looks."""
+"""Relative distance of the frequency that is checked beside the uncertainty of the speed, and number of looks."""
 N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
-"""Number of draws, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
+"""Number of samples, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
 MIN_ROTATING_FACTOR = 0.1
 """Least share of its middle that a factor has."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramSamples:
-    """Draws of one program; row 0 is the middle, without any doubt."""
+    """Samples of one program; row 0 is the middle, without any uncertainty."""
 
     rows: MillingRows
-    """All draws, the feed along x."""
+    """All samples, the feed along x."""
     cuts: tuple[Cut, ...]
-    """Cuts that the program makes on its way, the worst first."""
+    """Cuts that the program makes on its path, the worst first."""
     limits: Floats
-    """Deepest stable depth of each in the middle (m)."""
+    """Deepest stable depth of each in the median (m)."""
     piece_factor: int
     """Number of pieces of a turn over those that modes alone ask for."""
     uncertainty: Uncertainty
-    """Doubt that they were drawn from."""
+    """Uncertainty that they were drawn from."""
 
     def growth(self, depth: float | Floats) -> Floats:
-        """Growth from tooth to tooth in the worst of its cuts; negative where stable.
+        """Return the growth rate in the worst cut; negative where stable.
 
-        depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
+        depth in m: one, several (d,) or those of each sample (samples, d). Returns shape (samples, d).
         """
         wanted = np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
@@ -122,9 +73,10 @@ class ProgramSamples:
         )
 
     def critical_growth(self, depth: float) -> Floats:
-        """Growth at a depth (m) in the worst of its cuts, (draws,); of those that surely do not grow that in the first.
+        """Return the growth rate at a depth (m) in the worst cut; clearly stable samples in the first cut only.
 
-        Some draws say how much more there is in each other cut: passed over are those that die away so much faster.
+        Some samples say how much more there is in each other cut: passed over are those that die away this much
+        faster.
         """
         places = np.arange(len(self.rows))
         grown = self._growth_at_depth(np.zeros_like(places), places, depth)
@@ -138,12 +90,12 @@ class ProgramSamples:
         grown[sample] = np.max(np.vstack((grown[sample], others)), axis=0)
         return grown
 
-    def _growth_at_depth(self, cut: NDArray[np.intp], row: NDArray[np.intp], depth: float) -> Floats:
-        """Growth of some draws, each in one of the cuts (k,), at a depth (m), shape (k,)."""
+    def _growth_at_depth(self, cut: Indices, row: Indices, depth: float) -> Floats:
+        """Return the growth rate of some samples, each in one of the cuts (k,), at a depth (m), shape (k,)."""
         return self.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))[:, 0]
 
-    def growth_in_cuts(self, cut: NDArray[np.intp], row: NDArray[np.intp], depths: Floats) -> Floats:
-        """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
+    def growth_in_cuts(self, cut: Indices, row: Indices, depths: Floats) -> Floats:
+        """Return the growth rate of some samples, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
         grown = np.empty(depths.shape)
         angles = np.array([each.feed_angle for each in self.cuts])
         for alike in group_by_engagement(self.cuts):
@@ -154,40 +106,39 @@ class ProgramSamples:
                 grown[here] = growth_rate(rows, depths[here], number)
         return grown
 
-    def __getitem__(self, places: NDArray[np.intp]) -> ProgramSamples:
-        """The draws at some places."""
+    def __getitem__(self, places: Indices) -> ProgramSamples:
         return replace(self, rows=self.rows[places])
 
     def with_lowest_cuts(self, below: float, most: int | None = None) -> ProgramSamples:
-        """The cuts with a limit up to a depth (m) alone, at most so many; the worst stays."""
+        """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
         wanted[0] = True
         return self.with_cuts(wanted)
 
-    def with_cuts(self, wanted: NDArray[np.bool_]) -> ProgramSamples:
-        """The cuts at some places alone; the worst where it is none of them."""
+    def with_cuts(self, wanted: Flags) -> ProgramSamples:
+        """Select some cuts; the worst if there is none."""
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
 
-    def median_growth_near(self, depth: float, fall: float = 0.0, apart: float = 1.0) -> Floats:
-        """Largest growth of the middle in each cut at a depth (m), as far as speed and frequency may be off.
+    def median_growth_near(self, depth: float, drop: float = 0.0, apart: float = 1.0) -> Floats:
+        """Return the largest median growth of each cut at a depth (m) within the uncertainty of speed and frequency.
 
         fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
         slower and faster, that counts too. Shape (cuts,).
         """
         beside = self.uncertainty.speed + FREQUENCY_MARGIN
-        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - fall)
-        middle = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
+        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - drop)
+        median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
         cut, row = np.divmod(np.arange(len(self.cuts) * N_MARGIN_SPEEDS), N_MARGIN_SPEEDS)
-        grown = middle.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
+        grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
         return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
 
     def scale(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramSamples:
-        """The same draws with speed, frequencies and stiffnesses times these factors."""
+        """Scale speed, frequencies and stiffnesses of all samples."""
         return self.sweep(np.array([speed]), np.array([frequency]), np.array([stiffness]))
 
     def sweep(self, speed: Floats, frequency: Floats | float = 1.0, stiffness: Floats | float = 1.0) -> ProgramSamples:
-        """All draws at each of several factors (k,) after the other, k times as many."""
+        """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
         speeds, frequencies, stiffnesses = (np.repeat(factor, len(self.rows)) for factor in factors)
@@ -200,13 +151,8 @@ class ProgramSamples:
         return replace(self, rows=changed)
 
 
-def build_program(table: ProgramTable, machine: Machine) -> Program:
-    """A program in SI units."""
-    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-
-
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
-    """The program without any doubt, the feed along x; axes: of its modes (n, 2), None: the first that may be."""
+    """Build the median system, the feed along x; axes: of its modes (n, 2), None: the first sign pattern."""
     vectors = assembly.principal_directions.sign_patterns[0] if axes is None else axes
     return rows_at_speeds(
         build_milling_system(assembly.x, assembly.y, vectors), program.cut, np.array([program.speed_rpm])
@@ -214,7 +160,7 @@ def build_median_row(program: Program, assembly: Assembly, axes: Floats | None =
 
 
 class WorstLimit(NamedTuple):
-    """Limit of a program in the middle of its doubt, with the axes that are worst of those that may be."""
+    """Limit of a program in the median of its uncertainty, with the axes that are worst of those that may be."""
 
     limit: ProgramLimit
     """The lowest limit."""
@@ -224,59 +170,56 @@ class WorstLimit(NamedTuple):
     """The highest limit over the lowest: over the open signs, and with modes along x and y; 1 where nothing is open."""
 
 
-def find_worst_limit(program: Program, assembly: Assembly, cuts: Sequence[Cut]) -> WorstLimit:
-    """The lowest limit of the cuts that a program makes on its way, over what is open of the signs of the axes."""
-    axes = assembly.principal_directions
+def find_worst_limit(case: ProgramCase) -> WorstLimit:
+    """Find the lowest limit over all cuts of a program and all open signs of the principal directions."""
+    spindle, axes = case.spindle, case.spindle.principal_directions
     patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
-    limits = [program_limit(program, assembly.x, assembly.y, cuts, vectors) for vectors in patterns]
+    limits = [program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
     worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    deepest = MAX_PROGRAM_DEPTH_RATIO * program.depth
+    deepest = MAX_PROGRAM_DEPTH_RATIO * case.depth
     depths = [min(limit.limit, deepest) for limit in limits]
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
 
 
-def find_likely_axes(program: Program, assembly: Assembly, cuts: Sequence[Cut], doubt: Uncertainty) -> Floats | None:
-    """Axes that are likely to have the lowest limit: those in which the program grows most at its depth."""
-    patterns = assembly.principal_directions.sign_patterns
+def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:
+    """Find the principal directions in which a program grows most at its depth."""
+    patterns = case.spindle.principal_directions.sign_patterns
     if len(patterns) == 1:
         return patterns[0]
-    rows = reduce(join_rows, (build_median_row(program, assembly, axes) for axes in patterns))
-    middles = ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
-    return patterns[int(np.argmax(middles.growth(program.depth)))]
+    rows = reduce(join_rows, (build_median_row(program, case.spindle, axes) for axes in patterns))
+    return patterns[int(np.argmax(_unlimited_samples(case, rows).growth(program.depth)))]
 
 
-def draw_likely_samples(
-    program: Program, cuts: Sequence[Cut], assembly: Assembly, doubt: Uncertainty
-) -> ProgramSamples:
-    """The draws of a program whose limit nobody knows yet, with `find_likely_axes`, its cuts in no order."""
-    middle = build_median_row(program, assembly, find_likely_axes(program, assembly, cuts, doubt))
-    rows = join_rows(middle, doubt.sample(middle, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
+def _unlimited_samples(case: ProgramCase, rows: MillingRows) -> ProgramSamples:
+    """Build the samples of a program with unknown limits."""
+    return ProgramSamples(rows, case.cuts, np.full(len(case.cuts), np.inf), 1, case.uncertainty)
 
 
-def draw_samples(
-    program: Program,
-    limit: ProgramLimit,
-    cuts: Sequence[Cut],
-    assembly: Assembly,
-    doubt: Uncertainty,
-    axes: Floats | None = None,
-) -> ProgramSamples:
-    """The draws of a program; limit: that in the middle of the doubt, with modes along axes (n, 2)."""
-    middle, limits = build_median_row(program, assembly, axes), np.array(limit.limits)
+def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
+    """Sample the samples of a program with unknown limits, in the principal directions that are likely the worst.
+
+    program: the case at another speed and depth, in SI units.
+    """
+    median = build_median_row(program, case.spindle, _find_likely_axes(case, program))
+    return _unlimited_samples(case, join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
+
+
+def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = None) -> ProgramSamples:
+    """Sample the samples of a program from its median limit, with modes along axes (n, 2)."""
+    median, limits = build_median_row(case.program, case.spindle, axes), np.array(limit.limits)
     order = np.argsort(limits)
-    finer = max(limit.pieces // int(count_pieces(middle, MAX_PROGRAM_DEPTH_RATIO * program.depth)[0]), 1)
-    rows = join_rows(middle, doubt.sample(middle, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(cuts[place] for place in order), limits[order], finer, doubt)
+    finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)
+    rows = join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES))
+    return ProgramSamples(rows, tuple(case.cuts[place] for place in order), limits[order], finer, case.uncertainty)
 
 
-def draw_rotating_samples(draws: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
-    """The draws with what may differ between a spindle at rest and one in the cut, alike in all modes of a draw."""
-    rows, random = draws.rows, np.random.default_rng(seed)
+def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
+    """Vary the samples by plausible differences between a spindle at rest and one that cuts."""
+    rows, random = samples.rows, np.random.default_rng(seed)
     frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
 
-    def factor(middle: float, spread: float, normal: Floats) -> Floats:
-        return np.asarray(np.maximum(middle * (1 + spread * normal), MIN_ROTATING_FACTOR * middle)[:, np.newaxis])
+    def factor(median: float, spread: float, normal: Floats) -> Floats:
+        return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
     push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
     changed = replace(
@@ -287,4 +230,4 @@ def draw_rotating_samples(draws: ProgramSamples, seed: int = ROTATING_SEED) -> P
         tangential=rows.tangential * push,
         radial=rows.radial * push,
     )
-    return replace(draws, rows=changed)
+    return replace(samples, rows=changed)

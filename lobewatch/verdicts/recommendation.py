@@ -17,6 +17,7 @@ from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_remarks import missing_tool_remarks
 from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
@@ -26,31 +27,44 @@ from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, fin
 
 @dataclass(frozen=True)
 class Advice:
-    """What goes beyond the word."""
+    """What goes beyond the verdict."""
 
     best: Setting | None = None
-    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the most chips per
-    time. None where the program is stable, nothing is safe, or nothing can be said."""
+    """Setting to go to: at the program's depth, the nearest window of speeds; where there is none, the largest
+    removal rate per time. None where the program is stable, nothing is safe, or nothing can be said."""
     deepest_here: Setting | None = None
     """Deepest cut at the program's own speed, where `best` has another depth."""
     tolerable_drop: float = math.nan
-    """Tolerable fall of the frequency in the middle of the doubt, relative; 0 where it is not stable now, inf where
-    nothing happens down to 80 %, NaN where the program could not be checked."""
+    """Tolerable frequency drop in the median estimate, relative; 0 where it is not stable now, inf where nothing
+    happens down to 80 %, NaN where the program could not be checked."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what the decay rests on, and what would have to be known of the tool."""
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
-    """Advice beside a verdict; empty where it is unknown."""
-    tool, draws = verdict.assembly, verdict.samples
-    if tool is None or draws is None:
+    """Advise on a program: settings to use instead, and the tolerable frequency drop.
+
+    Parameters
+    ----------
+    verdict
+        Verdict on the program.
+    machine
+        Machine with its speeds, drive and tap interval.
+
+    Returns
+    -------
+    Advice
+        Advice; empty if the verdict is unknown.
+    """
+    tool, samples = verdict.assembly, verdict.samples
+    if tool is None or samples is None:
         return Advice()
     stiffness_at, remark = model_softening(tool)
-    decay = find_tolerable_drop(draws, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.is_stable else 0.0
+    decay = find_tolerable_drop(samples, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.is_stable else 0.0
     remarks = (remark,) if verdict.is_stable else ()
     if verdict.stability is Stability.STABLE or not is_compliance_known(verdict.program, tool):
         return Advice(tolerable_drop=decay, remarks=remarks)
-    search, program = SettingSearch(verdict.program, tool, machine, verdict.at_speed), verdict.program
+    search, program = SettingSearch(ProgramCase(verdict.program, tool, machine, verdict.at_speed)), verdict.program
     remarks = (*remarks, *missing_tool_remarks(program, search.cut_range.limits))
     elsewhere = search.nearest_window(program.depth_mm, program.speed_rpm)
     if elsewhere is not None:
@@ -61,19 +75,34 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
 def find_stable_pockets(
     table: CutTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = NO_TEST_CUTS, count: int = 3
 ) -> list[Setting]:
-    """Speeds and depths that would be called stable with depth to spare, the largest removal rate first.
+    """Find settings that would be called stable with depth to spare, the largest removal rate first.
 
-    The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
-    range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
+    Parameters
+    ----------
+    table
+        Program or reference cut; its own speed and depth do not count.
+    assembly
+        Tool as tapped.
+    machine
+        Machine with its speeds, drive and tap interval.
+    at_speed
+        Spindle at speed, as learned from test cuts.
+    count
+        Largest number of settings.
+
+    Returns
+    -------
+    list of Setting
+        Settings in different stable pockets; empty if none is stable, a direction was not tapped or is in question.
     """
     if not is_compliance_known(table, assembly):
         return []
     program = build_cut_program(at_speed.apply_coefficients(table), assembly.tool, machine)
-    return SettingSearch(program, assembly, machine, at_speed).pockets(count)
+    return SettingSearch(ProgramCase(program, assembly, machine, at_speed)).pockets(count)
 
 
 def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
-    """A cut as a program of a tool, at any speed and depth where it has none: no search rests on them."""
+    """Build a program from a cut; speed and depth are placeholders."""
     if isinstance(table, ProgramTable):
         return table
     place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
@@ -87,7 +116,7 @@ CUT_REMEDIES = (
     "another tool: a thicker one, or with fewer teeth",
     "a smaller radial depth",
 )
-"""What makes a cut safe that is not, in words."""
+"""What makes a cut safe that is not, in verdicts."""
 TOOL_SPEED_REMEDIES = (
     "a smaller diameter",
     "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
@@ -132,9 +161,9 @@ class Recommendation:
     alternatives: tuple[Alternative, ...] = ()
     """Settings beside it, two at most."""
     feed_mm: tuple[float, float] | None = None
-    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    """Least and greatest feed per tooth (mm): its own, else the tool limits; None where neither is known."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what it rests on, and on what is not known of the tool."""
+    """Remarks on what it rests on, and on the uncertainty of the tool."""
 
 
 def recommend(
@@ -147,19 +176,19 @@ def recommend(
     present_rpm: float | None = None,
     is_set: bool = False,
 ) -> Recommendation:
-    """The setting of most chips, at a depth where one is asked for; it would be called stable when it is entered.
+    """Recommend the setting of the largest removal rate, at a given depth if there is one.
 
     table: the cut, whose own speed and depth do not count; either: it may be milled up or down, the worse counts;
     present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
     """
     if isinstance(tool, DataError):
-        tap = f"tap it: lobewatch tap MACHINE --tool {shlex.quote(table.tool)}"
+        tap = f"tap it: TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
     if gap := _find_gap(table, tool, machine):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
     if too_fast := _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=too_fast[0], remedies=too_fast[1:])
-    search = SettingSearch(at_speed.apply_coefficients(table), tool, machine, at_speed, either)
+    search = SettingSearch(ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed, either))
     if is_set and present_rpm is not None:
         setting = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     else:
@@ -173,7 +202,7 @@ def recommend(
 
 
 def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
-    """Why nothing can be called safe at any speed and depth, and what to do; empty where it can be."""
+    """Return why nothing can be called stable at any setting, and the remedies; empty if it can."""
     asked = find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0)
     asked = [doubted for doubted in asked if doubted.key not in REQUESTED_KEYS]
     if asked:
@@ -182,7 +211,7 @@ def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[st
 
 
 def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
-    """Why no speed of the spindle is one that the tool bears, and what would change it; empty where one is."""
+    """Return why no spindle speed is within the tool limits, and the remedies; empty if one is."""
     speed, limits = reach.machine.speed, reach.limits
     if not reach.is_empty:
         return ()
@@ -196,26 +225,26 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
 def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
-    """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
-    judgement = search.results[setting.speed_rpm, setting.depth_mm]
+    """Build the recommendation of a setting, evaluated as a program."""
+    case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
     at = {
         "speed_rpm": setting.speed_rpm,
         "depth_mm": setting.depth_mm,
-        "direction": judgement.samples.cuts[0].direction,
+        "direction": result.samples.cuts[0].direction,
     }
     program = msgspec.structs.replace(table, **at)
-    verdict = evaluate_program(program, search.assembly, search.machine, search.at_speed, judgement)
+    verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
-        return Recommendation(table, search.any_direction, reason=reason, alternatives=others)
+        return Recommendation(table, search.case.any_direction, reason=reason, alternatives=others)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
     return Recommendation(
-        program, search.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
+        program, search.case.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
     )
 
 
 def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
-    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    """Return the range of feed per tooth (mm): of the program, else of the tool, else None."""
     own, borne = table.feed_per_tooth_mm, search.cut_range.limits.feed_per_tooth_mm
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
@@ -236,7 +265,7 @@ def _list_alternatives(
 def _explain_no_setting(
     search: SettingSearch, depth_mm: float | None, set_rpm: float | None
 ) -> tuple[str, tuple[str, ...]]:
-    """What there is not, and what would change that."""
+    """Explain why there is no setting, with remedies."""
     if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
         return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES
     if set_rpm is not None:
@@ -246,10 +275,10 @@ def _explain_no_setting(
 
 
 def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
-    """What would make it safe: what settles the doubt first, where that alone stands in the way."""
+    """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])
-    probe = msgspec.structs.replace(search.table, speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)
-    verdict = evaluate_program(probe, search.assembly, search.machine, search.at_speed)
+    probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)
+    verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))
+    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))

@@ -1,7 +1,7 @@
 """Estimate the safe depth over speed from few samples, before a setting is evaluated.
 
-Zero order narrows; where it is not exact, the multipliers of the middle of the doubt are looked at at coarser speeds,
-so that what it does not see (low immersion, flip) counts. Nothing is judged yet.
+Zero order narrows; where it is not exact, the multipliers of the median estimate are checked at coarser speeds, so
+that what it does not see (low immersion, flip) counts. Nothing is evaluated yet.
 """
 
 from __future__ import annotations
@@ -13,36 +13,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, sweep_extremes
-from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR as ROOM
-from lobewatch.verdicts.uncertainty import Uncertainty
+from lobewatch.verdicts.setting_robustness import (
+    MIN_DEPTH_MARGIN,
+    ROBUST_DEPTH_FACTOR,
+    ROBUST_SPEED_FACTOR,
+    sweep_extremes,
+)
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
-"""Number of draws that grow most at the depth that is likely ..."""
+"""Number of samples that grow most at the depth that is likely ..."""
 N_FLEXIBLE_SAMPLES = 8
 """... and of those with the largest force on the most flexible mode, whatever grows there."""
 N_CRITICAL_FEEDS = 2
-"""Number of directions of feed, the worst around the speed, in which they are looked at."""
+"""Number of directions of feed, the worst around the speed, in which they are checked."""
 CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
 """Shares of a depth at which they are."""
 DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
-"""Shares of the step between two of these, one calm and one not, at which they are once more."""
+"""Shares of the step between two of these, one stable and one not, at which they are once more."""
 DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
-"""Factor of the depth up to which is looked, where all of it is calm, and where hardly any of it is ..."""
+"""Factor of the depth up to which is looked, where all of it is stable, and where hardly any of it is ..."""
 MIN_SEARCHED_DEPTH = 1e-5
 """... down to this (m)."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +52,14 @@ class CriticalSamples:
     """A cut at one speed."""
 
     likely_depth: float
-    """Depth that is likely (m): the scale of what is looked at."""
+    """Depth that is likely (m): the scale of what is checked."""
     samples: ProgramSamples
-    """All draws at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth to spare."""
-    likely_first: NDArray[np.intp]
+    """All samples at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth of
+    margin."""
+    likely_first: Indices
     """Places of the few that are likely the first to chatter."""
     chattered: frozenset[int] = frozenset()
-    """Draws that count too since they have chattered elsewhere."""
+    """Samples that count too since they have chattered elsewhere."""
 
     @property
     def selected(self) -> ProgramSamples:
@@ -65,7 +68,7 @@ class CriticalSamples:
         return self.samples[np.union1d(self.likely_first, more)]
 
     def deepest_stable(self, most: float) -> float:
-        """The deepest up to a depth at which, and below which, all that count are stable with depth to spare (m)."""
+        """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth margin."""
         few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
         while calm == depth < ROBUST_DEPTH_FACTOR * most:
@@ -77,7 +80,7 @@ class CriticalSamples:
         return calm / ROBUST_DEPTH_FACTOR
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
-        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,).
+        """Return the largest growth of the selected samples at relative speeds and depths (m) (k,).
 
         In the worst direction of feed: it says where to look, no more.
         """
@@ -87,43 +90,37 @@ class CriticalSamples:
 
 
 def select_critical_samples(
-    program: Program,
-    cuts: Sequence[Cut],
-    spindle: Assembly,
-    doubt: Uncertainty,
-    fall: float,
-    stiffness_at: StiffnessAt,
-    spare: float,
+    case: ProgramCase, program: Program, drop: float, stiffness_at: StiffnessAt
 ) -> CriticalSamples:
-    """Those of a program (SI), with all cuts on its way, at its speed; its depth is what is likely.
+    """Select the samples that are likely the first to chatter, now or after a frequency drop.
 
-    spare: depth to spare in the middle of the doubt, relative.
+    program: the case at one speed and the depth that is likely safe.
     """
-    drawn = draw_likely_samples(program, cuts, spindle, doubt)
-    order = np.argsort(-drawn.median_growth_near(program.depth, fall, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
-    drawn = replace(drawn, cuts=tuple(cuts[place] for place in order), limits=drawn.limits[order])
-    aged = sweep_extremes(drawn, fall, stiffness_at)
+    likely = draw_likely_samples(case, program)
+    order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
+    aged = sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
-    middle = drawn.rows[np.zeros(1, dtype=np.intp)]
-    push = (1 + spare) / ROBUST_DEPTH_FACTOR
-    middle = replace(middle, tangential=push * middle.tangential, radial=push * middle.radial)
+    median = likely.rows[np.zeros(1, dtype=np.intp)]
+    push = (1 + MIN_DEPTH_MARGIN) / ROBUST_DEPTH_FACTOR
+    median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     first = np.concatenate(
         (np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES], [grown.size])
     )
-    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, middle)), np.unique(first))
+    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, median)), np.unique(first))
 
 
-def find_deepest_stable(draws: ProgramSamples, most: float) -> float:
-    """The deepest up to a depth (m) at which, and below which, all draws are stable (m); 0 where it is hardly any."""
+def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
+    """Return the deepest depth (m) up to `most` at which all samples are stable; 0 if there is hardly any."""
     depths = most * CRITICAL_DEPTH_SHARES
-    grown = np.max(draws.growth(depths), axis=0)
+    grown = np.max(samples.growth(depths), axis=0)
     if np.all(grown < 0):
         return most
     first = int(np.argmax(grown >= 0))
     low = float(depths[first - 1]) if first else 0.0
     between = low + (depths[first] - low) * DEPTH_BRACKET_SHARES
-    finer = np.max(draws.growth(between), axis=0)
+    finer = np.max(samples.growth(between), axis=0)
     depth = np.concatenate(([low], between, [depths[first]]))
     value = np.concatenate(([grown[first - 1] if first else -np.inf], finer, [grown[first]]))
     bad = int(np.argmax(value >= 0))
@@ -135,17 +132,18 @@ def find_deepest_stable(draws: ProgramSamples, most: float) -> float:
 LIKELY_SPEED_STEP = 0.002
 """Relative step of the speeds."""
 COARSE_SPEED_STEPS = 6
-"""Steps between two speeds at which the multipliers are looked at ..."""
+"""Steps between two speeds at which the multipliers are checked ..."""
 TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
 """... and shares of the limit by zero order at which they are ..."""
 FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
 """... and of the way from the last of these to the deepest that matters, where none of them chatters."""
 N_LIKELY_FEEDS = 2
-"""Number of directions of feed, those that zero order has as the worst at a speed, in which they are."""
+"""Number of directions of feed, those that zero-order approximation has as the worst at a speed, in which they are."""
 MIN_REMOVAL_SHARE = 0.75
-"""Share of the most chips that zero order has, as many of which must be thinkable at a speed for a look."""
+"""Share of the largest removal rate that zero-order approximation has, as many of which must be thinkable at a speed
+for a look."""
 MAX_DEPTH_FACTOR = 1.3
-"""Limits beyond so many times the deepest that may be cut, with all to spare, are not told apart."""
+"""Limits beyond this many times the deepest that may be cut, with all of margin, are not told apart."""
 LIKELY_FREQUENCY_MARGIN = 0.003
 """Relative distance of the frequency that is counted on beside speed and fall."""
 MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
@@ -164,11 +162,11 @@ class LikelyDepths:
     """Depth (mm) likely to be safe there, no deeper than tool and drive allow, shape (n,)."""
 
     def window_centers(self, depth_mm: float) -> list[float]:
-        """The middle (rpm) of each window of speeds at which a depth (mm) is likely."""
+        """Return the center (rpm) of each speed window in which a depth (mm) is likely safe."""
         return [float(self.speeds[run[run.size // 2]]) for run in _split_runs(self.depths >= depth_mm)]
 
     def removal_peaks(self, count: int) -> list[tuple[float, float]]:
-        """Speeds (rpm) and depths (mm) with more chips than beside them, the most first; then others apart."""
+        """Return speeds (rpm) and depths (mm) of local maxima of the removal rate, then of others apart."""
         chips = np.pad(self.depths * self.speeds, 1)
         tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
         order = np.argsort(-chips[1:-1], kind="stable")
@@ -183,29 +181,28 @@ class LikelyDepths:
         return [(float(self.speeds[place]), float(self.depths[place])) for place in taken[:count]]
 
     def is_same_pocket(self, first: float, second: float) -> bool:
-        """Whether nearly as much is likely all the way between two speeds (rpm): they lie in one pocket."""
+        """Return whether the likely depth between two speeds (rpm) stays nearly as large: one pocket."""
         ends = np.searchsorted(self.speeds, sorted((first, second)))
         between = self.depths[ends[0] : ends[1] + 1]
         return between.size < 2 or bool(np.min(between) >= POCKET_VALLEY_SHARE * min(between[0], between[-1]))
 
 
-def estimate_likely_depths(
-    reach: CutRange, cuts: Sequence[Cut], spindle: Assembly, doubt: Uncertainty, fall: float, spare: float
-) -> LikelyDepths:
-    """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
+def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> LikelyDepths:
+    """Estimate the safe depth over speed within the uncertainty, now and after a frequency drop.
 
-    cuts: all that the program makes on its way; spare: depth to spare in the middle of the doubt at least.
+    cuts: all that the program makes on its path; spare: depth margin in the median estimate at least.
     """
+    cuts, spindle, uncertainty = case.cuts, case.spindle, case.uncertainty
     number = max(int(math.log(reach.high_rpm / reach.low_rpm) / LIKELY_SPEED_STEP), 1)
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
     by_cut = (
         np.array([lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts])
         * 1e3
     )
-    deepest, safe = reach.depth_limits(speeds), max(doubt.tangential.high, 1 + spare)
+    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    beside = doubt.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROOM)
-    steps, ahead = math.ceil((beside + fall / 2) / LIKELY_SPEED_STEP), round(fall / 2 / LIKELY_SPEED_STEP)
+    beside = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    steps, ahead = math.ceil((beside + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:
         lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
@@ -223,11 +220,11 @@ def estimate_likely_depths(
 
 
 def _limits_by_multipliers(
-    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: NDArray[np.bool_]
+    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
 ) -> Floats:
-    """Limits (mm) by multipliers, up to a depth (mm) (n,), where wanted (n,), between few speeds; else by zero order.
+    """Return limits (mm) by multipliers where wanted (n,), interpolated; else by the zero-order approximation.
 
-    by_cut: limits by zero order (cuts, n).
+    by_cut: limits by the zero-order approximation (cuts, n).
     """
     places = np.unique(np.append(np.arange(0, speeds.size, COARSE_SPEED_STEPS), speeds.size - 1))
     places = places[wanted[places]]
@@ -245,9 +242,9 @@ def _limits_by_multipliers(
 
 
 def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
-    """Depth (mm) (r,) at which growth first reaches zero, on a line between looks; inf where it does not.
+    """Return the depth (mm) (r,) at which growth first reaches zero, or inf.
 
-    mean: limit by zero order (mm) (r,); most: depth up to which it matters.
+    mean: limit by the zero-order approximation (mm) (r,); most: depth up to which it matters.
     """
     ends = np.minimum(mean * TRIED_ZERO_ORDER_SHARES[-1], most)[:, np.newaxis]
     tried = np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis])
@@ -259,7 +256,7 @@ def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
 
 
 def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
-    """The same between depths (mm) (r, d)."""
+    """Interpolate the first zero of growth between depths (mm) (r, d)."""
     if not depths.size:
         return np.empty(0)
     grown = growth_rate(rows, depths / 1e3, count_pieces(rows, float(np.max(depths)) / 1e3, COARSE_CYCLES_PER_PIECE))
@@ -271,8 +268,8 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
     return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
 
 
-def _split_runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Places without a gap between them."""
-    places: NDArray[np.intp] = np.flatnonzero(wanted)
-    runs: Sequence[NDArray[np.intp]] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+def _split_runs(wanted: Flags) -> list[Indices]:
+    """Split into runs of consecutive places."""
+    places: Indices = np.flatnonzero(wanted)
+    runs: Sequence[Indices] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     return [run for run in runs if run.size]

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
@@ -31,48 +31,48 @@ class Setting:
     window_rpm: tuple[float, float]
     """Slowest and fastest speed around it at which the depth would be called stable too."""
     depth_margin: float
-    """Limit in the middle of the doubt over depth, less 1."""
+    """Limit in the median estimate over depth, less 1."""
     drop_margin: float
-    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+    """Frequency drop that it stands, relative, and is still called stable; 0.1 stands for that and more."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
-"""Relative step of a window of speeds, most steps on each side, and parts in which they are looked at."""
+"""Relative step of a window of speeds, most steps on each side, and parts in which they are checked."""
 ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
 """Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
 ROBUST_DEPTH_FACTOR = 1.05
 """Factor of the depth up to which it must be ..."""
+MIN_DEPTH_MARGIN = 0.20
+"""Depth that a recommended setting has of margin in the median estimate."""
 MIN_ROBUST_DROP = 0.01
 """... and fall of the frequency that it must stand at least."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
-"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
-
-Floats = NDArray[np.float64]
+"""Frequency drop that a setting is checked with; more than the last is not told apart."""
 
 
-def sweep_extremes(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws at the slower speed, then after the fall: the ends of what must be safe."""
-    return _sweep_speeds_and_drops(draws, [1 / ROBUST_SPEED_FACTOR, 1], [0, fall], stiffness_at)
+def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+    """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
+    return _sweep_speeds_and_drops(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
 
 
-def sweep_neighborhood(draws: ProgramSamples, fall: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """All draws at these ends, after half of the fall, and at the faster speed."""
+def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
+    """Sweep all samples over both speeds, the frequency drop and half of it."""
     return _sweep_speeds_and_drops(
-        draws, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, fall, fall / 2, 0], stiffness_at
+        samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at
     )
 
 
 def _sweep_speeds_and_drops(
-    draws: ProgramSamples, speeds: list[float], falls: list[float], stiffness_at: StiffnessAt
+    samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness_at: StiffnessAt
 ) -> ProgramSamples:
-    stiffness = np.array([stiffness_at(fall) for fall in falls])
-    return draws.sweep(np.array(speeds), 1 - np.array(falls), stiffness)
+    stiffness = np.array([stiffness_at(drop) for drop in drops])
+    return samples.sweep(np.array(speeds), 1 - np.array(drops), stiffness)
 
 
 def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
-    """Slowest and fastest speed (rpm) around one up to which a depth (m) is safe on all draws."""
+    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
     steps = np.arange(MAX_WINDOW_STEPS + 1.0)
     slow, fast = (
         _last_stable_ratio(near, hardest, np.power(1 + WINDOW_SPEED_STEP, sign * steps), depth) for sign in (-1, 1)
@@ -84,7 +84,7 @@ def find_speed_window(
 
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
-    """Fall of the frequency, relative, up to which a depth (m) is safe on these draws."""
+    """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
     grown = _sweep_speeds_and_drops(
         hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at
     ).critical_growth(depth)
@@ -92,7 +92,7 @@ def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: Stiffn
 
 
 def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Floats, depth: float) -> float:
-    """The last of these speeds, over the present one, which is the first, up to which all draws are stable."""
+    """Return the last relative speed up to which all samples are stable."""
     last = 0
     for steps in np.array_split(np.arange(1, ratio.size), N_WINDOW_PARTS):
         grown = hardest.sweep(ratio[steps]).critical_growth(depth).reshape(steps.size, -1)
@@ -105,7 +105,7 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
 
 
 def _last_stable_row(grown: Floats) -> int:
-    """Row up to which all of growth (k, draws) is negative from the first on."""
+    """Return the row up to which all of growth (k, samples) is negative from the first on."""
     calm = np.all(grown < 0, axis=1)
     return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
 
@@ -117,10 +117,10 @@ DEFAULT_NEEDED_DROP = 0.02
 
 
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
-    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
+    """Return the frequency drop that a recommended setting must tolerate: two tap intervals at the rate so far."""
     days = N_TAP_INTERVALS * machine.machine.tap_interval_days
-    falls = [expected_frequency_drop(series, days) for series in assembly.series.values()]
+    drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
     return max(
-        (DEFAULT_NEEDED_DROP if fall is None else max(fall, MIN_ROBUST_DROP) for fall in falls),
+        (DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops),
         default=DEFAULT_NEEDED_DROP,
     )

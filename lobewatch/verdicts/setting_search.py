@@ -1,9 +1,9 @@
-"""The one search for settings that would be called stable, with something to spare: advice, pockets, recommendations.
+"""The one search for settings that would be called stable, with something of margin: advice, pockets, recommendations.
 
-Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`CriticalSamples`). What
-is recommended has been judged like any program: `run_monte_carlo` finds it stable throughout, and the same draws are stable
-around it and as the spindle will be when it is tapped again (`room`). Where no speed of the grid has such a depth,
-nothing is recommended.
+Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few samples how deep
+(`CriticalSamples`). What is recommended has been evaluated like any program: `run_monte_carlo` finds it stable
+throughout, and the same samples are stable around it and as the spindle will be when it is tapped again (`room`).
+Where no speed of the grid has such a depth, nothing is recommended.
 """
 
 from __future__ import annotations
@@ -13,17 +13,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from lobes import Cut, Program
-from lobewatch.machine import Machine, ProgramTable
+from lobes import Program
+from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
 from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
 from lobewatch.verdicts.safe_depth_estimates import (
     CriticalSamples,
     LikelyDepths,
@@ -32,6 +30,7 @@ from lobewatch.verdicts.safe_depth_estimates import (
     select_critical_samples,
 )
 from lobewatch.verdicts.setting_robustness import (
+    MIN_DEPTH_MARGIN,
     ROBUST_DEPTH_FACTOR,
     ROBUST_SPEED_FACTOR,
     Setting,
@@ -40,101 +39,71 @@ from lobewatch.verdicts.setting_robustness import (
     find_speed_window,
     sweep_neighborhood,
 )
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty import Uncertainty, uncertainty_of
 
-MIN_DEPTH_MARGIN = 0.20
-"""Depth that a recommended setting has to spare in the middle of the doubt."""
 MAX_DEPTH_MARGIN = 20.0
-"""Depth to spare that stands for more too, and for no limit: no deeper is looked."""
+"""Depth margin that stands for more too, and for no limit: no deeper is looked."""
 MAX_SEARCHED_SPEEDS = 12
-"""Number of speeds that few draws are looked at at before it is said that there is none."""
+"""Number of speeds that few samples are checked at before it is said that there is none."""
 PROMISING_FACTOR = 1.1
-"""A speed is looked at where the depth that is likely times this, and times the largest share of such a depth that few
-draws have left elsewhere, would be more chips than are known of."""
+"""A speed is checked where the depth that is likely times this, and times the largest share of such a depth that few
+samples have left elsewhere, would be a larger removal rate than are known of."""
 NEIGHBOR_SPEED_STEPS = np.concatenate(
     [sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)]
 )
-"""Relative distances of speeds that are looked at beside that of most chips ..."""
+"""Relative distances of speeds that are checked beside that of largest removal rate ..."""
 N_CLIMBS = 2
 """... and number of times that they are."""
 MIN_FAILED_SPEEDS = 3
-"""Number of speeds judged in vain that say what is left at others of their pocket."""
+"""Number of speeds evaluated in vain that say what is left at others of their pocket."""
 TRIES_PER_SPEED, MAX_SETTING_TRIES = 4, 12
-"""Number of depths that are judged at one speed, and at all of them."""
+"""Number of depths that are evaluated at one speed, and at all of them."""
 NEARLY_SAFE_SHARE = 0.85
-"""Share of a depth that is wanted, where so much is likely it may be safe too."""
+"""Share of a depth that is wanted, where this much is likely it may be safe too."""
 MAX_REMEMBERED_SAMPLES = 8
-"""Draws of each judgement that are remembered where they chatter."""
+"""Samples of each result that are remembered where they chatter."""
 NEXT_DEPTH_SHARE = 0.98
-"""Share of a depth, at least as much less of which is looked at where draws chatter."""
+"""Share of a depth, at least as much less of which is checked where samples chatter."""
 N_WINDOW_SAMPLES = 24
-"""Number of draws, the hardest, that bound a window before all of them decide."""
+"""Number of samples, the hardest, that bound a window before all of them decide."""
 
-Floats = NDArray[np.float64]
 DepthsBySpeed = dict[float, float]
 """Depths (mm) that may be safe, by speeds (rpm)."""
 SharesBySpeed = dict[float, float]
-"""Shares that all draws left of the depths that few allowed, by speeds (rpm) that were judged in vain."""
+"""Shares that all samples left of the depths that few allowed, by speeds (rpm) that were evaluated in vain."""
 
 
 @dataclass(frozen=True, eq=False)
 class SettingSearch:
-    """Looking for settings of one cut with a tool that is surely known."""
+    """Search for settings of one cut with a tool that is surely known."""
 
-    table: ProgramTable
-    """Cut, with the coefficients that were learnt; its own speed and depth do not count."""
-    assembly: Assembly
-    """Tool as tapped."""
-    machine: Machine
-    """Machine, with its speeds, its drive and its tap interval."""
-    at_speed: SpindleAtSpeed = NO_TEST_CUTS
-    """Spindle as test cuts have taught it."""
-    any_direction: bool = False
-    """Direction left open: milled up or down, the worse counts."""
+    case: ProgramCase
+    """Program and tool; the speed and depth of the program do not count."""
     critical: dict[float, CriticalSamples] = field(default_factory=dict)
-    """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
+    """Few samples by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
-    """Draws that have chattered where few others made it seem safe."""
+    """Samples that have chattered where few others made it seem safe."""
     results: dict[tuple[float, float], MonteCarloResult] = field(default_factory=dict)
-    """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
-
-    @cached_property
-    def spindle(self) -> Assembly:
-        """The tool in the middle of what was learnt."""
-        return self.at_speed.scale_modes(self.assembly)
+    """Results of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def cut_range(self) -> CutRange:
         """Speeds and depths that may be recommended."""
-        return CutRange.of(self.machine, self.table)
-
-    @cached_property
-    def cuts(self) -> tuple[Cut, ...]:
-        """Cuts that it makes on its way."""
-        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
+        return CutRange.of(self.case.machine, self.case.table)
 
     @cached_property
     def needed_drop(self) -> float:
-        """Fall of the frequency that a setting must stand, relative."""
-        return find_needed_drop(self.assembly, self.machine)
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """What is not known."""
-        return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
+        """Frequency drop that a setting must stand, relative."""
+        return find_needed_drop(self.case.assembly, self.case.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
-        """Stiffness over that of now by the fall of the frequency."""
-        return model_softening(self.assembly)[0]
+        """Stiffness over that of now by the frequency drop."""
+        return model_softening(self.case.assembly)[0]
 
     @cached_property
     def likely_depths(self) -> LikelyDepths:
         """Where to look."""
-        return estimate_likely_depths(
-            self.cut_range, self.cuts, self.spindle, self.uncertainty, self.needed_drop, MIN_DEPTH_MARGIN
-        )
+        return estimate_likely_depths(self.case, self.cut_range, self.needed_drop)
 
     @cached_property
     def best(self) -> Setting | None:
@@ -142,7 +111,7 @@ class SettingSearch:
         return next(self._search_settings(), None)
 
     def pockets(self, count: int) -> list[Setting]:
-        """The best setting, and the next best of other pockets."""
+        """Return the best setting, and the best of other pockets."""
         taken: list[Setting] = []
         for setting in self._search_settings(taken):
             taken.append(setting)
@@ -151,21 +120,21 @@ class SettingSearch:
         return taken
 
     def nearest_window(self, depth_mm: float, speed_rpm: float) -> Setting | None:
-        """A depth (mm) at the window of speeds nearest to one (rpm)."""
+        """Find a depth (mm) in the speed window nearest to a speed (rpm)."""
         return self._first_safe(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
 
     def fastest_window(self, depth_mm: float) -> Setting | None:
-        """A depth (mm) at the fastest window of speeds."""
+        """Find a depth (mm) in the fastest speed window."""
         return self._first_safe(depth_mm, lambda speed: -speed)
 
     def deepest_at(self, speed_rpm: float, most_mm: float) -> Setting | None:
-        """The deepest at a speed (rpm), up to a depth (mm)."""
+        """Find the deepest setting at a speed (rpm), up to a depth (mm)."""
         if self.best is None or not self.cut_range.low_rpm <= speed_rpm <= self.cut_range.high_rpm:
             return None
         return self._deepest_setting(speed_rpm, min(most_mm, self._deepest_stable(speed_rpm)))
 
     def _first_safe(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
-        """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
+        """Find a depth (mm) in the first safe speed window, the lowest rank first."""
         for speed in self._candidate_speeds(depth_mm, rank):
             if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
                 setting = self.verify(speed, depth_mm)
@@ -174,7 +143,7 @@ class SettingSearch:
         return None
 
     def _candidate_speeds(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
-        """Speeds (rpm) to look for a depth (mm) at; that of most chips, which takes a search, is the last."""
+        """Yield speeds (rpm) at which a depth (mm) is likely safe; the speed of the best setting last."""
         if self.cut_range.is_empty:
             return
         middles = {
@@ -186,10 +155,10 @@ class SettingSearch:
             yield self.best.speed_rpm
 
     def _search_settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
-        """The deepest at speeds of the grid, the most chips first as far as few draws tell.
+        """Yield the deepest settings of the grid, the largest removal rate first.
 
-        What was judged in vain comes back with less depth, and the draws that chattered count from then on. Pockets
-        that are taken while it goes on are passed over.
+        What was evaluated in vain comes back with less depth, and the samples that chattered count from then on.
+        Pockets that are taken while it goes on are passed over.
         """
         if self.cut_range.is_empty:
             return
@@ -220,11 +189,11 @@ class SettingSearch:
                 depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
-        """Whether a speed (rpm) lies in none of the pockets that are taken."""
+        """Return whether a speed (rpm) lies in none of the pockets taken."""
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
     def _climb(self, speed: float, depths: DepthsBySpeed, kept: SharesBySpeed, looked: set[float]) -> float:
-        """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), once for each top."""
+        """Return the speed (rpm) of the largest removal rate after its neighbors have been tried, once a peak."""
         for _ in range(0 if speed in looked else N_CLIMBS):
             looked.add(speed)
             if (beside := self._better_neighbor(speed, depths[speed])) in looked:
@@ -235,7 +204,7 @@ class SettingSearch:
         return speed
 
     def _best_speed(self, depths: DepthsBySpeed, kept: SharesBySpeed) -> float:
-        """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
+        """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
         while True:
             speed = max(
                 depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, kept), default=0.0
@@ -245,12 +214,12 @@ class SettingSearch:
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
 
     def _expected_share(self, speed: float, kept: SharesBySpeed) -> float:
-        """Share of its depth that is likely to be left at a speed (rpm), when several of its pocket were judged."""
+        """Return the share of its depth that is likely to be confirmed at a speed (rpm)."""
         shares = [share for other, share in kept.items() if self.likely_depths.is_same_pocket(speed, other)]
         return 1.0 if speed in kept or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
     def _better_neighbor(self, speed: float, depth_mm: float) -> float:
-        """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""
+        """Return a neighboring speed (rpm) with a larger removal rate by the critical samples, or itself."""
         speeds = np.round(speed * (1 + NEIGHBOR_SPEED_STEPS) / SPEED_STEP_RPM) * SPEED_STEP_RPM
         depths = (np.floor(speed * depth_mm / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM
         held = [self.cut_range.contains(*place) for place in zip(speeds.tolist(), depths.tolist(), strict=True)]
@@ -260,22 +229,21 @@ class SettingSearch:
         return float(speeds[held][np.argmin(grown)]) if np.min(grown) < 0 else speed
 
     def _deepest_stable(self, speed: float) -> float:
-        """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
+        """Return the deepest depth (mm) at a speed (rpm) by the critical samples, now and later."""
         most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
         hard = self.critical[speed] = replace(self._critical_samples(speed), chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest_stable(most)
 
     def _critical_samples(self, speed: float) -> CriticalSamples:
-        """The few draws at a speed (rpm)."""
+        """Return the critical samples at a speed (rpm)."""
         if speed in self.critical:
             return self.critical[speed]
         likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
-        program = Program(self.machine.build_cut(self.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
-        spindle = self.spindle, self.uncertainty, self.needed_drop, self.stiffness_at
-        return select_critical_samples(program, self.cuts, *spindle, MIN_DEPTH_MARGIN)
+        program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
+        return select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
-        """The deepest setting up to a depth (mm)."""
+        """Find the deepest setting up to a depth (mm)."""
         for _ in range(TRIES_PER_SPEED):
             if not (depth_mm := self.cut_range.round_down_depth(depth_mm)):
                 return None
@@ -286,10 +254,10 @@ class SettingSearch:
         return None
 
     def verify(self, speed: float, depth_mm: float) -> Setting | float:
-        """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
-        table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
+        """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
+        depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
-        program = sample_program(table, self.assembly, self.machine, self.at_speed, self.any_direction)
+        program = sample_program(self.case.at(speed, depth_mm))
         limit = program.median.limit
         if limit < depth * (1 + MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
@@ -300,24 +268,24 @@ class SettingSearch:
         grown = around.critical_growth(deep)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        judgement = evaluate_samples(program)
-        if not judgement.is_stable_throughout:
-            places = 1 + np.flatnonzero(judgement.chatters)
+        result = evaluate_samples(program)
+        if not result.is_stable_throughout:
+            places = 1 + np.flatnonzero(result.chatters)
             self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), judgement.lowest)
+            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
             return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = find_speed_window(near, hardest, speed, depth, self.cut_range)
         left = find_drop_margin(hardest, depth, self.stiffness_at)
-        self.results[speed, depth_mm] = judgement
+        self.results[speed, depth_mm] = result
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
 
-    def _reduced_depth(self, draws: ProgramSamples, grown: Floats, depth_mm: float) -> float:
-        """A depth (mm) that these draws may let pass, which grow by so much at one (mm) with room (n,)."""
+    def _reduced_depth(self, samples: ProgramSamples, grown: Floats, depth_mm: float) -> float:
+        """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
         return min(
-            1e3 * find_deepest_stable(draws[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
+            1e3 * find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
             depth_mm - DEPTH_STEP_MM,
         )
 

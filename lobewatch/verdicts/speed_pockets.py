@@ -40,7 +40,8 @@ class SpeedPocket:
     speed_rpm: float
     """Speed of its deepest point (rpm)."""
     window_rpm: tuple[float, float]
-    """Slowest and fastest speed at which the limit is 0.8 of its deepest or more, wherever f_n is within its doubt."""
+    """Slowest and fastest speed at which the limit is 0.8 of its deepest or more, wherever f_n is within its
+    uncertainty."""
     gain: float
     """Limit there over the lowest one in the range of speeds (-); MOST_GAIN stands for more, too."""
 
@@ -50,10 +51,11 @@ class SpeedPocket:
 
 
 def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) -> list[SpeedPocket]:
-    """The best pockets of a cut, the largest removal rate first, of a tool that was tapped without force.
+    """Find the best pockets of a cut, the largest removal rate first, for a tool tapped without a force sensor.
 
-    By zero order from the modes followed, both of one stiffness; a direction that was not tapped is taken like the
-    other. Those narrower than the doubt of f_n are left out. Empty where no such modes are known.
+    By zero-order approximation from the modes followed, both of one stiffness; a direction that was not tapped is
+    taken like the other. Those narrower than the uncertainty of f_n are left out. Empty where no such modes are
+    known.
     """
     modes, reach = assembly.without_stiffness, CutRange.of(machine, table)
     if not modes or reach.is_empty:
@@ -82,7 +84,7 @@ def _with_arbitrary_stiffness(mode: Mode) -> Mode:
 
 
 def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine) -> float:
-    """Half-width of f_n, relative: of the tap test (95 %), and from one to the next."""
+    """Return the relative half-width of f_n: 95 % error of the tap test, and scatter from one to the next."""
     mode = assembly.without_stiffness[direction]
     error = float(mode.standard_error[0]) * mode.quantile() / mode.frequency
     given = machine.doubt.frequency_percent
@@ -91,15 +93,15 @@ def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine)
 
 
 def format_pockets(best: Sequence[SpeedPocket]) -> str:
-    """Speeds of pockets, for people; windows rounded inwards."""
+    """Format the speeds of pockets; windows are rounded inward."""
     windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
     return ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
 
 
 def speed_pocket_remarks(table: CutTable, name: str, assembly: Assembly, machine: Machine) -> tuple[Remark, ...]:
-    """Remark on the pockets of a cut whose depths are not known; none where none are found."""
+    """Return the remark on pockets with unknown depth, if there are any."""
     best = find_speed_pockets(table, assembly, machine)
     if not best:
         return ()
     text = f"pockets by frequency and damping: {format_pockets(best)}; how deep, test cuts tell"
-    return (Remark(SPEEDS_ONLY_CODE, name, text, "lobewatch suggest leads to a depth in five test cuts"),)
+    return (Remark(SPEEDS_ONLY_CODE, name, text, "pocket_depth.find_pocket_depths leads to a depth in five test cuts"),)

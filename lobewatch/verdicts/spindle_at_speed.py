@@ -1,4 +1,4 @@
-"""What test cuts have taught of the spindle as it turns, beside the tool as tapped: verdicts rest on both."""
+"""What test cuts have shown of the spindle as it turns, beside the tool as tapped: verdicts rest on both."""
 
 from __future__ import annotations
 
@@ -9,41 +9,51 @@ from typing import TypeVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Remark
+from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
 AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class SpindleAtSpeed:
-    """What test cuts have taught of one program and its spindle; without any, the spindle is taken as tapped."""
+    """What test cuts have shown of one program and its spindle; without any, the spindle is taken as tapped."""
 
     n_cuts: int = 0
-    """Number of test cuts that it was learnt from."""
+    """Number of test cuts that it was learned from."""
     remarks: tuple[Remark, ...] = ()
     """Cuts that contradict the others, and frequencies far from those at rest."""
     uncertainty: Uncertainty | None = None
-    """Doubt that the cuts have left; None where none has taught anything."""
+    """Uncertainty that the cuts have left; None where none has shown anything."""
     factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
-    """Frequency, damping ratio and stiffness in the middle over those tapped, modes in x, then y, shape (n, 3)."""
+    """Frequency, damping ratio and stiffness in the median over those tapped, modes in x, then y, shape (n, 3)."""
     tangential: float = math.nan
-    """Cutting coefficient Kt in the middle of what was learnt (N/mm2)."""
+    """Cutting coefficient Kt in the learned median (N/mm2)."""
     radial: float = math.nan
-    """Cutting coefficient Kr in the middle of what was learnt (N/mm2)."""
+    """Cutting coefficient Kr in the learned median (N/mm2)."""
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """Intervals of 95 % before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """Intervals of 95 % with the cuts, alike."""
 
     def scale_modes(self, assembly: Assembly) -> Assembly:
-        """A tool with its modes in the middle of what was learnt; as tapped where nothing was."""
+        """Scale the modes of a tool to the learned median; unchanged where nothing was learned.
+
+        Parameters
+        ----------
+        assembly
+            Tool as tapped.
+
+        Returns
+        -------
+        Assembly
+            Tool with the learned modes.
+        """
         if self.uncertainty is None:
             return assembly
         count = len(assembly.x or ())
@@ -51,18 +61,29 @@ class SpindleAtSpeed:
         return replace(assembly, x=x, y=y)
 
     def apply_coefficients(self, table: AnyCutTable) -> AnyCutTable:
-        """A cut with the coefficients that were learnt; as it stands in machine.toml where none were."""
+        """Set the learned cutting coefficients of a cut; unchanged where none were learned.
+
+        Parameters
+        ----------
+        table
+            Program or cut as in machine.toml.
+
+        Returns
+        -------
+        ProgramTable or CutTable
+            The same with the learned Kt and Kr.
+        """
         if self.uncertainty is None:
             return table
         return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
 
 
 NO_TEST_CUTS = SpindleAtSpeed()
-"""Nothing learnt: the spindle is judged as it was tapped."""
+"""Nothing learned: the spindle is evaluated as it was tapped."""
 
 
 def _scale_modes(modes: TipModes, factors: Floats) -> TipModes:
-    """Modes with frequency, damping ratio and stiffness times factors (n, 3)."""
+    """Scale frequency, damping ratio and stiffness of modes by factors (n, 3)."""
     return modes and [
         replace(
             mode,

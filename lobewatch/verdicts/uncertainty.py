@@ -1,7 +1,7 @@
 """Uncertainty of a program by cause, and Monte Carlo samples drawn from it.
 
-Half-widths of independent uniform distributions; where test cuts have taught, the draws that they have left. Whatever
-is said of a program over its doubt comes from these draws.
+Half-widths of independent uniform distributions; where test cuts have shown, the samples that they have left.
+Whatever is said of a program over its uncertainty comes from these samples.
 """
 
 from __future__ import annotations
@@ -11,13 +11,25 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, UncertaintyTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import PrincipalDirections
 from lobewatch.tool.tap_series import Scatter
+from lobewatch.verdicts.uncertainty_causes import (
+    CLAMPING,
+    COEFFICIENTS,
+    CROSS,
+    PREDICTION,
+    SPEED,
+    TAP_TEST,
+    TEST_CUTS,
+    UNCERTAINTY_CAUSES,
+    UNTAPPED,
+    WEAR,
+)
 from modal import Mode
 
 DEFAULT_TAP_SCATTER = Scatter(0.003, 0.10, 0.03)
@@ -28,12 +40,6 @@ MAX_MODE_PHASE = np.radians(89)
 """... and largest phase (rad)."""
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
-CROSS_CAUSE = "cross"
-"""Cause of the doubt of the axes of modes: what direct taps leave open."""
-TEST_CUT_CAUSE = "cuts"
-"""Cause of the doubt of modes that test cuts have taught: all that they have left open."""
-
-Floats = NDArray[np.float64]
 
 
 class FactorRange(NamedTuple):
@@ -62,12 +68,12 @@ class LearnedSamples:
     ratio: Floats
     """Kr/Kt over its mean, shape (r,)."""
 
-    def build_rows(self, middle: MillingRows, count: int, without: str) -> MillingRows:
-        """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
+    def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
+        """Build samples around a median (a row), at its speed; without: a cause that is left out."""
         take = np.arange(count) % len(self.tangential)
-        rows, spindle = middle[np.zeros(count, dtype=np.intp)], float(without != TEST_CUT_CAUSE)
+        rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != TEST_CUTS.name)
         force, direction = (
-            1 + (factor[take] - 1) * (without != "coefficients") for factor in (self.tangential, self.ratio)
+            1 + (factor[take] - 1) * (without != COEFFICIENTS.name) for factor in (self.tangential, self.ratio)
         )
         return replace(
             rows,
@@ -82,12 +88,12 @@ class LearnedSamples:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Doubt of a program, by what it comes from."""
+    """Uncertainty of a program, by what it comes from."""
 
     modes: Mapping[str, Floats]
-    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
-    (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
-    that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
+    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y,
+    shape (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction"
+    (a tool that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
     tap_correlation: Floats
     """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
     speed: float
@@ -97,40 +103,59 @@ class Uncertainty:
     ratio: FactorRange
     """Range of Kr/Kt, the direction of the force, over the middle."""
     wear: float = 1.0
-    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the least
-    is 1."""
+    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the
+    least is 1."""
     axes: PrincipalDirections | None = None
     """Axes of the modes, and what is open of them; None where they count as known."""
     learned: LearnedSamples | None = None
-    """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
+    """Samples that test cuts have left, which stand for the half-widths; None where none has shown anything."""
+
+    def __post_init__(self) -> None:
+        """Refuse causes without a record in `UNCERTAINTY_CAUSES`."""
+        if unknown := self.modes.keys() - UNCERTAINTY_CAUSES.keys():
+            raise ValueError(f"unknown causes of uncertainty: {', '.join(sorted(unknown))}")
 
     @property
     def causes(self) -> tuple[str, ...]:
         """Names of all that it comes from."""
-        across = [CROSS_CAUSE] if self.axes is not None and self.axes.are_uncertain else []
-        return (*self.modes, *across, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
+        across = [CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
+        return (*self.modes, *across, SPEED.name, COEFFICIENTS.name, *([WEAR.name] if self.wear > 1 else []))
 
-    def sample(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
-        """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
+    def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
+        """Sample systems within the uncertainty, reproducible by seed.
 
-        without: a cause that is taken as known.
+        Parameters
+        ----------
+        median
+            Median system, one row.
+        count
+            Number of samples.
+        seed
+            Seed of the random numbers; the other causes have the same samples whatever is left out.
+        without
+            Name of a cause that is left out.
+
+        Returns
+        -------
+        MillingRows
+            Sampled systems, `count` rows.
         """
-        rows = self._sample_new_edges(middle, count, seed, without)
-        if self.wear == 1 or without == "wear":
+        rows = self._sample_new_edges(median, count, seed, without)
+        if self.wear == 1 or without == WEAR.name:
             return rows
         worn = np.empty(count)
         worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
         return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
 
-    def _sample_new_edges(self, middle: MillingRows, count: int, seed: int, without: str) -> MillingRows:
+    def _sample_new_edges(self, median: MillingRows, count: int, seed: int, without: str) -> MillingRows:
         if self.learned is not None:
-            rows = self.learned.build_rows(middle, count, without)
-            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
+            rows = self.learned.build_rows(median, count, without)
+            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != SPEED.name)
             return self._with_sampled_axes(
                 replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
             )
         random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
-        factor = np.ones((count, middle.frequency.shape[1], 3))
+        factor = np.ones((count, median.frequency.shape[1], 3))
         turned = np.zeros(factor.shape[:2])
         for cause, widths in self.modes.items():
             uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
@@ -138,14 +163,14 @@ class Uncertainty:
             if cause != without:
                 factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
                 turned += moved[..., 3]
-        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != "speed")
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != SPEED.name)
         tangential, ratio = (
             span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._coefficient_ranges
         )
-        if without == "coefficients":
+        if without == COEFFICIENTS.name:
             tangential, ratio = np.ones((2, count))
-        rows = middle[np.zeros(count, dtype=np.intp)]
-        drawn = replace(
+        rows = median[np.zeros(count, dtype=np.intp)]
+        samples = replace(
             rows,
             frequency=rows.frequency * factor[..., 0],
             damping_ratio=rows.damping_ratio * factor[..., 1],
@@ -155,17 +180,17 @@ class Uncertainty:
             tangential=rows.tangential * np.maximum(tangential, MIN_SAMPLE_FACTOR),
             radial=rows.radial * np.maximum(tangential, MIN_SAMPLE_FACTOR) * np.maximum(ratio, 0.0),
         )
-        return self._with_sampled_axes(drawn, seed, without)
+        return self._with_sampled_axes(samples, seed, without)
 
     def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
-        """With axes drawn from what is open of them."""
-        if self.axes is None or not self.axes.are_uncertain or without == CROSS_CAUSE:
+        """Sample the open principal directions."""
+        if self.axes is None or not self.axes.are_uncertain or without == CROSS.name:
             return rows
         return replace(rows, vector=self.axes.sample(len(rows), seed))
 
     def _correlated(self, cause: str, uniform: Floats) -> Floats:
-        """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
-        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == "tap" else uniform
+        """Correlate the uniform numbers of the tap error, shape (count, n, 4)."""
+        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == TAP_TEST.name else uniform
 
     @property
     def _coefficient_ranges(self) -> tuple[FactorRange, FactorRange]:
@@ -173,7 +198,22 @@ class Uncertainty:
 
 
 def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
-    """The doubt of a cut with a tool as it is known at some time, at rest."""
+    """Determine the uncertainty of a cut with a tool that does not rotate.
+
+    Parameters
+    ----------
+    assembly
+        Tool as tapped or predicted.
+    table
+        Program or reference cut.
+    machine
+        Machine with its [doubt] table and materials.
+
+    Returns
+    -------
+    Uncertainty
+        Half-widths by cause, and ranges of the cutting coefficients.
+    """
     tangential, ratio = _coefficient_ranges(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_tap_correlation(mode) for mode in modes])
@@ -190,31 +230,31 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Largest factor of wear on the cutting coefficients: what the program says, else [doubt]."""
+    """Return the largest wear factor on the cutting coefficients, of the program or of [uncertainty]."""
     said = table.wear if isinstance(table, ProgramTable) else None
     return WEAR_FACTORS[said or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:
-    """Half-widths of the modes by cause, shape (n, 4) each."""
+    """Return half-widths of the modes by cause, shape (n, 4) each."""
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        widths = {"prediction": np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
+        widths = {PREDICTION.name: np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = [np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides]
         clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
-        widths = {"tap": np.array([_tap_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
+        widths = {TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)]), CLAMPING.name: np.vstack(clamping)}
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
-        widths["untapped"] = absent
+        widths[UNTAPPED.name] = absent
         absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
     return widths
 
 
 def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Scatter:
-    """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
+    """Return the scatter of the tap tests of a tool in a direction: machine.toml, else the series, else the default."""
     scatter = assembly.scatter(side if side in assembly.directions else assembly.directions[0]) or DEFAULT_TAP_SCATTER
     percents = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
     sizes = [width if wish is None else wish / 100 for width, wish in zip(scatter[:3], percents, strict=True)]
@@ -222,20 +262,20 @@ def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Sc
 
 
 def _prediction_uncertainty(mode: Mode, given: UncertaintyTable) -> tuple[float, float, float, float]:
-    """Half-widths of a mode that is predicted; its phase may be none at all, or twice what it is taken for."""
+    """Return the half-widths of a predicted mode."""
     frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
     return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
 
 
 def _tap_error(mode: Mode) -> Floats:
-    """95 % of the error of the tap test, relative, of the phase in rad; 0 where it is not known."""
+    """Return the 95 % error of the tap test, relative, of the phase in rad; 0 where it is unknown."""
     values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
     error = np.append(mode.standard_error, mode.phase_deg_std)
     return np.asarray(np.nan_to_num(mode.quantile() * error / values))
 
 
 def _tap_correlation(mode: Mode) -> Floats:
-    """Root of the correlations of the errors of a mode whose phase was fitted, shape (4, 4); else 1."""
+    """Return the root of the error correlations of a mode whose phase was fitted, shape (4, 4); else 1."""
     error = np.sqrt(np.diag(mode.joint_covariance))
     if not np.all(error > 0):
         return np.eye(4)
@@ -245,13 +285,13 @@ def _tap_correlation(mode: Mode) -> Floats:
 
 
 def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Kt and Kr/Kt over the middle: the published range where there is one, else that of [doubt]."""
-    middle = machine.coefficients(table)
-    if middle.tangential_range is None or middle.ratio_range is None:
+    """Return the ranges of Kt and Kr/Kt: published, else by [uncertainty]."""
+    median = machine.coefficients(table)
+    if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
         return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
-    ratio = middle.radial / middle.tangential
+    ratio = median.radial / median.tangential
     return (
-        FactorRange(*(limit / middle.tangential for limit in middle.tangential_range)),
-        FactorRange(*(limit / ratio for limit in middle.ratio_range)),
+        FactorRange(*(limit / median.tangential for limit in median.tangential_range)),
+        FactorRange(*(limit / ratio for limit in median.ratio_range)),
     )

@@ -16,6 +16,7 @@ from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_remarks import (
     assumption_remarks,
     find_decisive_cause,
@@ -25,6 +26,7 @@ from lobewatch.verdicts.program_remarks import (
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.uncertainty_causes import QUESTION, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -34,22 +36,23 @@ class Stability(StrEnum):
     """Word that is said of a program."""
 
     STABLE = "stable"
-    """At most 1 % of the doubt chatters, at 95 % confidence."""
+    """At most 1 % of the uncertainty chatters, at 95 % confidence."""
     DOUBTFUL = "doubtful"
-    """Stable in the middle, but more of the doubt may chatter; a remark says what decides and what would settle it."""
+    """Stable in the median, but more of the uncertainty may chatter; a remark says what decides and what would
+    settle it."""
     NOT_STABLE = "not stable"
-    """It chatters in the middle of the doubt."""
+    """It chatters in the median estimate."""
     UNKNOWN = "unknown"
     """It could not be checked; a remark says why."""
 
 
 class CriticalDrop(NamedTuple):
-    """Falls of the frequency of today, relative; 0 where the word has changed already, inf where none changes it."""
+    """Frequency drop of today, relative; 0 where the verdict has changed already, inf where none changes it."""
 
     doubtful: float
     """Fall up to which it stays stable; NaN where it could not be checked."""
     not_stable: float
-    """Fall up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
+    """Fall up to which it stays stable in the median estimate; NaN where it could not be checked."""
     error: float
     """Standard error of `not_stable`, by damping and stiffness as they scatter from tap test to tap test."""
 
@@ -58,15 +61,15 @@ class StoredVerdict(NamedTuple):
     """What the history keeps of a verdict."""
 
     stability: Stability
-    """Word on the program."""
+    """Stability of the program."""
     limit: float
-    """Deepest stable depth at the program's speed in the middle of the doubt (m); NaN where it is not known."""
+    """Deepest stable depth at the program's speed in the median estimate (m); NaN where it is not known."""
     critical: CriticalDrop | None = None
-    """Falls of the frequency that change the word; None where nobody has asked yet."""
+    """Frequency drop that change the verdict; None where nobody has asked yet."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the median estimate; None where it is unknown."""
         return None if self.stability is Stability.UNKNOWN else self.stability is not Stability.NOT_STABLE
 
 
@@ -75,27 +78,28 @@ class Verdict:
     """Whether a program is stable with a tool in the spindle as it is known at some time."""
 
     program: ProgramTable
-    """Program as it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
+    """Program as in machine.toml, with the cutting coefficients that test cuts have shown."""
     stability: Stability
-    """Word on the program."""
+    """Stability of the program."""
     assembly: Assembly | None = None
     """Tool as tapped that it was checked with; None where there is nothing to check with."""
     at_speed: SpindleAtSpeed = NO_TEST_CUTS
-    """Spindle as test cuts have taught it beside that."""
+    """Spindle as test cuts have shown it beside that."""
     limit: float = math.nan
-    """Deepest stable depth at its speed in the middle of the doubt, in the worst direction of feed (m); inf where there
+    """Deepest stable depth at its speed in the median estimate, in the worst direction of feed (m); inf where there
     is none up to 20 times its own, NaN where unknown."""
     limit_low: float = math.nan
-    """1 % quantile of the limit over the doubt (m)."""
+    """1 % quantile of the limit over the uncertainty (m)."""
     limit_high: float = math.nan
-    """99 % quantile of the limit over the doubt (m)."""
+    """99 % quantile of the limit over the uncertainty (m)."""
     chatter_risk: float = math.nan
-    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those learnt."""
+    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those
+    learned."""
     decisive_cause: str = ""
-    """Cause of the doubt that decides (`Uncertainty.causes`), "question" where a tap test is in question, "workpiece" where
-    it is thin; empty unless it is doubtful."""
+    """Cause of the uncertainty that decides (`Uncertainty.causes`), "question" where a tap test is in question,
+    "workpiece" where it is thin; empty unless it is doubtful."""
     chatter_frequency: float = math.nan
-    """Frequency that is heard at the limit (Hz); NaN where there is none."""
+    """Frequency that is recorded at the limit (Hz); NaN where there is none."""
     kind: str = ""
     """Kind of the limit: "hopf", "flip" or ""."""
     feed_angle: float = math.nan
@@ -103,17 +107,17 @@ class Verdict:
     method: str = ""
     """Method that the limit was found by."""
     detail: str = ""
-    """Fineness of the method, and number of draws."""
+    """Fineness of the method, and number of samples."""
     drive_limit: float = math.inf
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
     samples: ProgramSamples | None = None
-    """Spindles that it was judged on; None where it is unknown."""
+    """Spindles that it was evaluated on; None where it is unknown."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what it rests on, what would settle it, and why it is unknown."""
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether it is stable in the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the median estimate; None where it is unknown."""
         return self.stored.is_stable
 
     @property
@@ -128,7 +132,7 @@ class Verdict:
 
     @property
     def depth_margin(self) -> float:
-        """Limit in the middle over depth, less 1; negative where it is not stable."""
+        """Median limit over depth, less 1; negative where it is not stable."""
         return self.limit / (self.program.depth_mm / 1e3) - 1
 
     @property
@@ -147,11 +151,31 @@ def evaluate_program(
     tool: Assembly | DataError,
     machine: Machine,
     at_speed: SpindleAtSpeed = NO_TEST_CUTS,
-    judgement: MonteCarloResult | None = None,
+    result: MonteCarloResult | None = None,
 ) -> Verdict:
-    """The verdict on a program as it stands in machine.toml, or why its tool is not known.
+    """Evaluate a program, or say why it cannot be evaluated.
 
-    judgement: that of `run_monte_carlo`, where it is known already.
+    Parameters
+    ----------
+    table
+        Program as in machine.toml.
+    tool
+        Tool as tapped or predicted, or the reason why it is unknown.
+    machine
+        Machine.
+    at_speed
+        Spindle at speed, as learned from test cuts.
+    result
+        Monte Carlo result of the same program, if it has been computed already.
+
+    Returns
+    -------
+    Verdict
+        Verdict with limits, uncertainty and remarks.
+
+    References
+    ----------
+    .. [1] JCGM 101:2008, Propagation of distributions using a Monte Carlo method (GUM-S1).
     """
     if isinstance(tool, DataError):
         unknown = _unknown_verdict(table, (Remark("no-tap", "", str(tool)),))
@@ -161,31 +185,35 @@ def evaluate_program(
     on_model = tool.predicted or machine.tap.position_mm > 0
     if asked := find_program_questions(machine, table, on_model):
         return _unknown_verdict(table, tuple(doubted.remark for doubted in asked), tool)
-    table = at_speed.apply_coefficients(table)
-    judgement, depth = judgement or run_monte_carlo(table, tool, machine, at_speed), table.depth_mm / 1e3
-    middle, word, cause = judgement.median, classify_stability(table, judgement, tool), ""
-    remarks = [*_verdict_remarks(table, tool, at_speed, machine), *assumption_remarks(table, machine, judgement)]
-    if word is Stability.DOUBTFUL:
-        cause = _decisive_cause(table, judgement, tool)
-        tangential = middle.limit / depth * machine.build_cut(table).tangential
-        remarks.append(uncertainty_advice(cause, table, tangential, tool, at_speed.n_cuts))
+    case = ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed)
+    return _build_verdict(case, result or run_monte_carlo(case))
+
+
+def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
+    """Build the verdict on a program from its Monte Carlo result."""
+    median, stability, cause = result.median, classify_stability(case, result), ""
+    remarks = [*_verdict_remarks(case), *assumption_remarks(case, result)]
+    if stability is Stability.DOUBTFUL:
+        cause = _find_decisive_cause(case, result)
+        remarks.append(uncertainty_advice(cause, case, result))
+    drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
     return Verdict(
-        program=table,
-        stability=word,
-        assembly=tool,
-        at_speed=at_speed,
-        limit=middle.limit,
-        limit_low=min(judgement.low, middle.limit),
-        limit_high=max(judgement.high, middle.limit),
-        chatter_risk=_chatter_risk(judgement, depth, at_speed),
+        program=case.table,
+        stability=stability,
+        assembly=case.assembly,
+        at_speed=case.at_speed,
+        limit=median.limit,
+        limit_low=min(result.low, median.limit),
+        limit_high=max(result.high, median.limit),
+        chatter_risk=_estimate_chatter_risk(case, result),
         decisive_cause=cause,
-        chatter_frequency=middle.chatter_frequency,
-        kind=middle.kind,
-        feed_angle=middle.feed_angle,
-        method=middle.method,
-        detail=f"{middle.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
-        drive_limit=float(drive_depth_limit(machine, table, np.array([table.speed_rpm]))[0]),
-        samples=judgement.samples,
+        chatter_frequency=median.chatter_frequency,
+        kind=median.kind,
+        feed_angle=median.feed_angle,
+        method=median.method,
+        detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
+        drive_limit=float(drive_limit[0]),
+        samples=result.samples,
         remarks=tuple(remarks),
     )
 
@@ -196,30 +224,27 @@ def _unknown_verdict(
     assembly: Assembly | None = None,
     further: tuple[Remark, ...] = (),
 ) -> Verdict:
-    """The verdict on a program that cannot be checked."""
+    """Build the verdict on a program that cannot be evaluated."""
     text = "; ".join(map(str, reasons)) or "no modes at the tool tip"
     remark = Remark(NOT_CHECKED_CODE, table.name, f"not checked: {text}")
     return Verdict(table, Stability.UNKNOWN, assembly, remarks=(remark, *further))
 
 
-def classify_stability(table: ProgramTable, judgement: MonteCarloResult, assembly: Assembly) -> Stability:
-    """The word on a program with a tool that was judged."""
-    if not judgement.median.stable:
+def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability:
+    """Classify the stability of a program from its Monte Carlo result."""
+    if not result.median.stable:
         return Stability.NOT_STABLE
-    return (
-        Stability.STABLE
-        if judgement.is_stable_throughout and is_compliance_known(table, assembly)
-        else Stability.DOUBTFUL
-    )
+    is_stable = result.is_stable_throughout and is_compliance_known(case.table, case.assembly)
+    return Stability.STABLE if is_stable else Stability.DOUBTFUL
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
+    """Return whether the compliance is known: both directions tapped, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
 def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] | None:
-    """What is not known of what gives way, and what to do first; None where nothing is left open."""
+    """Return what is unknown of the compliance and what to do first, or None."""
     if len(assembly.directions) < 2:
         return assembly.missing_direction
     if isinstance(table, ProgramTable) and table.thin:
@@ -231,28 +256,27 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
     return None
 
 
-def _decisive_cause(table: ProgramTable, judgement: MonteCarloResult, assembly: Assembly) -> str:
-    """Cause of the doubt that decides."""
-    if assembly.questions:
-        return "question"
-    if table.thin and assembly.is_complete and not np.any(judgement.chatters):
-        return "workpiece"
-    return find_decisive_cause(judgement, table.depth_mm / 1e3)
+def _find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
+    """Return the name of the cause of uncertainty that decides a doubtful verdict."""
+    if case.assembly.questions:
+        return QUESTION.name
+    if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
+        return WORKPIECE.name
+    return find_decisive_cause(result, case.depth)
 
 
-def _chatter_risk(judgement: MonteCarloResult, depth: float, at_speed: SpindleAtSpeed) -> float:
-    """Chance of chatter at a depth (m) with the spindle turning: as learnt, or under plausible differences."""
-    if at_speed.n_cuts:
-        return float(np.mean(judgement.chatters))
-    return float(np.mean(draw_rotating_samples(judgement.samples.with_lowest_cuts(0.0)).growth(depth)[1:] >= 0))
+def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:
+    """Estimate the chatter risk with the spindle rotating: as learned, or with plausible differences."""
+    if case.at_speed.n_cuts:
+        return float(np.mean(result.chatters))
+    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(case.depth)[1:] >= 0))
 
 
-def _verdict_remarks(
-    table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, machine: Machine
-) -> Iterator[Remark]:
-    yield from (remark for remark in assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
-    yield from at_speed.remarks
-    yield from assembly.questions
+def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
+    machine, table = case.machine, case.table
+    yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
+    yield from case.at_speed.remarks
+    yield from case.assembly.questions
     yield from tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -5,8 +5,8 @@ where
 
     det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
 
-Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal.
-Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal. Source:
+Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
 """
 
 from __future__ import annotations
@@ -16,20 +16,17 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows
 from lobes.tooth_force import interval_forces, mean_force, mean_regeneration, rotate_to_machine
+from lobewatch.arrays import Complexes, Floats
 
 FREQUENCIES_PER_WAVE = 16
 """Frequencies in which the regeneration of the longest delay turns once, at least."""
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-
 
 def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:
-    """Frequencies (Hz) (r, k), rising, with as many more as the delays of a cut ask for at tooth frequencies (Hz)."""
+    """Add as many frequencies to a rising grid (Hz) (r, k) as the delays of a cut need."""
     longest = max(cut.delays) * cut.teeth / (2 * np.pi)
     low, high = float(np.min(grid)), float(np.max(grid))
     even = np.arange(low, high, float(np.min(teeth)) / longest / FREQUENCIES_PER_WAVE)
@@ -37,10 +34,10 @@ def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:
 
 
 def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -> tuple[Floats, Floats]:
-    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+    """Find the lowest limit (m) and its frequency (Hz) of loops (r, k) with uneven pitch, at tooth frequencies (r, s).
 
-    As `lobes.uneven_limits`: b = -1 / Re(L s) where Im(L s) = 0, between the frequencies on a line; inf and NaN where
-    there is none.
+    As `lobes.uneven_limits`: b = -1 / Re(L s) where Im(L s) = 0, between the frequencies on a line; inf and NaN
+    where there is none.
     """
     depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     for i in range(teeth.shape[1]):
@@ -58,7 +55,7 @@ def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -
 
 
 FREQUENCY_GRID_REACH = 0.7
-"""Distance from each natural frequency up to which frequencies are looked at, relative ..."""
+"""Distance from each natural frequency up to which frequencies are checked, relative ..."""
 FREQUENCY_GRID_POINTS = 49
 """... and number of them, dense near it."""
 MAX_BATCH_NUMBERS = 300_000
@@ -97,13 +94,13 @@ class ZeroOrderBatch:
 
     @classmethod
     def of(cls, rows: MillingRows) -> ZeroOrderBatch:
-        """Spindles fed each in its own direction, by the mean force of their cut."""
+        """Build the batch from rows, each fed in its own direction."""
         tangential, radial = _unit_mean_forces(rows.cut)
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, rotate_to_machine(force, rows.feed_angle))
 
     def limits(self, speed_rpm: Floats, deepest: float = np.inf) -> tuple[Floats, Floats]:
-        """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
+        """Return the lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) of each row.
 
         Both of shape (r, s); inf and NaN where there is none, and perhaps where it is more than `deepest` (m).
         """
@@ -117,7 +114,7 @@ class ZeroOrderBatch:
         return depth, chatter
 
     def _limits_of_part(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
-        """Limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
+        """Return limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
         grid, cut = self._frequency_grid(), self.rows.cut
         if cut.pitch:
             grid = refine_frequency_grid(grid, cut, teeth)
@@ -133,7 +130,7 @@ class ZeroOrderBatch:
         return depth, chatter
 
     def fastest_growth(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
-        """Growth (1/s) and frequency (Hz) of the motion that grows fastest, at a speed (rpm) each and a depth (m).
+        """Return growth (1/s) and frequency (Hz) of the fastest growing motion, at a speed (rpm) each and a depth (m).
 
         Both of shape (r,).
         """
@@ -152,7 +149,7 @@ class ZeroOrderBatch:
         return np.asarray(fastest.real), np.asarray(fastest.imag / (2 * np.pi))
 
     def _characteristic(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
-        """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
+        """Return det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
         (gx, dx), (gy, dy) = self._receptance_with_derivative(s, 0, 0), self._receptance_with_derivative(s, 1, 1)
         h = self.force[..., np.newaxis]
         wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
@@ -176,7 +173,7 @@ class ZeroOrderBatch:
         return bool(np.any(np.prod(self.rows.vector, axis=-1)))
 
     def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:
-        """Receptance from one direction to another at frequencies (rad/s) (r, k)."""
+        """Return the receptance from one direction to another at frequencies (rad/s) (r, k)."""
         total = np.zeros(frequency.shape, np.complex128)
         for mode in self._modes(force, shown):
             r = frequency / mode.frequency
@@ -187,7 +184,7 @@ class ZeroOrderBatch:
         return total
 
     def _receptance_with_derivative(self, s: Complexes, force: int, shown: int) -> tuple[Complexes, Complexes]:
-        """Receptance from one direction to another at s (r, k) (1/s), and its derivative."""
+        """Return the receptance from one direction to another at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
         for mode in self._modes(force, shown):
             r = s / mode.frequency
@@ -199,7 +196,7 @@ class ZeroOrderBatch:
         return total, slope
 
     def _modes(self, force: int, shown: int) -> Iterator[ModeColumns]:
-        """Modes that a force in one direction moves in another."""
+        """Yield the modes that a force in one direction moves in another."""
         place, velocity = self.rows.tip_participation
         axes, vector = self.rows.axes.tolist(), self.rows.vector
         if force not in axes or shown not in axes:
@@ -210,14 +207,14 @@ class ZeroOrderBatch:
             yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
 
     def _frequency_grid(self) -> Floats:
-        """Frequencies (Hz), rising, shape (r, k)."""
+        """Return rising frequencies (Hz), dense near the natural ones, shape (r, k)."""
         width = self.rows.damping_ratio[..., np.newaxis]
         around = width * np.sinh(np.linspace(-1, 1, FREQUENCY_GRID_POINTS) * np.arcsinh(FREQUENCY_GRID_REACH / width))
         grid = (self.rows.frequency / (2 * np.pi))[..., np.newaxis] * (1 + around)
         return np.sort(grid.reshape(len(self.rows), -1), axis=1)
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
-        """Both eigenvalues of H0 G at frequencies (r, k), each followed over them."""
+        """Return both eigenvalues of H0 G at frequencies (r, k), each followed over them."""
         gx, gy = (self._receptance(2 * np.pi * grid, axis, axis) for axis in (0, 1))
         h = self.force[..., np.newaxis]
         half, product = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2, gx * gy
@@ -231,7 +228,7 @@ class ZeroOrderBatch:
 
 
 def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
-    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+    """Find the lowest limit (m) and its frequency (Hz) of loops (r, k), at tooth frequencies (r, s).
 
     A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
@@ -262,14 +259,14 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
 
 
 def _unwrap(angle: Floats) -> Floats:
-    """Angles (r, k) without jumps of a turn."""
+    """Unwrap angles (r, k)."""
     step = np.diff(angle, axis=1)
     angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(step / (2 * np.pi)), axis=1)
     return angle
 
 
 def is_force_constant(cut: Cut) -> bool:
-    """Whether the force does not change over the turn: then the mean force is all of it."""
+    """Return whether the force is constant over the turn, so that the mean force is exact."""
     force = interval_forces(cut, 64)[0]
     return (
         not cut.pitch
@@ -279,6 +276,6 @@ def is_force_constant(cut: Cut) -> bool:
 
 
 def _unit_mean_forces(cut: Cut) -> tuple[Floats, Floats]:
-    """Mean force matrices for Kt alone and Kr alone, each 1, in the frame of the feed."""
+    """Return the mean force matrices for Kt = 1 and for Kr = 1, in the frame of the feed."""
     first = mean_force(replace(cut, tangential=1.0, radial=0.0, feed_angle=0.0))
     return first, mean_force(replace(cut, tangential=1.0, radial=1.0, feed_angle=0.0)) - first

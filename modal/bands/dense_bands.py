@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from modal.bands.extraction import FittedBand, Floats
+from modal.arrays import Floats
+from modal.bands.extraction import FittedBand
 from modal.bands.fit_peaks import MIN_MODE_PEAK_SHARE, are_modes
 from modal.bands.residual_analysis import (
     has_lower_aic,

@@ -10,12 +10,12 @@ from itertools import chain
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from acquisition import Frf
+from modal.arrays import Complexes, Flags, Floats
 from modal.bands.dense_bands import mark_close_modes, refine_dense_band
-from modal.bands.extraction import Complexes, Extraction, FittedBand, Floats
+from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.find_resonances import Resonance, add_residual_resonances, find_resonances
 from modal.bands.fit_peaks import LocalBand, fit_peaks, group_into_bands, iterate_bands, refit_with_real_constants
 from modal.bands.frf_lines import line_weights, usable_lines
@@ -68,7 +68,7 @@ def _noise_profile(left: Complexes, band: FittedBand, given: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(variance / np.mean(variance), MIN_NOISE_FLOOR_SHARE**2)))
 
 
-def _fit_noise_variance(left: Floats, height: Floats, counts: NDArray[np.bool_]) -> Floats:
+def _fit_noise_variance(left: Floats, height: Floats, counts: Flags) -> Floats:
     """Likeliest variance by line, floor + slope height, or equal where that is as likely; of each FRF, shape (p, n).
 
     left, height: squares of the residual and of the model; counts: the lines that it is told from, all (p, n).
@@ -89,7 +89,7 @@ def _fit_noise_variance(left: Floats, height: Floats, counts: NDArray[np.bool_])
     return np.asarray(np.where(mean[:, np.newaxis] > 0, (share @ columns)[:, 0], 0.0))
 
 
-def _log_likelihood(left: Floats, variance: Floats, counts: NDArray[np.bool_]) -> Floats:
+def _log_likelihood(left: Floats, variance: Floats, counts: Flags) -> Floats:
     """Log likelihood of these variances by the squares of complex normal residuals, of each FRF, shape (p,)."""
     return np.asarray(-np.sum((np.log(variance) + left / variance) * counts, axis=1))
 
@@ -198,7 +198,7 @@ def _with_residual_resonances(state: Extraction, known: list[Resonance]) -> list
     return known
 
 
-def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
+def _stray_lines(state: Extraction) -> Flags:
     """Lines that stand far out of the residual on both sides of them: hum, or a carrier; shape (p, n)."""
     stray = np.zeros(state.weight.shape, bool)
     for band in state.bands:

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf, infer_recorded_share
+from modal.arrays import Complexes, Floats
 from modal.bands.find_resonances import Resonance
 from modal.fitting import BandFit
 from modal.poles import StabilisationChart, fit_lscf_poles, select_physical_poles
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FIXED_MODE = "held"
 """Word for a mode whose frequency and damping ratio a person gave."""

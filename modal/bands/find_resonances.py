@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from acquisition import Frf
+from modal.arrays import Complexes, Flags, Floats, Indices
 from modal.bands.frf_lines import incoherent_noise, measured_over_receptance, remove_drift
 
 MIN_FRF_LINES = 8
@@ -172,7 +173,7 @@ def _is_not_lower(new: _Peak, old: _Peak) -> bool:
     return old.resonance.height - new.resonance.height < MAX_SMOOTHING_LOSS * old.noise
 
 
-def _find_peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
+def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> list[_Peak]:
     size = np.abs(mobility)
     faintest = 1e-12 * size.max()
     floor = np.maximum(MIN_PEAK_TO_NOISE * noise, max(least, faintest))
@@ -185,7 +186,7 @@ def _find_peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.fl
     return [_measure_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
 
-def _has_deep_valleys(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _has_deep_valleys(size: Floats, tops: Indices) -> Flags:
     """Whether the valley before a neighbour that is higher is deep enough, for each peak."""
     if tops.size < 2:
         return np.ones(tops.size, dtype=bool)
@@ -199,20 +200,18 @@ def _has_deep_valleys(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDAr
     return ~shallow
 
 
-def _higher_saddle(size: NDArray[np.float64], top: int, lowest: float) -> float:
+def _higher_saddle(size: Floats, top: int, lowest: float) -> float:
     """The higher of the lowest values between a peak and what is higher on either side, or the lowest of all."""
     return max(_lowest_before_higher_value(side, lowest) for side in (size[top::-1], size[top:]))
 
 
-def _lowest_before_higher_value(side: NDArray[np.float64], lowest: float) -> float:
+def _lowest_before_higher_value(side: Floats, lowest: float) -> float:
     """Lowest value between side[0] and the next higher one; the lowest of all where none is higher."""
     higher = int(np.argmax(side > side[0]))
     return float(side[:higher].min()) if higher else lowest
 
 
-def _measure_peak(
-    frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64], top: int, noise: float
-) -> _Peak:
+def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> _Peak:
     """size: of the mobility."""
     f = frf.frequency
     below, above = _lines_to_half_power(size[top::-1]), _lines_to_half_power(size[top:])
@@ -234,7 +233,7 @@ def _peak_coherence(frf: Frf, lines: slice) -> float:
     return float(np.mean(frf.coherence[lines]))
 
 
-def _lines_to_half_power(size: NDArray[np.float64]) -> float:
+def _lines_to_half_power(size: Floats) -> float:
     """Lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
     level = size[0] / np.sqrt(2)
     higher = np.flatnonzero(size > size[0])
@@ -246,7 +245,7 @@ def _lines_to_half_power(size: NDArray[np.float64]) -> float:
     return float(end - (level - side[end]) / (side[end - 1] - side[end]))
 
 
-def mobility_noise(frf: Frf) -> NDArray[np.float64]:
+def mobility_noise(frf: Frf) -> Floats:
     """rms of the noise on each line of the mobility, shape (n,): what is larger, its third differences or coherence.
 
     Third differences do not see noise that is alike on neighbouring lines, as that of an overloaded sensor is.

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modal.bands.extraction import BandData, Extraction, FittedBand, Floats
+from modal.arrays import Flags, Floats
+from modal.bands.extraction import BandData, Extraction, FittedBand
 from modal.bands.find_resonances import Resonance
 from modal.fitting import MIN_RESIDUAL_TERMS, BandFit, fit_band, fit_real_constants, remove_residual_terms
 from modal.poles import select_physical_poles
@@ -40,7 +40,7 @@ class LocalBand:
         return max(resonance.height for resonance in self.resonances)
 
 
-def group_into_bands(resonances: Sequence[Resonance], frequency: NDArray[np.float64]) -> list[LocalBand]:
+def group_into_bands(resonances: Sequence[Resonance], frequency: Floats) -> list[LocalBand]:
     """Bands around close resonances; neighbouring ones meet between them, in proportion to their half-widths.
 
     resonances come by rising frequency, frequency (Hz) has shape (n,).
@@ -81,7 +81,7 @@ def _band_boundary(a: Resonance, b: Resonance) -> float:
     return (a.frequency * b.half_width + b.frequency * a.half_width) / (a.half_width + b.half_width)
 
 
-def _band_lines(group: tuple[Resonance, ...], below: float, above: float, frequency: NDArray[np.float64]) -> slice:
+def _band_lines(group: tuple[Resonance, ...], below: float, above: float, frequency: Floats) -> slice:
     low = max(below, min(r.frequency - BAND_MARGIN_HALF_WIDTHS * r.half_width for r in group))
     high = min(above, max(r.frequency + BAND_MARGIN_HALF_WIDTHS * r.half_width for r in group))
     first, last = np.searchsorted(frequency, [group[0].frequency, group[-1].frequency])
@@ -130,9 +130,7 @@ def refit_with_real_constants(band: FittedBand) -> FittedBand:
     return replace(band, fit=fit) if np.all(are_modes(fit, data.frequency, band.height)) else band
 
 
-def are_modes(
-    fit: BandFit, frequency: Floats, height: Floats, largest_error: float = MAX_PEAK_FIT_ERROR
-) -> NDArray[np.bool_]:
+def are_modes(fit: BandFit, frequency: Floats, height: Floats, largest_error: float = MAX_PEAK_FIT_ERROR) -> Flags:
     """Which lie in the band, are high enough, and are known well enough in one of the FRFs at least."""
     return np.asarray(
         (fit.frequency > frequency[0])
@@ -163,9 +161,7 @@ def _residual_share(fit: BandFit, data: BandData) -> float:
 def _better_fit(a: tuple[BandFit, Floats] | None, b: tuple[BandFit, Floats] | None) -> tuple[BandFit, Floats] | None:
     """The one with more modes, of two with as many that which leaves less."""
     return max(
-        (fit for fit in (a, b) if fit is not None),
-        key=lambda fit: (fit[1].size, -fit[0].sum_of_squares),
-        default=None,
+        (fit for fit in (a, b) if fit is not None), key=lambda fit: (fit[1].size, -fit[0].sum_of_squares), default=None
     )
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from modal.arrays import Floats
 
 
 def usable_lines(frf: Frf, band: tuple[float, float] | None) -> Frf:
@@ -31,7 +31,7 @@ MIN_VARIANCE_SHARE = 1e-6
 """Share of the mean variance below which no line is believed."""
 
 
-def line_weights(frf: Frf) -> NDArray[np.float64]:
+def line_weights(frf: Frf) -> Floats:
     """Weights of the receptance, 1/rms of its noise up to a factor, shape (n,).
 
     The noise is that of the coherence where there are three averages or more (random error times |H|, squared and
@@ -46,7 +46,7 @@ def line_weights(frf: Frf) -> NDArray[np.float64]:
     return factor if mean == 0 else factor / np.sqrt(np.maximum(variance, MIN_VARIANCE_SHARE * mean) / mean)
 
 
-def incoherent_noise(frf: Frf) -> NDArray[np.float64]:
+def incoherent_noise(frf: Frf) -> Floats:
     """rms of the noise of what was measured that its coherence tells, shape (n,); 0 where it tells nothing.
 
     A coherence below 1 is that of several hits: of ten, where nobody said how many.
@@ -59,7 +59,7 @@ def incoherent_noise(frf: Frf) -> NDArray[np.float64]:
     return np.asarray(size * np.sqrt((1 - g2) / (2 * averages * g2)))
 
 
-def _smooth_variance(variance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smooth_variance(variance: Floats) -> Floats:
     """Running mean that a disturbed line (hum) does not spread over; such a line keeps its own variance."""
     most = DISTURBED_LINE_RATIO * scipy.ndimage.median_filter(variance, VARIANCE_SMOOTHING_LINES)
     return np.where(
@@ -67,7 +67,7 @@ def _smooth_variance(variance: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def measured_over_receptance(frf: Frf) -> NDArray[np.float64]:
+def measured_over_receptance(frf: Frf) -> Floats:
     """|measured quantity| over |receptance|: 1, omega or omega^2 by line, shape (n,)."""
     power = {"receptance": 0, "mobility": 1, "accelerance": 2}[frf.measured_as]
     return np.asarray((2 * np.pi * frf.frequency) ** power)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modal.bands.extraction import Complexes, FittedBand, Floats
+from modal.arrays import Complexes, Flags, Floats
+from modal.bands.extraction import FittedBand
 from modal.fitting import MAX_RESIDUAL_TERMS, BandFit, refit_nearby
 
 RESIDUAL_BLOCKS = 48
@@ -173,7 +173,7 @@ def _trial_changes(band: FittedBand) -> Iterator[Floats]:
             yield np.where(_is_peak_cut(fit, np.delete(data.frequency, part)), 0.0, moved).ravel()
 
 
-def _is_peak_cut(fit: BandFit, left_out: Floats) -> NDArray[np.bool_]:
+def _is_peak_cut(fit: BandFit, left_out: Floats) -> Flags:
     """Whether lines (Hz) that are left out belong to the peak of each mode, (m,)."""
     distance = np.abs(left_out[:, np.newaxis] - fit.frequency)
     return np.asarray(np.any(distance < TRIAL_PEAK_HALF_WIDTHS * np.prod(fit.poles, axis=0), axis=0))

@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from modal.arrays import Complexes, Flags, Floats
 
 MIN_SINGULAR_VALUE_SHARE = 1e-10
 """Share of the largest singular value below which an unknown cannot be told from the others."""
@@ -26,7 +24,7 @@ class FixedPoleFit:
 
     poles: Floats
     """Frequencies (Hz) and damping ratios, (2, m)."""
-    free: NDArray[np.bool_]
+    free: Flags
     """Whether each of them may move, (2 m,)."""
     q: Floats
     """Orthonormal bases of what the residual terms leave of the modes, (p, 2 n, c)."""
@@ -222,7 +220,7 @@ class BandFit:
     """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     phase_if_complex: Floats
     """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
-    held: NDArray[np.bool_]
+    held: Flags
     """Modes whose frequency and damping ratio were given and have no error, shape (m,)."""
 
     @cached_property

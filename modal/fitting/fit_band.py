@@ -10,17 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modal.fitting.band_fit import (
-    MIN_RESIDUAL_TERMS,
-    BandFit,
-    Complexes,
-    FixedPoleFit,
-    Floats,
-    residual_powers,
-    split_complex,
-)
+from modal.arrays import Complexes, Flags, Floats
+from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit, FixedPoleFit, residual_powers, split_complex
 
 MIN_CURVE_SEPARATION = 1e-2
 """Share of itself that each curve has beyond all others where normal equations lose no more than four digits."""
@@ -37,11 +29,11 @@ class ProjectedBand:
     """Orthonormal bases of the residual terms of each FRF, the same of real and imaginary parts, (p, n, terms)."""
     data: Floats
     """Values that they leave of each weighted FRF, (p, 1, 2 n)."""
-    held: NDArray[np.bool_]
+    held: Flags
     """Modes whose poles stay where they are, (m,)."""
 
     @cached_property
-    def _free(self) -> NDArray[np.bool_]:
+    def _free(self) -> Flags:
         """Whether each frequency and damping ratio may move, (2 m,)."""
         return np.tile(~self.held, 2)
 
@@ -68,9 +60,7 @@ class ProjectedBand:
         return FixedPoleFit(poles, self._free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
 
 
-def project_band(
-    frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: NDArray[np.bool_]
-) -> ProjectedBand:
+def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: Flags) -> ProjectedBand:
     """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,)."""
     bases = _term_bases(frequency, weight, terms)
     return ProjectedBand(
@@ -175,7 +165,7 @@ def fit_band(
     weight: Floats,
     starts: Floats,
     terms: int = MIN_RESIDUAL_TERMS,
-    held: NDArray[np.bool_] | None = None,
+    held: Flags | None = None,
 ) -> BandFit | None:
     """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None where nothing fits.
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from modal.arrays import Floats
 from modal.modes.mode import Mode, ratio_or_zero
 
 
@@ -90,7 +90,7 @@ def _window_widening(a: float) -> float:
     return float(a * np.expm1(-4 * a) / -(np.expm1(-2 * a) ** 2))
 
 
-def _phase_correlation(mode: Mode, slope: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _phase_correlation(mode: Mode, slope: Floats) -> Floats | None:
     """Of the error of the phase, which stays as it is, with those of the values without the window."""
     if mode.phase_correlation is None or mode.best_covariance is None:
         return mode.phase_correlation
@@ -98,7 +98,7 @@ def _phase_correlation(mode: Mode, slope: NDArray[np.float64]) -> NDArray[np.flo
     return ratio_or_zero(slope @ (mode.phase_correlation * mode.standard_error), error)
 
 
-def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float) -> NDArray[np.float64]:
+def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float) -> Floats:
     """Of frequency, damping ratio and stiffness without the window by those with it, shape (3, 3).
 
     w^2 = size^2 - 2 zeta size/tau + 1/tau^2.
@@ -239,7 +239,7 @@ def with_mass_uncertainty(mode: Mode, frf: Frf, mass_std: float) -> Mode:
     off = loading.frequency * mode.frequency, loading.frequency * mode.damping_ratio, loading.stiffness * mode.stiffness
     more = np.outer(off, off)
 
-    def widened(covariance: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    def widened(covariance: Floats | None) -> Floats | None:
         return None if covariance is None else covariance + more
 
     return replace(mode, covariance=widened(mode.covariance), jackknife=widened(mode.jackknife))

@@ -8,9 +8,10 @@ from itertools import chain
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from acquisition import Frf, Remark
+from modal.arrays import Complexes, Floats
 
 UNKNOWN_PHASE_STD_DEG = 90.0
 """Standard error (degrees) of a phase of which nothing is known."""
@@ -43,7 +44,7 @@ class Mode:
     stiffness: float
     """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative where Re A is; NaN of a mode seen in
     free decays alone, where no force was measured."""
-    covariance: NDArray[np.float64] | None = None
+    covariance: Floats | None = None
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
     That takes the errors of neighbouring lines as independent; what noise of the hammer adds, alike over many lines,
@@ -52,7 +53,7 @@ class Mode:
     """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
     method: str = ""
     """Method it was found by."""
-    jackknife: NDArray[np.float64] | None = None
+    jackknife: Floats | None = None
     """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
     """Hits that the jackknife left out in turn, of the FRF with the fewest."""
@@ -60,7 +61,7 @@ class Mode:
     """Phase of its modal constant times the sign of K (degrees), -90 to 90; 0 for a real mode."""
     phase_deg_std: float = 0.0
     """Standard error of that phase (degrees), of a mode that was found real, too; 0 where it was not asked for."""
-    phase_correlation: NDArray[np.float64] | None = None
+    phase_correlation: Floats | None = None
     """Correlations of the error of the phase with those of (frequency, damping_ratio, stiffness), shape (3,)."""
     coherence: float | None = None
     """Mean coherence between the half-power points; None where it is not known."""
@@ -74,7 +75,7 @@ class Mode:
     """Share of its decay that is left when the record ends; None where the length of the record is not known."""
     half_power_damping: float | None = None
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
-    shape: NDArray[np.float64] | None = None
+    shape: Floats | None = None
     """Mode shape over the FRFs of `fit_common_modes`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
     match_count: tuple[int, int] | None = None
     """Number of other FRFs of the same structure that have it too, and number of those looked at; None where nobody
@@ -138,7 +139,7 @@ class Mode:
         return complex(np.exp(1j * np.radians(self.phase_deg)) / self.stiffness)
 
     @property
-    def joint_covariance(self) -> NDArray[np.float64]:
+    def joint_covariance(self) -> Floats:
         """Covariance of (frequency, damping_ratio, stiffness, phase_deg), shape (4, 4); NaN where not estimated."""
         error = np.append(self.standard_error, self.phase_deg_std)
         correlation = np.eye(4)
@@ -147,24 +148,24 @@ class Mode:
         return np.asarray(correlation * np.outer(error, error))
 
     @property
-    def best_covariance(self) -> NDArray[np.float64] | None:
+    def best_covariance(self) -> Floats | None:
         """The covariance to go on with: over the hits where there are any, else that of the fit; None without both."""
         return self.covariance if self.jackknife is None else self.jackknife
 
     @property
-    def standard_error(self) -> NDArray[np.float64]:
+    def standard_error(self) -> Floats:
         """Standard errors of (frequency Hz, damping_ratio, stiffness N/m), shape (3,); NaN where not estimated.
 
         Over the hits where there are any, else those of the fit."""
         return _root_of_diagonal(self.best_covariance)
 
     @property
-    def fit_error(self) -> NDArray[np.float64]:
+    def fit_error(self) -> Floats:
         """Standard errors from `covariance`, with or without a jackknife, shape (3,); NaN where not estimated."""
         return _root_of_diagonal(self.covariance)
 
     @property
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Floats:
         """Correlations of the errors, shape (3, 3); NaN where not estimated, 0 with a value that has no error."""
         if self.best_covariance is None:
             return np.full((3, 3), np.nan)
@@ -179,7 +180,7 @@ class Mode:
         p = (1 + level) / 2
         return float(scipy.special.stdtrit(self.degrees_of_freedom if self.jackknife is None else self.n_hits - 1, p))
 
-    def interval(self, level: float = 0.95) -> NDArray[np.float64]:
+    def interval(self, level: float = 0.95) -> Floats:
         """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
 
         Student's t: with n_hits - 1 degrees of freedom over hits, else with those of the fit."""
@@ -200,19 +201,19 @@ class Mode:
             method=f"{self.method}, {method}".removeprefix(", "),
         )
 
-    def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(self, frequency: Floats) -> Complexes:
         """Receptance of this mode alone (m/N), same shape as frequency (Hz)."""
         r, zeta, constant = np.asarray(frequency) / self.frequency, self.damping_ratio, self.constant
         turned = constant.imag * (zeta + 1j * r) / np.sqrt(1 - zeta**2) if constant.imag else 0.0
         return np.asarray((constant.real + turned) / (1 - r**2 + 2j * zeta * r))
 
 
-def ratio_or_zero(value: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+def ratio_or_zero(value: Floats, error: Floats) -> Floats:
     """Values over errors; 0 where a value has none."""
     return np.divide(value, error, out=np.zeros(value.shape), where=error != 0)
 
 
-def _root_of_diagonal(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:
+def _root_of_diagonal(covariance: Floats | None) -> Floats:
     return np.full(3, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
 
 

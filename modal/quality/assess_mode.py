@@ -7,9 +7,9 @@ from dataclasses import replace
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf, Remark, is_smoothed
+from modal.arrays import Floats
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
 from modal.bands.residual_analysis import residual_near_mode
@@ -48,7 +48,7 @@ def with_truncation_error(mode: Mode) -> Mode:
     return replace(widened, phase_deg_std=of_phase, phase_correlation=mode.phase_correlation * kept)
 
 
-def _widen_covariance(covariance: NDArray[np.float64] | None, off: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _widen_covariance(covariance: Floats | None, off: Floats) -> Floats | None:
     """With further independent errors of what has one: a value that a person holds has none."""
     return None if covariance is None else covariance + np.diag(np.where(np.diag(covariance) > 0, off, 0.0) ** 2)
 

@@ -21,7 +21,8 @@ from acquisition import Frf
 from lobes import project_modes
 from lobewatch.machine import FEED_ANGLES, ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of, find_worst_limit
+from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_samples import find_worst_limit
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
 from modal import Mode, fit_modes, select_credible_modes, synthesize_frf
 
@@ -120,9 +121,7 @@ def sayings(count: int, seed: int, across: bool = False) -> list[Saying]:
     for rng in np.random.default_rng(seed).spawn(4 * count):
         spindle = random_spindle(rng)
         tool = spindle.assembly(rng, across)
-        limit, _, _ = find_worst_limit(
-            build_program(spindle.cut, MACHINE), tool, cutting_conditions_of(spindle.cut, MACHINE, tool)
-        )
+        limit, _, _ = find_worst_limit(ProgramCase(spindle.cut, tool, MACHINE))
         if 1e3 * limit.limit < DEEPEST_MM and len(made) < count:
             verdict = evaluate_program(_at(spindle.cut, 1e3 * limit.limit / 2), tool, MACHINE)
             made += [Saying(spindle, verdict)] if verdict.stability is not Stability.UNKNOWN else []

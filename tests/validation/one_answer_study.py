@@ -20,10 +20,11 @@ from lobes import build_milling_system, count_pieces, growth_rate, rows_at_speed
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_samples import build_program, draw_samples, find_worst_limit
+from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_samples import draw_samples, find_worst_limit
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets, recommend
-from lobewatch.verdicts.setting_robustness import ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
-from lobewatch.verdicts.setting_search import MIN_DEPTH_MARGIN, SettingSearch
+from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
+from lobewatch.verdicts.setting_search import SettingSearch
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 
@@ -63,7 +64,7 @@ def answers(numbers: range, seed: int, most_modes: int = 12, dense: bool = True)
         table, tool = program(milling, max(DEPTH_STEP_MM, limit * rng.uniform(0.3, 2.5))), assembly(milling)
         ask_everywhere(counts, f"{seed}.{number}", table, tool)
         if dense and len(counts.shares) < counts.cuts:
-            counts.shares.append(share_of_best(SettingSearch(table, tool, MACHINE)))
+            counts.shares.append(share_of_best(SettingSearch(ProgramCase(table, tool, MACHINE))))
             sys.stdout.write(
                 f"{number} {_about(milling)} {counts.seconds[-1]:.1f} s, {counts.shares[-1]:.3f} of best\n"
             )
@@ -125,9 +126,9 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
     """Whether the middle is stable at speeds (rpm) at the depth that so many chips ask for, with all to spare."""
     depths = (np.floor(chips / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM * (1 + MIN_DEPTH_MARGIN) / 1e3
     calm = np.ones(speeds.size, dtype=bool)
-    for vectors in search.spindle.principal_directions.sign_patterns:
-        system = build_milling_system(search.spindle.x, search.spindle.y, vectors)
-        for cut in search.cuts:
+    for vectors in search.case.spindle.principal_directions.sign_patterns:
+        system = build_milling_system(search.case.spindle.x, search.case.spindle.y, vectors)
+        for cut in search.case.cuts:
             rows = rows_at_speeds(system, cut, speeds[calm])
             grown = growth_rate(rows, depths[calm, np.newaxis], count_pieces(rows, float(np.max(depths))))[:, 0]
             calm[calm] = grown < 0
@@ -138,11 +139,11 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
     """Whether the middle and the hardest draws let a setting pass."""
-    at = build_program(_at(search.table, speed, depth_mm), MACHINE)
-    limit, axes, _ = find_worst_limit(at, search.spindle, search.cuts)
+    at = search.case.at(speed, depth_mm)
+    limit, axes, _ = find_worst_limit(at)
     if limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
         return False
-    drawn = draw_samples(at, limit, search.cuts, search.spindle, search.uncertainty, axes).with_lowest_cuts(np.inf, 2)
+    drawn = draw_samples(at, limit, axes).with_lowest_cuts(np.inf, 2)
     force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
     hardest = drawn[np.argsort(-np.max(force, axis=1))[:HARDEST]]
     return not np.any(

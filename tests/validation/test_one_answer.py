@@ -11,6 +11,7 @@ from random_milling import random_case
 from verdict_study import MACHINE, assembly, program
 
 from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.recommendation import find_stable_pockets
 from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
@@ -53,7 +54,7 @@ def test_no_depth_is_named_that_would_be_asked_about() -> None:
 def search_of(number: int, depth_mm: float = 1.0) -> SettingSearch:
     """Of a random cut; where it is deep itself, so may be what is looked for."""
     milling = random_case(np.random.default_rng(6).spawn(number + 1)[number])
-    return SettingSearch(program(milling, depth_mm), assembly(milling), MACHINE)
+    return SettingSearch(ProgramCase(program(milling, depth_mm), assembly(milling), MACHINE))
 
 
 @pytest.mark.parametrize(("number", "depth_mm"), [(19, 1.0), (234, 1.0), (348, 14.36)])
@@ -63,7 +64,7 @@ def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_
     """Few depths are looked at on the way, and step over such islands."""
     search = search_of(number, depth_mm)
     assert search.best is not None
-    nearest = search.nearest_window(search.table.depth_mm, search.table.speed_rpm)
+    nearest = search.nearest_window(search.case.table.depth_mm, search.case.table.speed_rpm)
     assert nearest is None or search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
 
 
@@ -85,7 +86,7 @@ def test_one_look_at_a_depth_at_which_draws_chatter_in_a_cut_passed_over_says_ho
 
 
 def test_no_depth_is_named_that_is_so_small_that_it_would_be_asked_about() -> None:
-    table, tool = search_of(934).table, search_of(934).assembly
+    table, tool = search_of(934).case.table, search_of(934).case.assembly
     named = find_stable_pockets(table, tool, MACHINE)
     assert named
     assert min(setting.depth_mm for setting in named) >= 0.002 * table.tool_diameter_mm > 0.05

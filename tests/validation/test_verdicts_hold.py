@@ -14,8 +14,8 @@ from verdict_study import MACHINE, assembly, chattering, limit_mm, program, stud
 from lobes import count_pieces, growth_rate
 from lobewatch.machine import ToolWear
 from lobewatch.verdicts.monte_carlo import run_monte_carlo
-from lobewatch.verdicts.program_samples import build_median_row, build_program, cutting_conditions_of
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.program_case import ProgramCase, build_program, cutting_conditions_of
+from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import WEAR_FACTORS, uncertainty_of
 from lobewatch.verdicts.verdict import Stability, classify_stability, evaluate_program
 
@@ -96,11 +96,8 @@ def test_shares_that_are_called_stable_by_wear() -> None:
         limit = limit_mm(milling) if len(milling.x + milling.y) <= 6 else math.inf
         for (wear, part), said in words.items() if math.isfinite(limit) else ():
             worn = msgspec.structs.replace(program(milling, part * limit), wear=wear)
-            said.append(
-                classify_stability(
-                    worn, run_monte_carlo(worn, assembly(milling), MACHINE, NO_TEST_CUTS), assembly(milling)
-                )
-            )
+            case = ProgramCase(worn, assembly(milling), MACHINE)
+            said.append(classify_stability(case, run_monte_carlo(case)))
     shares = {key: float(np.mean([word is Stability.STABLE for word in said])) for key, said in words.items()}
     say(
         f"{len(words['new', 0.5])} programs: "

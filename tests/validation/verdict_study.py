@@ -21,7 +21,7 @@ from lobes import program_limit
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import build_program, cutting_conditions_of
 from lobewatch.verdicts.recommendation import advise
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode

@@ -1,1 +1,1 @@
-"""What a recorded file holds, what a person adds to that, and the hits or the FRF that follow from both."""
+"""Contents of a recorded file, the user's description of it, and the hits or the FRF resolved from both."""

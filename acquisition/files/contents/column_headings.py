@@ -65,7 +65,7 @@ COLUMN_ROLES: dict[str, tuple[Role, str]] = {
     "tacho": ("tacho", ""),
     "-": ("ignored", ""),
 }
-"""What `--columns` may call a column -> its role and quantity."""
+"""What `Description.columns` may call a column -> its role and quantity."""
 
 
 def split_heading(heading: str) -> tuple[str, str]:
@@ -109,9 +109,7 @@ def infer_role(name: str, unit: str) -> Role:
     """What a column is by its name and its unit, the unit first; empty where neither tells."""
     letters = unicodedata.normalize("NFKD", name.strip().lower())
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
-    plain = (
-        _FRF_PREFIX.sub("", plain, count=1) if _FRF_PREFIX.match(plain) and not _FRF_PREFIX.fullmatch(plain) else plain
-    )
+    plain = plain if _FRF_PREFIX.fullmatch(plain) else re.sub(rf"^(?:{_FRF_PREFIX.pattern})", "", plain, count=1)
     by_name = next((role for pattern, role in _ROLE_PATTERNS if re.match(pattern, plain)), "")
     parsed = parse_unit(unit)
     quantity = parsed.quantity if parsed else ""
@@ -125,8 +123,8 @@ def infer_role(name: str, unit: str) -> Role:
     return by_name  # type: ignore[return-value]
 
 
-def assign_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: ImportReport) -> tuple[Signal, ...]:
-    """The signals with the roles and units that `columns` gives them, in its order; what it leaves out is left out.
+def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: ImportReport) -> tuple[Signal, ...]:
+    """Return the signals with the roles and units that `columns` gives them, in its order, without the others.
 
     "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
     second column of H.
@@ -134,62 +132,60 @@ def assign_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Im
     named = list[Signal]()
     in_order = not any("=" in text for text in columns)
     if in_order and len(columns) < len(signals):
-        ledger.faults.append(
-            f"--columns names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}; name all in "
+        names = format_signal_names(signals)
+        report.faults.append(
+            f"Description.columns names {len(columns)} of its {len(signals)} columns, which are {names}; name all in "
             'their order, "-" for what is left out, or each as in "real=2"'
         )
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
-        signal = _select_signal(signals, name.strip(), number, ledger)
+        signal = _select_signal(signals, name.strip(), number, report)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
-            ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(COLUMN_ROLES)}")
+            report.reject("columns", repr(text), f"{word!r} is none of {', '.join(COLUMN_ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = infer_decibel_unit(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
-                ledger.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
+                report.reject("columns", repr(text), f"{signal.name} is named twice; name each column once")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
     return tuple(named)
 
 
-def _select_signal(signals: Sequence[Signal], name: str, number: int, ledger: ImportReport) -> Signal | None:
-    if not name and number < len(signals):
-        return signals[number]
+def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal | None:
     if name:
-        return find_column(signals, name, "--columns", ledger)
-    ledger.faults.append(f"--columns: no column {number + 1} in the file, which holds {format_signal_names(signals)}")
+        return find_column(signals, name, "columns", report)
+    if number < len(signals):
+        return signals[number]
+    fault = f"no column {number + 1} in the file, which holds {format_signal_names(signals)}"
+    report.reject("columns", None, fault)
     return None
 
 
-def find_column(signals: Sequence[Signal], name: str, option: str, ledger: ImportReport) -> Signal | None:
-    """That of a name, heading, unit or number; None where there is none or are several, which the ledger says."""
+def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal | None:
+    """Find the column of a name, heading, unit or number; None where the report says that there is not one."""
     meant = _match_columns(signals, name)
     if len(meant) == 1:
         return meant[0]
-    names = format_signal_names(signals)
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
-        ledger.faults.append(f"{option}: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
+        fault = f"{len(meant)} columns are called {name!r}; say which by its number, {numbers}"
     else:
-        ledger.faults.append(f"{option}: nothing called {name!r} in the file, which holds {names}")
+        fault = f"nothing called {name!r} in the file, which holds {format_signal_names(signals)}"
+    report.reject(field_name, None, fault)
     return None
 
 
 def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
-    """Those of a name, else shown so, of this number, of this unit."""
+    """Return the columns of a name, else shown so, of this number, or of this unit."""
     unit = parse_unit(name)
     tests: tuple[Callable[[int, Signal], bool], ...] = (
         lambda _, signal: signal.name == name,
-        lambda _, signal: (
-            name in (_format_signal_name(signal), f"{_format_signal_name(signal)} ({signal.values.size})")
-        ),
+        lambda _, signal: name in (_format_signal_name(signal), _format_signal_name(signal, with_size=True)),
         lambda _, signal: bool(signal.unit) and split_heading(name) == (signal.name, signal.unit),
         lambda _, signal: re.fullmatch(rf"{re.escape(name)}:\d+", signal.name) is not None,
         lambda number, _: name == str(number),
-        lambda _, signal: (
-            bool(signal.unit) and (signal.unit == name or (unit is not None and parse_unit(signal.unit) == unit))
-        ),
+        lambda _, signal: bool(signal.unit) and (signal.unit == name or unit == parse_unit(signal.unit) is not None),
     )
     for test in tests:
         if meant := [signal for number, signal in enumerate(signals, 1) if test(number, signal)]:
@@ -198,15 +194,12 @@ def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
 
 
 def format_signal_names(signals: Sequence[Signal], most: int = 12) -> str:
-    """What a file holds, for a sentence: names with units, and with how long they are where they differ in that."""
+    """Return the names and units of signals for a sentence, with their lengths where these differ."""
     with_size = len({signal.values.size for signal in signals}) > 1
-    whole = [
-        f"{_format_signal_name(signal)} ({signal.values.size})" if with_size else _format_signal_name(signal)
-        for signal in signals
-    ]
-    return ", ".join(whole[:most]) + (f" and {len(whole) - most} more" if len(whole) > most else "")
+    names = [_format_signal_name(signal, with_size=with_size) for signal in signals]
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def _format_signal_name(signal: Signal) -> str:
+def _format_signal_name(signal: Signal, *, with_size: bool = False) -> str:
     text = f"{signal.name} [{signal.unit}]" if signal.unit else signal.name
-    return re.sub(r"\s+", " ", text)
+    return re.sub(r"\s+", " ", text) + (f" ({signal.values.size})" if with_size else "")

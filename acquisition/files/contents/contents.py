@@ -98,9 +98,9 @@ def list_distinct_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def cut_to_shortest(
-    used: Sequence[Signal], axes: Sequence[Signal], ledger: ImportReport
+    used: Sequence[Signal], axes: Sequence[Signal], report: ImportReport
 ) -> tuple[list[Signal], list[Signal]]:
-    """Columns and their axes cut to where the first of them ends, which the ledger tells; others as they are.
+    """Columns and their axes cut to where the first of them ends, which the report tells; others as they are.
 
     Of several axes only the longest counts: the others may be those of other columns.
     """
@@ -109,7 +109,7 @@ def cut_to_shortest(
         return list(used), list(axes)
     shortest, n = by_size[0], _count_values(by_size[0])
     if _count_values(by_size[-1]) > n:
-        ledger.add_fact("rows", f"{n} of {_count_values(by_size[-1])}, as {shortest.name} ends there", "default")
+        report.add_fact("rows", f"{n} of {_count_values(by_size[-1])}, as {shortest.name} ends there", "default")
     cut = [[replace(column, values=column.values[:n]) for column in columns] for columns in (used, axes)]
     return cut[0], cut[1]
 
@@ -119,12 +119,13 @@ def has_same_axis(one: Signal, other: Signal) -> bool:
     return one.record == other.record and (_is_in_same_table(one, other) or one.values.shape == other.values.shape)
 
 
-def report_flaws(used: Sequence[Signal], ledger: ImportReport, first: int = 0) -> None:
+def report_flaws(used: Sequence[Signal], report: ImportReport, first: int = 0) -> None:
     """A fault for each column with a flaw from this place on."""
     for column in used:
         flaw = next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), "")
         if flaw:
-            ledger.faults.append(f"{column.name} {flaw}; mend it there, or leave {column.name} out of --columns")
+            remedy = f"mend it there, or leave {column.name} out of Description.columns"
+            report.faults.append(f"{column.name} {flaw}; {remedy}")
 
 
 def _is_in_same_table(one: Signal, other: Signal) -> bool:

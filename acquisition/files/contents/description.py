@@ -69,7 +69,7 @@ class Description:
     def list_signal_options(self) -> list[str]:
         """The options that were given and that say something of the signals in the file."""
         names = [option.name for option in fields(self) if option.name not in _LABEL_FIELDS]
-        return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) not in ("", (), None)]
+        return [f"Description.{name}" for name in names if getattr(self, name) not in ("", (), None)]
 
 
 Origin = Literal["file", "option", "default"]
@@ -89,32 +89,37 @@ class Fact:
 
 @dataclass
 class ImportReport:
-    """Filled while a file is understood."""
+    """Facts, gaps and faults of a recording, collected while its contents are resolved."""
 
     facts: list[Fact] = field(default_factory=list)
-    """Facts that are known."""
+    """Known facts."""
     missing: list[str] = field(default_factory=list)
-    """Facts that the file does not say, each with the option that says it."""
+    """Facts that the file does not state, each with the field of the description that states it."""
     faults: list[str] = field(default_factory=list)
-    """Faults that stand in the way."""
+    """Faults that prevent the import."""
 
     def add_fact(self, name: str, value: str, origin: Origin = "file") -> None:
-        """A fact."""
+        """Add a known fact."""
         self.facts.append(Fact(name, value, origin))
 
+    def add_missing(self, fact: str, field_name: str, example: str = "") -> None:
+        """Add a fact that is missing, and the field of the description that states it, with an example."""
+        self.missing.append(f"{fact} (Description.{field_name}{example})")
+
+    def reject(self, field_name: str, value: object, fault: str) -> None:
+        """Add the fault of a field of the description and its value; None leaves the value out."""
+        shown = "" if value is None else f" {value}"
+        self.faults.append(f"Description.{field_name}{shown}: {fault}")
+
     def merge(self, other: ImportReport) -> None:
-        """All that another one holds."""
+        """Add all entries of another report."""
         self.facts += other.facts
         self.missing += other.missing
         self.faults += other.faults
 
-    def add_missing(self, fact: str, option: str) -> None:
-        """Something is missing."""
-        self.missing.append(f"{fact} ({option})")
-
-    def add_contradiction(self, option: str, given: object, in_file: object) -> None:
-        """An option says other than the file."""
-        self.faults.append(f"{option} {given}: the file says {in_file}; leave the option out")
+    def add_contradiction(self, field_name: str, given: object, in_file: object) -> None:
+        """Add the fault of a field that differs from the file."""
+        self.reject(field_name, given, f"the file says {in_file}; leave the option out")
 
     @property
     def is_clean(self) -> bool:
@@ -122,7 +127,6 @@ class ImportReport:
         return not self.missing and not self.faults
 
     def format_problems(self) -> str:
-        """All that is missing and wrong; empty where nothing is."""
-        sentences = ["; ".join(self.faults)] if self.faults else []
-        sentences += [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
-        return "; ".join(sentences)
+        """Return all that is missing and wrong; empty where nothing is."""
+        missing = [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
+        return "; ".join([*self.faults, *missing])

@@ -1,4 +1,4 @@
-"""A recorded file as it is understood: hits or an FRF, where each fact is from, and what is missing."""
+"""Recorded file as it is understood: hits or an FRF, the origin of each fact, and what is missing."""
 
 from __future__ import annotations
 
@@ -18,71 +18,71 @@ from acquisition.hit import Hit
 from acquisition.tap_test import Conditions
 
 ANY_COLUMNS_EXAMPLE = (
-    f"{HIT_COLUMNS_EXAMPLE}, those of --force FILE where the force stands in another file behind them; or {FRF_COLUMNS_EXAMPLE}, "
-    "without time where --rate says it, without frequency where --spacing does"
+    f"{HIT_COLUMNS_EXAMPLE}, those of Description.force FILE where the force stands in another file behind them; or "
+    f"Description.columns{FRF_COLUMNS_EXAMPLE}, without time where Description.rate says it, "
+    "without frequency where Description.spacing does"
 )
-"""How any of both is named."""
+"""Example of the columns of either hits or an FRF."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recorded file, understood as far as it can be."""
+    """Recorded file, understood as far as possible."""
 
     path: Path
-    """File it was read from."""
+    """File that was read."""
     title: str
     """Name of its format, for people."""
     hits: tuple[Hit, ...] = ()
-    """Hits in SI units; empty where it holds only an FRF, or where something is missing or wrong."""
+    """Hits in SI units; empty where the file holds only an FRF, or where something is missing or wrong."""
     frf: Frf | None = None
-    """The FRF that it holds; None where there is none, or where something is missing or wrong."""
+    """FRF of the file; None without one, or where something is missing or wrong."""
     facts: tuple[Fact, ...] = ()
-    """Facts that are known, each from the file, by option or by default."""
+    """Known facts, each from the file, by option or by default."""
     problems: str = ""
-    """Text on what is missing, with the options that say it, and what is wrong; empty where nothing is."""
+    """What is missing, with the fields of `Description` that state it, and what is wrong; empty where nothing is."""
     created: datetime | None = None
-    """Time of recording, where the file says so (timezone-aware)."""
+    """Time of recording (timezone-aware); None where unknown."""
     tool: str = ""
-    """Name of the tool in the spindle, where the file says so."""
+    """Name of the tool in the spindle; empty where unknown."""
     direction: str = ""
-    """Direction at the tool tip, where the file says so."""
+    """Direction at the tool tip; empty where unknown."""
     operator: str = ""
-    """Name of the person who held the hammer, where the file says so."""
+    """Name of the person with the hammer; empty where unknown."""
     device: str = ""
-    """Recording device, where the file says so."""
+    """Recording device; empty where unknown."""
     conditions: Conditions | None = None
-    """Conditions it was taken under; None where it is no tap file of ours."""
+    """Conditions of the test; None where the file is not a tap file of lobewatch."""
     window: float | None = None
-    """Time constant (s) of the exponential window over the response that the file names; NaN where it does not say how
-    its window falls, None where there is none."""
+    """Time constant of the exponential window over the response (s); NaN where unknown, None without a window."""
 
     def require_valid(self) -> Recording:
-        """Itself; DataError with all that is missing or wrong."""
+        """Return this recording; raise DataError with all that is missing or wrong."""
         if self.problems:
             raise DataError(f"{self.path}: {self.problems}")
         return self
 
 
 def resolve_recording(path: Path, title: str, contents: Contents, description: Description) -> Recording:
-    """Hits where signals over time are all there is, else the FRF."""
-    ledger = ImportReport()
-    signals = assign_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    """Return the hits where the contents are only signals over time, else the FRF."""
+    report = ImportReport()
+    signals = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
     contents = replace(contents, signals=signals)
-    frf, hits = (None, []) if ledger.faults else _resolve_frf_or_hits(contents, description, ledger)
+    frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, description, report)
     if len(contents.machines) > 1:
-        ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
+        report.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
-        ledger.add_fact("window", window)
+        report.add_fact("window", window)
     for note in contents.notes:
-        ledger.add_fact("note", note)
+        report.add_fact("note", note)
     return Recording(
         path,
         title,
         tuple(hits),
         frf,
-        tuple(ledger.facts),
-        ledger.format_problems(),
+        tuple(report.facts),
+        report.format_problems(),
         contents.created,
         contents.tool,
         contents.direction,
@@ -91,35 +91,32 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
 
 
 def _resolve_frf_or_hits(
-    contents: Contents, description: Description, ledger: ImportReport
+    contents: Contents, description: Description, report: ImportReport
 ) -> tuple[Frf | None, list[Hit]]:
-    """Neither where something is missing or wrong, which the ledger then says."""
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
     if find_frf_candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _report_useless_options(description, ("rate", "full_scale", "force"), "an FRF", ledger)
-        return resolve_frf(contents, description, ledger), []
+        _reject_useless_fields(description, ("rate", "full_scale", "force"), "an FRF", report)
+        return resolve_frf(contents, description, report), []
     if not signals:
-        ledger.faults.append("it holds no columns of numbers")
+        report.faults.append("it holds no columns of numbers")
     elif over_frequency or not _is_over_time(signals):
-        ledger.add_missing(
-            f"what its columns are ({format_signal_names(signals)})",
-            FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE,
-        )
+        example = FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE
+        report.add_missing(f"what its columns are ({format_signal_names(signals)})", "columns", example)
     else:
-        _report_useless_options(description, ("averages",), "hits, and they are counted", ledger)
-        _report_useless_options(description, ("spacing", "start"), "signals over time", ledger)
-        return None, resolve_hits(contents, description, ledger)
+        _reject_useless_fields(description, ("averages",), "hits, and they are counted", report)
+        _reject_useless_fields(description, ("spacing", "start"), "signals over time", report)
+        return None, resolve_hits(contents, description, report)
     return None, []
 
 
 def _is_over_time(signals: Sequence[Signal]) -> bool:
-    over_time = any(signal.role in ("time", "force", "response") or signal.rate for signal in signals)
-    return over_time or any(signal.per_full_scale for signal in signals)
+    return any(
+        signal.role in ("time", "force", "response") or signal.rate or signal.per_full_scale for signal in signals
+    )
 
 
-def _report_useless_options(description: Description, names: Sequence[str], content: str, ledger: ImportReport) -> None:
-    """Options that say nothing of what the file holds."""
+def _reject_useless_fields(description: Description, names: Sequence[str], content: str, report: ImportReport) -> None:
     for name in names:
         if getattr(description, name) not in ((), None):
-            ledger.faults.append(f"--{name.replace('_', '-')}: the file holds {content}; leave the option out")
+            report.reject(name, None, f"the file holds {content}; leave the option out")

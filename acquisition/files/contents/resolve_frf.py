@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
 from acquisition.files.contents.description import Description, ImportReport
@@ -17,30 +17,20 @@ from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_u
 from acquisition.files.contents.units import parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
-_HERTZ_NAMES = re.compile(r"f|hz|column \d+|(?!.*(ang|circ|omega|rad)).*freq.*", re.IGNORECASE)
-"""Names of a frequency proper, and that of a column that has none."""
-_ROUND_STEP_DIGITS, _ROUND_STEP_TOLERANCE = 5, 3e-7
-"""Digits of a round step, and how far, relative, one may be off that: the last of seven printed digits."""
-
-
-def is_angular(axis: Signal) -> bool:
-    """Whether it may be."""
-    values = np.asarray(axis.values.real, dtype=np.float64)
-    step = float(values[-1] - values[0]) / max(values.size - 1, 1)
-    return not _HERTZ_NAMES.fullmatch(axis.name.strip()) or (not _is_round(step) and _is_round(step / (2 * math.pi)))
-
-
-def _is_round(step: float) -> bool:
-    return step > 0 and abs(float(f"{step:.{_ROUND_STEP_DIGITS - 1}e}") / step - 1) < _ROUND_STEP_TOLERANCE
-
-
-FRF_COLUMNS_EXAMPLE = '--columns "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
-"""How an FRF is named."""
+FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
+"""Example of the columns of an FRF."""
 FRF_FORM_BY_MOTION: dict[str, FrfQuantity] = {
     "displacement": "receptance",
     "velocity": "mobility",
     "acceleration": "accelerance",
 }
+"""Form of an FRF by the quantity of its response."""
+MAX_INVALID_COHERENCE_SHARE = 0.02
+"""Share of the lines that may have a coherence outside 0 to 1, as the first lines of some analysers have."""
+_HERTZ_NAMES = re.compile(r"f|hz|column \d+|(?!.*(ang|circ|omega|rad)).*freq.*", re.IGNORECASE)
+"""Names of a frequency in Hz, and the name of a column without one."""
+_ROUND_STEP_DIGITS, _ROUND_STEP_TOLERANCE = 5, 3e-7
+"""Digits of a round step, and its relative tolerance: the last of seven printed digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +40,10 @@ class FrfCandidate:
     signal: Signal
     """Signal that names it: the complex values, the real part or the magnitude."""
     partner: Signal | None = None
-    """The imaginary part or the phase."""
+    """Imaginary part or phase."""
 
     def format_columns_option(self) -> str:
-        """Its columns as `--columns` names them."""
+        """Return its columns as `Description.columns` names them."""
         return ",".join(f"{part.role}={part.name}" for part in self.parts)
 
     @property
@@ -63,7 +53,7 @@ class FrfCandidate:
 
 
 def find_frf_candidates(signals: Sequence[Signal]) -> list[FrfCandidate]:
-    """The FRFs among signals: complex ones, and pairs in their order."""
+    """Find the FRFs among signals: complex ones, and pairs in their order."""
     listed = [FrfCandidate(signal) for signal in signals if signal.role == "frf"]
     for first, second in (("real", "imag"), ("magnitude", "phase")):
         seconds: Iterator[Signal | None] = iter([part for part in signals if part.role == second])
@@ -71,43 +61,39 @@ def find_frf_candidates(signals: Sequence[Signal]) -> list[FrfCandidate]:
     return listed
 
 
-def resolve_frf(contents: Contents, description: Description, ledger: ImportReport) -> Frf | None:
-    """The FRF; None where something is missing or wrong, which the ledger then says."""
+def resolve_frf(contents: Contents, description: Description, report: ImportReport) -> Frf | None:
+    """Return the FRF of some contents; None where the report says what is missing or wrong."""
     listed = find_frf_candidates(contents.signals)
     if not listed:
-        ledger.add_missing("what its columns are", FRF_COLUMNS_EXAMPLE)
+        report.add_missing("what its columns are", "columns", FRF_COLUMNS_EXAMPLE)
         return None
-    signal = choose_signal([candidate.signal for candidate in listed], description.response, "FRFs", ledger)
-    n_averages = _resolve_averages(contents, description, ledger)
+    signal = choose_signal([candidate.signal for candidate in listed], description.response, "FRFs", report)
+    n_averages = _resolve_averages(contents, description, report)
     candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
     coherence = _find_coherence(contents, listed.index(candidate), candidate.signal)
     axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == candidate.signal.record]
-    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, ledger)
+    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, report)
     candidate = FrfCandidate(*used[: len(candidate.parts)])
-    values = _compute_complex_values(candidate, ledger)
-    unit = resolve_frf_unit(candidate.signal, description, ledger)
-    frequency = _resolve_frequency(contents, candidate, axes, description, ledger)
-    shares = _resolve_coherence(used[-1] if coherence else None, ledger)
-    report_flaws(candidate.parts, ledger, int(frequency is None or frequency[0] == 0))
-    if frequency is None or values is None or unit is None or not ledger.is_clean:
+    values = _compute_complex_values(candidate, report)
+    unit = resolve_frf_unit(candidate.signal, description, report)
+    frequency = _resolve_frequency(contents, candidate, axes, description, report)
+    shares = _resolve_coherence(used[-1] if coherence else None, report)
+    report_flaws(candidate.parts, report, int(frequency is None or frequency[0] == 0))
+    if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
     shares = None if shares is None else shares[first:]
     try:
         return _make_frf(frequency[first:], values[first:] * unit[1], shares, n_averages, FRF_FORM_BY_MOTION[unit[0]])
     except ValueError as error:
-        ledger.faults.append(str(error))
+        report.faults.append(str(error))
         return None
 
 
 def _make_frf(
-    frequency: NDArray[np.float64],
-    values: NDArray[np.complex128],
-    coherence: NDArray[np.float64] | None,
-    n_averages: int,
-    form: FrfQuantity,
+    frequency: Floats, values: Complexes, coherence: Floats | None, n_averages: int, form: FrfQuantity
 ) -> Frf:
-    """values: in SI, of the form that they have in the file."""
+    """Make an FRF from SI values of this form."""
     if form == "receptance":
         return Frf(frequency, values, coherence, n_averages)
     if form == "mobility":
@@ -116,135 +102,142 @@ def _make_frf(
     return from_accelerance(frequency, values, coherence, n_averages)
 
 
-def _compute_complex_values(candidate: FrfCandidate, ledger: ImportReport) -> NDArray[np.complex128] | None:
-    """Complex values in the unit of the file."""
+def _compute_complex_values(candidate: FrfCandidate, report: ImportReport) -> Complexes | None:
+    """Return the complex values in the unit of the file."""
     first, second = candidate.signal, candidate.partner
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
-            ledger.faults.append(f"{first.name} holds real numbers; an FRF is complex")
+            report.faults.append(f"{first.name} holds real numbers; an FRF is complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
-        partner = "imaginary part" if first.role == "real" else "phase"
-        ledger.add_missing(
-            f"the {partner} of {first.name}", '--columns "frequency,real,imag" or "frequency,magnitude,phase"'
-        )
-        return None
-    if first.role == "real" and second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
-        ledger.faults.append(
-            f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}; they must be the same"
-        )
+        fact = f"the {'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
+        report.add_missing(fact, "columns", ' "frequency,real,imag" or "frequency,magnitude,phase"')
         return None
     if first.role == "real":
+        if second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
+            units = f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}"
+            report.faults.append(f"{units}; they must be the same")
+            return None
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLE_UNITS.get(second.unit.lower(), "")
     if not angle:
-        ledger.add_missing("the unit of its phase", '--columns "frequency,magnitude,phase [deg]"')
+        report.add_missing("the unit of its phase", "columns", ' "frequency,magnitude,phase [deg]"')
+        return None
+    if not is_decibel(first.unit) and np.any(first.values < 0):
+        fact = f"whether {first.name}, which falls below 0, is in dB"
+        report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
         return None
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
-    if not is_decibel(first.unit) and np.any(first.values < 0):
-        ledger.add_missing(
-            f"whether {first.name}, which falls below 0, is in dB", '--columns "frequency,db,phase [deg]"'
-        )
-        return None
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
     return np.asarray(size * np.exp(1j * phase))
 
 
 def _is_same_unit(one: str, other: str) -> bool:
-    known = parse_unit(one)
-    return one == other if known is None else known == parse_unit(other)
+    unit = parse_unit(one)
+    return one == other if unit is None else unit == parse_unit(other)
+
+
+def _resolve_frequency(
+    contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, report: ImportReport
+) -> Floats | None:
+    """Return the frequencies of the lines (Hz)."""
+    axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
+    if axis is None:
+        return _make_even_frequency(contents.signals, frf, description, report)
+    report_flaws([axis], report)
+    if description.spacing is not None or description.start is not None:
+        fault = f"the file holds its frequencies, {axis.name}; leave them out"
+        report.faults.append(f"Description.spacing, Description.start: {fault}")
+        return None
+    if not axis.unit and _is_angular(axis):
+        report.add_missing(f"the unit of {axis.name}, Hz or rad/s", "columns", f' "frequency [rad/s]={axis.name},..."')
+        return None
+    unit = parse_unit(axis.unit or "Hz")
+    if unit is None or unit.quantity != "frequency":
+        report.faults.append(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
+        return None
+    values = np.asarray(axis.values, dtype=np.float64) * unit.factor
+    report.add_fact("lines", _format_lines(values.size, *(axis.values[[0, -1]] * unit.factor)))
+    if not axis.unit:
+        report.add_fact("frequency", "in Hz", "default")
+    return values
+
+
+def _is_angular(axis: Signal) -> bool:
+    """Return whether a frequency without a unit may be in rad/s: by its name, or as its steps are round only in Hz."""
+    values = np.asarray(axis.values.real, dtype=np.float64)
+    step = float(values[-1] - values[0]) / max(values.size - 1, 1)
+    return not _HERTZ_NAMES.fullmatch(axis.name.strip()) or (not _is_round(step) and _is_round(step / (2 * math.pi)))
+
+
+def _is_round(step: float) -> bool:
+    return step > 0 and abs(float(f"{step:.{_ROUND_STEP_DIGITS - 1}e}") / step - 1) < _ROUND_STEP_TOLERANCE
 
 
 def _make_even_frequency(
-    signals: Sequence[Signal], frf: FrfCandidate, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
-    """Frequencies of the lines of an FRF (Hz), as a person says."""
+    signals: Sequence[Signal], frf: FrfCandidate, description: Description, report: ImportReport
+) -> Floats | None:
+    """Return the frequencies of the lines by the spacing in the description (Hz)."""
     n, step, start = frf.signal.values.size, description.spacing, description.start or 0.0
     if step is None:
+        fact, by_spacing = "the frequencies of its lines", "spacing 0.5 Description.start 0 in Hz"
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
-        by_name = f'--columns "frequency [Hz]={axis},{frf.format_columns_option()}", or [rad/s]; or ' if axis else ""
-        ledger.add_missing("the frequencies of its lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
+        if axis is None:
+            report.missing.append(f"{fact} (Description.{by_spacing})")
+        else:
+            columns = f'"frequency [Hz]={axis},{frf.format_columns_option()}", or [rad/s]'
+            report.add_missing(fact, "columns", f" {columns}; or Description.{by_spacing}")
         return None
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
-        ledger.faults.append(f"--spacing {step:g}, --start {start:g}: give a spacing > 0 Hz and a start >= 0 Hz")
+        fault = "give a spacing > 0 Hz and a start >= 0 Hz"
+        report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)
         return None
-    ledger.add_fact("lines", f"{n}, {start:.4g} to {start + step * (n - 1):.6g} Hz", "option")
+    report.add_fact("lines", _format_lines(n, start, start + step * (n - 1)), "option")
     return np.asarray(start + step * np.arange(n), dtype=np.float64)
 
 
 def _may_be_axis(signal: Signal, n: int) -> bool:
-    return (
-        signal.values.shape == (n,) and not np.iscomplexobj(signal.values) and bool(np.all(np.diff(signal.values) > 0))
-    )
+    values = signal.values
+    return values.shape == (n,) and not np.iscomplexobj(values) and bool(np.all(np.diff(values) > 0))
 
 
-def _resolve_frequency(
-    contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
-    """Of an FRF (Hz)."""
-    axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
-    if axis is None:
-        return _make_even_frequency(contents.signals, frf, description, ledger)
-    report_flaws([axis], ledger)
-    if description.spacing is not None or description.start is not None:
-        ledger.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
-        return None
-    if not axis.unit and is_angular(axis):
-        ledger.add_missing(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},..."')
-        return None
-    unit = parse_unit(axis.unit) if axis.unit else None
-    if axis.unit and (unit is None or unit.quantity != "frequency"):
-        ledger.faults.append(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
-        return None
-    ledger.add_fact("lines", f"{axis.values.size}, {_format_range(axis, unit.factor if unit else 1.0)}")
-    if unit is None:
-        ledger.add_fact("frequency", "in Hz", "default")
-    return np.asarray(axis.values, dtype=np.float64) * (unit.factor if unit else 1.0)
-
-
-def _format_range(axis: Signal, factor: float) -> str:
-    return f"{axis.values[0] * factor:.4g} to {axis.values[-1] * factor:.6g} Hz"
+def _format_lines(n: int, first: float, last: float) -> str:
+    return f"{n}, {first:.4g} to {last:.6g} Hz"
 
 
 def _find_coherence(contents: Contents, number: int, frf: Signal) -> Signal | None:
-    """That of the FRF of this number."""
+    """Return the coherence of the FRF of this number."""
     coherences = [signal for signal in contents.signals if signal.role == "coherence"]
-    beside = [signal for signal in coherences if has_same_axis(signal, frf)]
-    if not beside or (len(coherences) > 1 and number >= len(coherences)):
+    parallel = [signal for signal in coherences if has_same_axis(signal, frf)]
+    if not parallel or (len(coherences) > 1 and number >= len(coherences)):
         return None
-    return coherences[number] if len(coherences) > 1 and coherences[number] in beside else beside[0]
+    return coherences[number] if len(coherences) > 1 and coherences[number] in parallel else parallel[0]
 
 
-def _resolve_coherence(signal: Signal | None, ledger: ImportReport) -> NDArray[np.float64] | None:
-    """Values of a coherence; a line where it lies beyond 0 to 1 is trusted with nothing."""
+def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | None:
+    """Return the values of a coherence, 0 at lines where it is outside 0 to 1."""
     if signal is None:
-        ledger.add_fact("coherence", "none", "file")
+        report.add_fact("coherence", "none", "file")
         return None
     values = np.asarray(signal.values.real, dtype=np.float64)
-    beyond = ~((values >= 0) & (values <= 1 + 1e-9))
-    if np.mean(beyond) > MAX_INVALID_COHERENCE_SHARE:
-        ledger.add_fact("coherence", f"{signal.name} is beyond 0 to 1 at {beyond.sum()} lines: left out")
+    invalid = ~((values >= 0) & (values <= 1 + 1e-9))
+    if np.mean(invalid) > MAX_INVALID_COHERENCE_SHARE:
+        report.add_fact("coherence", f"{signal.name} is beyond 0 to 1 at {invalid.sum()} lines: left out")
         return None
-    taken = f"; beyond 0 to 1 at {beyond.sum()} lines, there taken as 0" if beyond.any() else ""
-    ledger.add_fact("coherence", f"{signal.name}{taken}")
-    return np.where(beyond, 0.0, values)
+    taken = f"; beyond 0 to 1 at {invalid.sum()} lines, there taken as 0" if invalid.any() else ""
+    report.add_fact("coherence", f"{signal.name}{taken}")
+    return np.where(invalid, 0.0, values)
 
 
-MAX_INVALID_COHERENCE_SHARE = 0.02
-"""Share of the lines that may have a coherence that is none, as the first lines of some analysers have."""
-
-
-def _resolve_averages(contents: Contents, description: Description, ledger: ImportReport) -> int:
-    if description.averages is not None and description.averages < 1:
-        ledger.faults.append(f"--averages {description.averages}: give the number of hits averaged, 1 or more")
-    elif None not in (description.averages, contents.averages) and description.averages != contents.averages:
-        ledger.add_contradiction("--averages", description.averages, contents.averages)
-    elif contents.averages is not None:
-        ledger.add_fact("averages", str(contents.averages))
-        return contents.averages
-    elif description.averages is not None:
-        ledger.add_fact("averages", str(description.averages), "option")
-        return description.averages
+def _resolve_averages(contents: Contents, description: Description, report: ImportReport) -> int:
+    in_file, given = contents.averages, description.averages
+    if given is not None and given < 1:
+        report.reject("averages", given, "give the number of hits averaged, 1 or more")
+    elif in_file is not None and given is not None and given != in_file:
+        report.add_contradiction("averages", given, in_file)
+    elif (averages := given if in_file is None else in_file) is not None:
+        report.add_fact("averages", str(averages), "option" if in_file is None else "file")
+        return averages
     else:
-        ledger.add_fact("averages", "1 (--averages)", "default")
+        report.add_fact("averages", "1 (Description.averages)", "default")
     return 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import find_column
 from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description, ImportReport
@@ -22,7 +22,7 @@ NEIGHBOR_TURNS = 5
 """Turns on each side that a turn is compared with; chosen."""
 
 
-def compute_speed_from_pulses(signal: NDArray[np.float64], sample_rate: float, pulses: int = 1) -> NDArray[np.float64]:
+def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
     """Spindle speed at each sample (rpm), shape (n,), from a tachometer in any unit, shape (n,); sample_rate in Hz.
 
     pulses: in a turn; from one turn to the next the speed is constant, NaN before the first, after the last and where
@@ -56,7 +56,7 @@ def compute_speed_from_pulses(signal: NDArray[np.float64], sample_rate: float, p
     return speed
 
 
-def _find_rising_edges(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _find_rising_edges(signal: Floats) -> Floats:
     """Where pulses begin, in samples and parts of them."""
     low, high = float(np.min(signal)), float(np.max(signal))
     if not high > low:
@@ -71,58 +71,54 @@ def _find_rising_edges(signal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 SPEED_ROLES = ("speed", "tacho")
-"""Roles of a column of the speed."""
+"""Roles of a column of the spindle speed."""
 
 
 def split_speed_column(
-    signals: Sequence[Signal], description: Description, ledger: ImportReport
+    signals: Sequence[Signal], description: Description, report: ImportReport
 ) -> tuple[list[Signal], Signal | None]:
-    """The signals without that of the speed, and that one; None where there is none."""
+    """Return the signals without the spindle speed, and the signal of the speed; None without one."""
     columns = [signal for signal in signals if signal.role in SPEED_ROLES]
     if description.tacho:
-        named = find_column(signals, description.tacho, "--tacho", ledger)
+        named = find_column(signals, description.tacho, "tacho", report)
         columns = [] if named is None else [named]
     if len(columns) > 1:
         names = " and ".join(signal.name for signal in columns)
-        ledger.add_missing(f"which of {names} is the speed of the spindle", f'--tacho "{columns[0].name}"')
+        report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
     rest = [
-        signal for signal in signals if not (signal.role in SPEED_ROLES or any(signal is column for column in columns))
+        signal for signal in signals if signal.role not in SPEED_ROLES and not any(signal is other for other in columns)
     ]
     if description.pulses is not None and not columns:
-        ledger.faults.append(f"--pulses {description.pulses}: no column is a tachometer; name it with --tacho")
+        report.reject("pulses", description.pulses, "no column is a tachometer; name it with Description.tacho")
     return rest, columns[0] if columns else None
 
 
-def resolve_speed(
-    signal: Signal, sample_rate: float, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
-    """Spindle speed at each sample (rpm), NaN where it is not known; None where the ledger says what is wrong."""
+def resolve_speed(signal: Signal, sample_rate: float, description: Description, report: ImportReport) -> Floats | None:
+    """Return the spindle speed at each sample (rpm), NaN where unknown; None where the report says what is wrong."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
-    if signal.role == "speed" and (unit is None or unit.quantity != "frequency"):
-        ledger.add_missing(f"the unit of the speed in {signal.name}", f'--columns "speed [rpm]={signal.name}"')
-        return None
     if unit is not None and unit.quantity == "frequency":
-        return _convert_speed(signal, values, 60 * unit.factor, description, ledger)
+        return _convert_speed(signal, values, 60 * unit.factor, description, report)
+    if signal.role == "speed":
+        report.add_missing(f"the unit of the speed in {signal.name}", "columns", f' "speed [rpm]={signal.name}"')
+        return None
     try:
         return compute_speed_from_pulses(values, sample_rate, 1 if description.pulses is None else description.pulses)
     except ValueError as error:
-        ledger.faults.append(f"{signal.name}: {error}")
+        report.faults.append(f"{signal.name}: {error}")
         return None
 
 
 def _convert_speed(
-    signal: Signal, values: NDArray[np.float64], factor: float, description: Description, ledger: ImportReport
-) -> NDArray[np.float64] | None:
-    """factor: rpm per unit."""
+    signal: Signal, values: Floats, factor: float, description: Description, report: ImportReport
+) -> Floats | None:
+    """Convert a speed with a factor (rpm per unit)."""
     if description.pulses is not None:
-        ledger.faults.append(
-            f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit}); leave it out"
-        )
+        fault = f"{signal.name} is the speed itself ({signal.unit}); leave it out"
+        report.reject("pulses", description.pulses, fault)
         return None
     speed = np.abs(values) * factor
     if not np.any(speed > 0):
-        ledger.faults.append(
-            f"{signal.name}: stands at 0 {signal.unit} all along; name another column, or leave it out"
-        )
+        fault = f"stands at 0 {signal.unit} all along; name another column, or leave it out"
+        report.faults.append(f"{signal.name}: {fault}")
         return None
     return np.where(speed > 0, speed, np.nan)

@@ -1,1 +1,1 @@
-"""One module a format: what stands in a file of it, without deciding what that means."""
+"""Readers of recorded files, which return the contents of a file without interpreting them."""

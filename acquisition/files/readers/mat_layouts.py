@@ -3,7 +3,7 @@
 Seen in public files: vectors by name (`Freq_domain`, `Hf_chan_2`, `Hf_coh_chan_2`, `Time_chan_1`), matrices of a logger
 (`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), structs of Test.Lab
 (`x_values`, `y_values`), and our own. An FRF is taken before signals over time that stand beside it: it is the average
-of the hits, they are one of them; `--columns` takes them all the same.
+of the hits, they are one of them; `Description.columns` takes them all the same.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import infer_role, split_heading
 from acquisition.files.contents.contents import Contents, Role, Signal, list_array_signals
 
@@ -51,7 +52,7 @@ def _infer_window(before: Any, behind: Any) -> str:
     return _fit_exponential(time[loud], np.log(ratio))
 
 
-def _fit_exponential(time: NDArray[np.float64], level: NDArray[np.float64]) -> str:
+def _fit_exponential(time: Floats, level: Floats) -> str:
     """level: logarithm of the window."""
     slope, start = np.polyfit(time, level, 1)
     if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:
@@ -140,7 +141,7 @@ def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
 def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     """SignalCalc: the abscissa stands in the first column, channel 1 is the hammer.
 
-    Beside its FRFs stand the signals of the last hit, before the window, for `--columns`; alone they are that hit.
+    Beside its FRFs stand the signals of the last hit, before the window, for `Description.columns`; alone they are that hit.
     """
     units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
@@ -240,7 +241,7 @@ def _read_logger(v: Mapping[str, Any]) -> Contents | None:
 
 def _read_vectors(v: Mapping[str, Any]) -> Contents | None:
     """Vectors and matrices of the length of a frequency, complex ones but for coherence; the time signals beside them
-    keep their names and no role, so that `--columns` can have them. Only signals over time: those of its length."""
+    keep their names and no role, so that `Description.columns` can have them. Only signals over time: those of its length."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
     for name, axis in arrays.items():
         if _FREQUENCY_NAME.fullmatch(name) and _is_rising(axis):
@@ -272,7 +273,7 @@ def _make_vector_signals(
 
 def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
     """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell. What
-    else stands in the file has no role, so that `--columns` can have it; an FRF is taken before signals of no name."""
+    else stands in the file has no role, so that `Description.columns` can have it; an FRF is taken before signals of no name."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
     rate = next((float(v[name]) for name in v if _RATE_NAME.fullmatch(name) and _is_number(v[name])), None)
     axis = next((name for name in arrays if _TIME_NAME.fullmatch(name) and _has_equal_length(name, arrays)), None)

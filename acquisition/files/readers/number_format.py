@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
+
 SignUse = Literal["decimal", "thousands", "doubtful"]
 """What a sign in a number is for."""
 
@@ -74,7 +76,7 @@ def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
         raise ValueError("which is no number")
     if use == "doubtful":
         either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
-        raise ValueError(f"which may be {either} (--decimal comma or --decimal point)")
+        raise ValueError(f"which may be {either} (Description.decimal comma or Description.decimal point)")
     return word.replace(sign, "")
 
 
@@ -173,7 +175,7 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
     return Column(np.array(values), flaws)
 
 
-def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> NDArray[np.float64] | None:
+def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> Floats | None:
     """The numbers of cells, many times as fast; None where one is complex, missing, or has thousands."""
     text = "\n".join(cells)
     if any(sign in text for sign in numerals.non_decimal_signs):

@@ -10,8 +10,8 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Format, Signal
 
@@ -33,7 +33,7 @@ def read_audio(path: Path) -> Contents:
     return Contents(tuple(signals))
 
 
-def _read_wav(path: Path) -> tuple[int, NDArray[np.float64]]:
+def _read_wav(path: Path) -> tuple[int, Floats]:
     """Sample rate and channels of a WAV file."""
     import scipy.io.wavfile  # it takes a while, and few files need it
 
@@ -52,7 +52,7 @@ def _read_wav(path: Path) -> tuple[int, NDArray[np.float64]]:
     return rate, columns / scale
 
 
-def _read_flac_or_mp3(path: Path) -> tuple[int, NDArray[np.float64]]:
+def _read_flac_or_mp3(path: Path) -> tuple[int, Floats]:
     """Sample rate and channels of a FLAC or MP3 file."""
     try:
         import soundfile

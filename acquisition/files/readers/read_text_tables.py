@@ -116,7 +116,7 @@ def _find_rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tup
     plain = NumberedLines([*map(normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
     form = detect_row_layout(plain.texts[first - begin :])
     if not form.columns:
-        cure = "pass over what stands above them with --skip"
+        cure = "pass over what stands above them with Description.skip"
         raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
     width = len(form.split(plain.texts[first - begin :][:2][-1]))
     if not _begins_in_column(plain.texts[first - begin], form) and is_unit_line(lines.texts[:first], form, width):
@@ -152,7 +152,7 @@ def _reject_broken_row(path: Path, above: NumberedLines, form: RowLayout, width:
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
     if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):
-        cure = f"mend it, or pass over what stands above the rows with --skip {above.numbers[-1]}"
+        cure = f"mend it, or pass over what stands above the rows with Description.skip {above.numbers[-1]}"
         place = f"{path}: line {above.numbers[-1]}"
         raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")
 

@@ -139,7 +139,8 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
         goes_on = goes_on and sum(map(is_number, row)) != width
         if is_short or goes_on:
             n = sum(map(is_number, row))
-            cure = "" if i else f"; pass over it with --skip {rows.numbers[0]}, and name the columns with --columns"
+            skip = f"pass over it with Description.skip {rows.numbers[0]}"
+            cure = "" if i else f"; {skip}, and name the columns with Description.columns"
             raise DataError(f"{place}: line {rows.numbers[i]}: {n} numbers where other rows have {width}{cure}")
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
 from acquisition.files.readers.text_file import decode_utf8_or_latin1
 
@@ -43,11 +43,11 @@ class UffFunction:
     """Direction of the hammer, likewise."""
     place: tuple[object, ...]
     """Nodes and directions: the same for an FRF and its coherence."""
-    abscissa: NDArray[np.float64]
+    abscissa: Floats
     """Abscissa in its unit, shape (n,)."""
     step: float
     """Step of an even abscissa; 0 where it is not even."""
-    values: NDArray[np.float64] | NDArray[np.complex128]
+    values: Floats | Complexes
     """Values of the function in their unit, shape (n,)."""
     abscissa_axis: UffAxis
     """Quantity and unit of the abscissa."""
@@ -111,9 +111,9 @@ def _parse_row_seven(line: str) -> tuple[int, int, int, float, float]:
 
 def _make_function(
     lines: list[str],
-    abscissa: NDArray[np.float64],
+    abscissa: Floats,
     step: float,
-    values: NDArray[np.float64] | NDArray[np.complex128],
+    values: Floats | Complexes,
 ) -> UffFunction:
     six = lines[6].ljust(80)
     response, reference = (_parse_point(six[31:55]), _parse_point(six[56:80]))
@@ -164,7 +164,7 @@ def _parse_axis(line: str) -> UffAxis:
     return UffAxis(int(line[:10].split()[0] if line[:10].split() else 0), "" if unit.upper() == "NONE" else unit)
 
 
-def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[NDArray[np.float64], int]:
+def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[Floats, int]:
     """n numbers, in columns that may touch each other."""
     end = content.find(b"\n    -1", begin - 1)
     body = content[begin : end if end >= 0 else len(content)]
@@ -179,7 +179,7 @@ def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[N
 
 def _read_binary_values(
     place: str, head: str, content: bytes, begin: int, n: int, layout: tuple[int, bool]
-) -> tuple[NDArray[np.float64], int]:
+) -> tuple[Floats, int]:
     """n values of the binary form; an uneven abscissa is single precision beside single values, else double."""
     kind, even = layout
     words = head.split()

@@ -1,1 +1,1 @@
-"""What cuts sound like: which parts of a recording they are, true speed, chatter or not; arrays in, a record out."""
+"""Chatter detection: cuts in a recording, true spindle speed, chatter or not; arrays in, a record out."""

@@ -7,17 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Flags, Floats
 
 CUT_PIECE_LENGTH = 0.04
 """Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
 MIN_CUT_LOUDNESS = 0.2
-"""A cut is so much louder than air, in log10 of the power."""
+"""A cut is this much louder than air, in log10 of the power."""
 POWER_STEP_MARGIN = 1.0
-"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10): chatter
-of few lines is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
+"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10):
+chatter of few peaks is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
 MIN_AIR_SHARE = 0.1
 """Share of a recording that is air, at least; or air is the quietest part."""
 N_QUIET_PIECES = 5
@@ -31,9 +30,9 @@ N_SMOOTHED_PIECES = 3
 MAX_THRESHOLD_STEPS = 50
 """Steps after which the threshold stands."""
 ENTRY_LOUDNESS_STEP = 0.3
-"""Entry and exit are so much louder or quieter than most of a cut, in log10 of the power: twice."""
+"""Entry and exit are this much louder or quieter than most of a cut, in log10 of the power: twice."""
 MIN_CUT_LENGTH_SHARE = 1 / 6
-"""What has so much of the length of the longest cut beside it is none; chosen."""
+"""What has this much of the length of the longest cut beside it is none; chosen."""
 MAX_ENTRY_TIME = 2.0
 """Longest entry or exit (s)."""
 MAX_PAUSE_TIME = 0.1
@@ -49,7 +48,7 @@ MIN_CUT_TIME = 0.3
 MAX_CUT_TIME = 2.0
 """... and at most, its end: no spindle is so steady that more is of use (s)."""
 KNOCK_PEAK_RATIO = 4.0
-"""A piece of a cut with a peak so many times those around it is a knock."""
+"""A piece of a cut with a peak this many times those around it is a knock."""
 N_KNOCK_NEIGHBORS = 6
 """Pieces on each side that a piece is compared with ..."""
 KNOCK_PEAK_QUANTILE = 0.75
@@ -80,7 +79,7 @@ WHOLE_SIGNAL = CutParts("")
 
 
 def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]:
-    """The cuts in a recording, one at least: without a cut it stands for why there is none.
+    """Find the cuts in a recording; without a cut the only entry gives the reason.
 
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; turn: of the spindle (s).
 
@@ -120,7 +119,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     return kept or [longest]
 
 
-def _find_loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
+def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
     """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
 
     axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
@@ -132,7 +131,7 @@ def _find_loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
     return np.asarray(is_strong if is_clearer else is_loud)
 
 
-def _loudness_step(level: Floats, is_loud: NDArray[np.bool_]) -> float:
+def _loudness_step(level: Floats, is_loud: Flags) -> float:
     """By how much what is loud is louder than what is not, in the mean."""
     is_split = np.any(is_loud) and not np.all(is_loud)
     return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
@@ -154,7 +153,7 @@ def _loudness_threshold(level: Floats) -> float:
 def _build_parts(
     axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
 ) -> CutParts:
-    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it; size: of a piece (samples)."""
+    """Build entry, steady part and exit of a stretch of pieces, with its fault; size: of a piece (samples)."""
     step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
     first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
@@ -173,7 +172,8 @@ def _build_parts(
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
     """How many pieces at the beginning and at the end of a cut stand beside its longest part of one loudness.
 
-    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself changes.
+    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself
+    changes.
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_QUIET_PIECES)
     usual = _join_stretches(_find_stretches(np.abs(smooth - np.median(smooth)) < ENTRY_LOUDNESS_STEP), join)
@@ -192,7 +192,7 @@ def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int
 
 
 def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
-    """The power of pieces at the frequencies above `LOWEST`; pieces: shape (pieces, size)."""
+    """Return the power of pieces above `MIN_LOUDNESS_FREQUENCY`; pieces: shape (pieces, size)."""
     size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
     power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(MIN_LOUDNESS_FREQUENCY * size / sample_rate) + 1 :]) ** 2
@@ -200,9 +200,9 @@ def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
 
 
 def _loudness(power: Floats) -> Floats:
-    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies.
+    """Return log10 of the power of each piece over that of the quietest part, averaged over the frequencies.
 
-    Mean over frequency, not of logarithms: a light cut is heard in few lines. power: shape (pieces, frequencies).
+    Mean over frequency, not of logarithms: a light cut is recorded in few peaks. power: shape (pieces, frequencies).
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
     beside = N_QUIET_PIECES // 2
@@ -215,8 +215,8 @@ def _loudness(power: Floats) -> Floats:
     return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
 
 
-def _find_stretches(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First piece and the one after the last of each stretch."""
+def _find_stretches(loud: Flags) -> list[tuple[int, int]]:
+    """Return the first piece and the one after the last of each stretch."""
     edge = np.diff(np.concatenate(([0], loud.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))
 
@@ -233,7 +233,7 @@ def _join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tu
 
 
 def _find_longest_air(loud: Sequence[tuple[int, int]], count: int, step: int) -> slice:
-    """The longest part without a cut or a knock."""
+    """Find the longest part without a cut or a knock."""
     ends, begins = [0, *(end + 1 for _, end in loud)], [*(begin for begin, _ in loud), count]
     begin, end = max(zip(ends, begins, strict=True), key=lambda gap: gap[1] - gap[0])
     return slice(begin * step, max(end, begin) * step)

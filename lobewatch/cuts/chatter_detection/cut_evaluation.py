@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import (
@@ -29,7 +29,6 @@ from lobewatch.cuts.chatter_detection.peak_classification import (
     is_undersampled,
 )
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_spectra,
@@ -46,7 +45,7 @@ from lobewatch.cuts.chatter_detection.spindle_speed import (
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
-"""Energy of what is left over that of the comb: above it, with side bands, a cut chatters ..."""
+"""Energy of what is left over that of the comb: above it, with sidebands, a cut chatters ..."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
 """... without side bands above this ..."""
 MAX_STABLE_ENERGY = 2e-4
@@ -54,7 +53,7 @@ MAX_STABLE_ENERGY = 2e-4
 MIN_COMB_ENERGY = 1e-9
 """Least energy that the comb is taken to have, over that of what is left."""
 MIN_SIDEBANDS = 3
-"""Number of lines of a family that is chatter for sure."""
+"""Number of peaks of a family that is chatter for sure."""
 FLIP_TOLERANCE = 0.003
 """Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
 MAX_UNEVEN_ENERGY = 5.0
@@ -64,15 +63,15 @@ MAX_RUNOUT_ENERGY = 8.0
 SLOT_IMMERSION = 0.95
 """Immersion from which on tooth passing nearly vanishes."""
 END_PEAK_TOLERANCE = 1.0
-"""Distance of a line at the end of a cut up to which it is that of the whole cut (bins)."""
+"""Distance of a peak at the end of a cut up to which it is that of the whole cut (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutEvaluation:
-    """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
+    """Evaluation of one cut in a recording, with its evidence; None and NaN where it did not get so far."""
 
     verdict: CutVerdict
-    """Word for what the cut sounded like."""
+    """Verdict on the cut."""
     reason: str
     """Code of why it cannot be told; empty where it can."""
     parts: CutParts = WHOLE_SIGNAL
@@ -80,19 +79,19 @@ class CutEvaluation:
     spindle_speed: SpindleSpeed | None = None
     """True speed of the spindle."""
     energy_ratio: float = np.nan
-    """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
+    """Energy of what is left, at the end of the cut, over that of the harmonics of the spindle."""
     chatter: ChatterPeaks | None = None
-    """Lines of chatter."""
+    """Peaks of chatter."""
     peaks: PeaksByOrigin | None = None
-    """All lines, by where they come from."""
+    """All peaks, by where they come from."""
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
     distant_rpm: float = np.nan
-    """Speed further from the one that was set that the lines fit (rpm); NaN without one, or where one is near."""
+    """Speed further from the one that was commanded that the peaks fit (rpm); NaN without one, or where one is near."""
     tone: float = np.nan
     """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
     axis: int = 0
-    """Which of several axes the word rests on, from 0."""
+    """Which of several axes the verdict rests on, from 0."""
     measured_rpm: float | None = None
     """Speed by the tachometer in the cut (rpm), NaN where it gave none there; None without a tachometer."""
 
@@ -111,24 +110,24 @@ def evaluate_cut(
     commanded_rpm: float,
     measured_rpm: float | None = None,
 ) -> CutEvaluation:
-    """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
+    """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
-    commanded_rpm as it was set; measured_rpm by a tachometer, which the lines must not contradict
-    ("tacho-contradicts"); None without one. All axes have one speed, and the word is that of the loudest evidence: of
-    the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
-    "speed-not-found", "no-air" (also where only lines that are there in air make a speed, which is named),
+    commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
+    ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
+    of the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
+    "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
     "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
-    "unexplained-tone" (a line without side bands), "slow-sampling" (fewer than three multiples of tooth passing are
-    heard, folded ones too).
+    "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
+    recorded, folded ones too).
 
-    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+    Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
     >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
     >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
     >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
     >>> heard = evaluate_cut(cut, air, 10e3, 4, 0.5, 6020.0)
-    >>> heard.word, round(heard.speed_rpm)
+    >>> heard.verdict, round(heard.speed_rpm)
     ('stable', 6000)
     """
     spectra = compute_spectra(cut, sample_rate)
@@ -153,7 +152,7 @@ def evaluate_cut(
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
-    """The word on an axis; a tone alone is looked for in pieces of the air too."""
+    """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     lines = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
     unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, lines, turning, spectrum.bin_width)
     by_origin = classify_peaks(lines, spectrum, quiet, turning, teeth, unsteady)
@@ -169,7 +168,7 @@ def _evaluate_axis(
 def _find_speed(
     spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
 ) -> SpindleSpeed | CutEvaluation:
-    """The speed of the spindle, or the sound of a cut in which it is not known; commanded in Hz."""
+    """Find the spindle speed, or return the evaluation of a cut without one; commanded in Hz."""
     if measured_rpm is None:
         turning = find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if turning is not None:
@@ -187,7 +186,7 @@ def _find_speed(
 
 
 def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
-    """What is told where nothing is known of air, or where it sounds as the cut does: the speed, and no word."""
+    """Evaluate the speed only, where there is no air or it sounds like the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
     if turning is None:
@@ -201,12 +200,12 @@ def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: fl
 
 
 def _speed_not_found(spectrum: Spectrum, elsewhere: float) -> CutEvaluation:
-    """Of a speed that is not near the one that was set; elsewhere: that which the lines fit (rpm), NaN without one."""
+    """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: a speed that fits (rpm)."""
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=elsewhere)
 
 
 def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
-    """What the word rests on: chatter before anything else, then how loud it is."""
+    """Rank an axis: chatter first, then by energy."""
     if sound.peaks is None:
         return False, 0.0
     if sound.chatter is not None:
@@ -215,7 +214,7 @@ def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
 
 
 def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
-    """The word on an axis whose lines are known."""
+    """Evaluate an axis with classified peaks."""
     lines, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
     if lines is None or turning is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
@@ -245,13 +244,13 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
 
 
 def _chatter_power(chatter: ChatterPeaks) -> float:
-    """Power of the line that names it."""
+    """Return the power of the peak that names the chatter."""
     at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
     return float(chatter.peaks.amplitude[at] ** 2)
 
 
 def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
-    """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
+    """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
     if sound.peaks is None:
         return sound
     power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
@@ -267,7 +266,7 @@ def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float
 
 
 def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
-    """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
+    """Group the peaks by "turns" of the spindle, "tooth" passing, "air" and "chatter"; empty groups are left out."""
     lines, chatter = sound.peaks, sound.chatter
     named: dict[str, SpectralPeaks] = {}
     if lines is not None:
@@ -291,7 +290,7 @@ class CutRecording(NamedTuple):
     """Radial depth over diameter (-)."""
     commanded_rpm: float
     """Spindle speed as it was set (rpm)."""
-    clipped: NDArray[np.bool_] | None = None
+    clipped: Flags | None = None
     """Overload of the sensor or its input, shape (n,); None: nowhere."""
     lost_scans: int = 0
     """Number of scans that are missing."""
@@ -300,7 +299,7 @@ class CutRecording(NamedTuple):
 
 
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
-    """Tell each cut in a recording; one sound at least, which says why where there is no cut.
+    """Evaluate each cut in a recording; without a cut the only entry gives the reason.
 
     Reasons why one cannot be told are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
@@ -329,13 +328,13 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
 
 
 def _mean_speed(speed: Floats) -> float:
-    """Over the time in which it is known; NaN where it is known in less than half of it."""
+    """Return the mean speed where it is known; NaN where that is less than half of the time."""
     known = speed[np.isfinite(speed)]
     return float(np.mean(known)) if 2 * known.size > speed.size else np.nan
 
 
 def _find_signal_fault(recording: CutRecording, parts: CutParts) -> str:
-    """Why the signal cannot be trusted, a code; empty where it can."""
+    """Return the code of why the signal cannot be trusted; empty if it can."""
     if parts.reason == "too-short":
         return parts.reason
     if recording.clipped is not None and np.any(recording.clipped if parts.reason else recording.clipped[parts.cut]):

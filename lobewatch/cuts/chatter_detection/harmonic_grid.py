@@ -5,31 +5,31 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.spectrum import Floats, SpectralPeaks
+from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
 
 MAX_SIDEBAND_FAMILIES = 4
-"""Largest number of frequencies that are no multiples, with their side bands."""
+"""Largest number of frequencies that are no harmonics, with their sidebands."""
 MAX_GRID_ERRORS = 10.0
-"""Standard errors that a line is away that does not belong to the lattice."""
+"""Standard errors that a peak is away that does not belong to the harmonic grid."""
 GRID_TOLERANCES = 1.2, 0.6, 0.6, 0.6
-"""Distances from the lattice (bins) up to which lines belong to it, one for each step of the least squares; chosen: the
-first as wide as a line (`sorted_lines.WIDE`), since a speed by votes is off, then half of that."""
+"""Distances from the harmonic grid (bins) up to which peaks belong to it, one for each step of the least squares;
+chosen: the first as wide as a peak (`PEAK_TOLERANCE`), since a speed by votes is off, then half of that."""
 MAX_SPEED_CHANGE = 0.005
 """Relative change of the spindle frequency by which least squares have run away; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class SidebandFamily:
-    """Lines at sign * r + k f, f the frequency of the spindle."""
+    """Peaks at sign * r + k f, f the frequency of the spindle."""
 
-    indices: NDArray[np.intp]
-    """Places of its lines among all, shape (n,)."""
+    indices: Indices
+    """Places of its peaks among all, shape (n,)."""
     sign: Floats
-    """Sign of r in each line, shape (n,); 0 where r is 0."""
+    """Sign of r in each peak, shape (n,); 0 where r is 0."""
     order: Floats
-    """Order k of each line, shape (n,)."""
+    """Order k of each peak, shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,17 @@ class SpindleSpeed:
     frequency: float
     """Turns a second (Hz)."""
     error: float
-    """Standard error (Hz); inf where it does not follow from several lines."""
+    """Standard error (Hz); inf where it does not follow from several peaks."""
     share: float
-    """Share of the lines looked at that it explains."""
+    """Share of the peaks checked that it explains."""
     agreeing: int
-    """Lines that agree on it, beyond those that it is worked out from."""
+    """Peaks that agree on it, beyond those that it is worked out from."""
     misfit: float
-    """Mean square distance of all lines from it, in standard errors of each, at most `STRAY` squared."""
+    """Mean square distance of all peaks from it, in standard errors of each, at most `MAX_GRID_ERRORS` squared."""
 
 
 def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
-    """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
+    """Refine a spindle frequency (Hz) by least squares over its harmonic grid; bin_: bin width of the spectrum (Hz)."""
     speed = SpindleSpeed(frequency, np.inf, 0.0, 0, MAX_GRID_ERRORS**2)
     for tolerance in GRID_TOLERANCES:
         families = find_sideband_families(speed.frequency, lines, tolerance * bin_)
@@ -71,7 +71,7 @@ def refine_speed(frequency: float, lines: SpectralPeaks, bin_: float) -> Spindle
 
 
 def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
-    """Multiples of a frequency (Hz), then the families of the clearest lines that are left; tolerance in Hz."""
+    """Find the harmonics of a frequency (Hz), then the sideband families of the clearest peaks left."""
     order = np.round(lines.frequency / frequency)
     comb = (np.abs(lines.frequency - order * frequency) < tolerance) & (order > 0)
     families = [SidebandFamily(np.flatnonzero(comb), np.zeros(int(comb.sum())), order[comb])]
@@ -94,7 +94,7 @@ def find_sideband_families(frequency: float, lines: SpectralPeaks, tolerance: fl
 
 
 def _design_rows(family: SidebandFamily, number: int, count: int) -> Floats:
-    """What its lines say of f and of the r of each family, shape (n, count)."""
+    """Return the rows of the least-squares problem for one family, shape (n, count)."""
     rows = np.zeros((family.indices.size, count))
     rows[:, number] = family.sign
     rows[:, 0] = family.order

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats, Indices, Integers
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_power,
@@ -25,21 +24,21 @@ from lobewatch.cuts.chatter_detection.spectrum import (
 N_STEADINESS_PARTS = 4
 """Parts that a cut is divided into."""
 N_STEADINESS_PEAKS = 8
-"""Multiples that are looked at."""
+"""Harmonics that are checked."""
 MAX_UNSTEADINESS = 2e-3
-"""Largest change that is looked for, relative."""
+"""Largest change that is searched, relative."""
 MIN_UNSTEADINESS = 1e-4
 """Change that every spindle varies by, relative; chosen."""
 UNSTEADINESS_FACTOR = 3.0
 """Change of the speed over that of the means of the parts: within a part it varies too; chosen."""
 MIN_STEADINESS_PEAKS = 3
-"""Multiples that must have changed alike."""
+"""Harmonics that must have changed alike."""
 
 
 def estimate_unsteadiness(
     signal: Floats, sample_rate: float, lines: SpectralPeaks, turning: SpindleSpeed, bin_: float
 ) -> float:
-    """By how much the speed varies, relative; signal of the cut, its lines and their bin (Hz)."""
+    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
     order = np.round(lines.frequency / turning.frequency)
     comb = (
         np.abs(lines.frequency - order * turning.frequency)
@@ -59,7 +58,7 @@ def estimate_unsteadiness(
 
 
 def _speed_change(off: Floats) -> float:
-    """Change of the speed in one part: what most of its multiples agree on, else 0; off: of each, relative."""
+    """Return the speed change that most harmonics of one part agree on, else 0; off: relative, of each."""
     near = off[np.abs(off) < MAX_UNSTEADINESS]
     if near.size < max(MIN_STEADINESS_PEAKS, off.size / 2):
         return 0.0
@@ -68,64 +67,64 @@ def _speed_change(off: Floats) -> float:
 
 
 PEAK_TOLERANCE = 1.2
-"""A line belongs to a frequency that is no further away than this (bins)."""
+"""A peak belongs to a frequency that is no further away than this (bins)."""
 MAX_AIR_POWER_RATIO = 9.0
-"""Power of a line over that which it has in air, below which it comes from elsewhere."""
+"""Power of a peak over that which it has in air, below which it comes from elsewhere."""
 AIR_PEAK_TOLERANCE = 2.0
-"""Distance up to which a line of the air part is the same (bins of its own)."""
+"""Distance up to which a peak of the air part is the same (bins of its own)."""
 AIR_PIECE_LENGTH = 0.5
-"""Length of the pieces of air in which tones are looked for that come and go (s); each begins in the middle of the one
+"""Length of the pieces of air in which tones are searched that come and go (s); each begins in the middle of the one
 before it; chosen ..."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
 """... and the power of a tone there over that of the noise of so many bins on each side: noise reaches it near a line
 once in 1000 airs of 10 s; chosen."""
 MAX_FOLDED_RATES = 2.0
-"""Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
+"""Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
 UPPER_BAND_SHARE = 0.7
 """... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
 MAX_HARMONICS = 16
 """... or than any, where fewer than this are below half the sample rate; chosen."""
 MIN_TOOTH_HARMONICS = 3
-"""Multiples of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
+"""Harmonics of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
 FOLDED_PEAK_SLACK = 1e-3
 """... and so much further off, relative: from few lines the speed is no better known."""
 MAX_FOLDED_AMPLITUDE = 1.5
-"""Amplitude of a folded multiple over that of the loudest multiple, at most."""
+"""Amplitude of a folded harmonic over that of the loudest harmonic, at most."""
 MAX_WAVERING_ENERGY = 0.05
-"""Energy of all that is left over that of the multiples up to which lines as near to these as `steadiness.MOST` are of
-a speed that wavers; chosen, with a stable cut that a microphone has heard in sight."""
+"""Energy of all that is left over that of the harmonics up to which peaks as near to these as `MAX_UNSTEADINESS` are
+of a speed that wavers; chosen, with a stable cut that a microphone has recorded in sight."""
 MAX_SPEED_ERRORS = 3.0
-"""Standard errors of the spindle frequency within which its multiples may lie; chosen."""
+"""Standard errors of the spindle frequency within which its harmonics may lie; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class PeaksByOrigin:
-    """All lines of a cut."""
+    """All peaks of a cut."""
 
     comb: SpectralPeaks
-    """Multiples of the frequency of the spindle, the first left out: it is there in air."""
-    tooth_order: NDArray[np.int64]
+    """Harmonics of the frequency of the spindle, the first left out: it is there in air."""
+    tooth_order: Integers
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
     air: SpectralPeaks
-    """Lines that are there in air."""
+    """Peaks that are there in air."""
     folded: SpectralPeaks
-    """Lines where multiples above half the sample rate are folded to."""
+    """Peaks where harmonics above half the sample rate are folded to."""
     unexplained: SpectralPeaks
-    """Lines that are left: chatter, where there is any."""
+    """Peaks that are left: chatter, where there is any."""
 
 
-def is_in_air(lines: SpectralPeaks, air: Spectrum) -> NDArray[np.bool_]:
-    """Whether lines are there in air too."""
+def is_in_air(lines: SpectralPeaks, air: Spectrum) -> Flags:
+    """Whether peaks are there in air too."""
     return np.asarray(
         lines.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(lines.frequency, AIR_PEAK_TOLERANCE)
     )
 
 
 def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
-    """The spectrum of air with tones of its pieces near frequencies (Hz): one that comes and goes is fainter in all.
+    """Add intermittent tones of the air near frequencies (Hz) to its spectrum.
 
     signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
-    does what passes by 40 Hz in a piece or faster, as a multiple of a spindle that is slowing down.
+    does what passes by 40 Hz in a piece or faster, as a harmonic of a spindle that is slowing down.
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
@@ -141,29 +140,29 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     return replace(air, power=power)
 
 
-def _bins_around(middle: Floats, reach: int, last: int) -> NDArray[np.intp]:
-    """Bins up to so many from some, none beyond the last; shape (n, 2 reach + 1)."""
+def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
+    """Return the bins within a reach of some, none beyond the last; shape (n, 2 reach + 1)."""
     places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
     return np.asarray(np.clip(places, 0, last))
 
 
 def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
-    """The lines of all axes that are not there in air, without skirts."""
+    """Find the peaks of all axes that are not in air, without skirts."""
     lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
 
 
 def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
-    """Whether fewer than three multiples of tooth passing are below half the sample rate."""
+    """Whether fewer than three harmonics of tooth passing are below half the sample rate."""
     return spectrum.sample_rate / 2 < MIN_TOOTH_HARMONICS * teeth * turning.frequency
 
 
 def classify_peaks(
     lines: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
-    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
+    """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
 
-    unsteady: by how much the speed varies, relative: multiples are so much wider.
+    unsteady: by how much the speed varies, relative: harmonics are this much wider.
     """
     order = np.round(lines.frequency / turning.frequency)
     away = np.abs(lines.frequency - order * turning.frequency)
@@ -187,7 +186,7 @@ def classify_peaks(
 def _remove_wavering(
     left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed
 ) -> SpectralPeaks:
-    """What is left but for faint lines that are multiples of a speed that wavers faster than is seen in its lines."""
+    """Remove faint peaks next to spindle harmonics, caused by a speed that wavers quickly."""
     if left.energy > MAX_WAVERING_ENERGY * comb.energy:
         return left
     away = fold_frequency(left.frequency, turning.frequency)
@@ -196,8 +195,8 @@ def _remove_wavering(
 
 def _is_near_folded(
     lines: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
-) -> NDArray[np.bool_]:
-    """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
+) -> Flags:
+    """Whether peaks lie where harmonics of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
     if not orders.size:
@@ -210,15 +209,15 @@ def _is_near_folded(
 
 
 MIN_CHATTER_AMPLITUDE = 0.1
-"""Share of the loudest amplitude that a line has that names chatter ..."""
+"""Share of the loudest amplitude that a peak has that names chatter ..."""
 MIN_FAMILY_AMPLITUDE = 1e-3
 """... and one that belongs to it."""
 MAX_CHATTER_ANCHORS = 12
-"""Lines whose families are compared."""
+"""Peaks whose families are compared."""
 CHATTER_HARMONICS = 3
-"""Multiples of a frequency that are looked for."""
+"""Harmonics of a frequency that are searched."""
 DISPLACEMENT_WEIGHT = 0.3
-"""Weight of the displacement of a family beside the lines that it explains; chosen ..."""
+"""Weight of the displacement of a family beside the peaks that it explains; chosen ..."""
 MIN_FAMILY_ENERGY = 0.25
 """... which has this share of the energy of the largest at least."""
 
@@ -228,18 +227,18 @@ class ChatterPeaks:
     """One family."""
 
     frequency: float
-    """Frequency of the line with the largest displacement (Hz)."""
+    """Frequency of the peak with the largest displacement (Hz)."""
     error: float
     """Standard error of the frequency (Hz)."""
     peaks: SpectralPeaks
-    """All lines f_c + k tooth passing."""
+    """All peaks f_c + k tooth passing."""
 
 
 def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float) -> ChatterPeaks:
-    """The family that chatter is named by; left: one line at least. All in Hz.
+    """Find the family of peaks that chatter is named by, in Hz; left: at least one unexplained peak.
 
-    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
-    taken whose multiples explain the most, and whose displacement, amplitude over frequency squared, is large.
+    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their sidebands too. So that of the loudest peaks is
+    taken whose harmonics explain the most, and whose displacement, amplitude over frequency squared, is large.
     """
     part = left.amplitude > MIN_FAMILY_AMPLITUDE * np.max(left.amplitude)
     weight = np.where(part, (left.amplitude / left.frequency**2) ** 2, 0.0)
@@ -260,13 +259,13 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_: float)
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_: float) -> bool:
-    """Whether it has another line k tooth passings away, or one turn: a cut makes them, a pump has none. In Hz."""
+    """Return whether chatter has a peak k tooth passings or one turn away: a cut makes them, a pump does not. In Hz."""
     apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
     return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_))
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
-    """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
+    """Return 1 for peaks that are harmonics of a frequency or their sidebands, else 0, shape (n,)."""
     explained = np.zeros(len(left))
     for order in range(1, CHATTER_HARMONICS + 1):
         apart = sideband_distance(left.frequency, order * frequency, tooth_frequency)

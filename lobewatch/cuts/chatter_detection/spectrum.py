@@ -7,19 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from lobewatch.arrays import Flags, Floats, Indices
 
 
 def fold_frequency(frequency: Floats | float, rate: Floats | float) -> Floats:
-    """Frequencies (Hz) as they are found again between 0 and half of a rate (Hz): of samples, or of teeth."""
+    """Fold frequencies (Hz) to between 0 and half of a rate (Hz), of samples or of teeth."""
     remainder = np.mod(frequency, rate)
     return np.asarray(np.minimum(remainder, rate - remainder))
 
 
 def sideband_distance(frequency: Floats | float, chatter: float, teeth: float) -> Floats:
-    """Distance (Hz) of frequencies from +-chatter + k teeth, those that chatter at a frequency (Hz) sounds with."""
+    """Return the distance (Hz) of frequencies from the nearest sideband +-chatter + k teeth."""
     return np.minimum(fold_frequency(frequency - chatter, teeth), fold_frequency(frequency + chatter, teeth))
 
 
@@ -32,15 +31,15 @@ NOISE_BINS = 64
 NOISE_QUANTILE = 0.25
 """... as this quantile of their power: lines may fill the rest."""
 MIN_PEAK_POWER = 25.0
-"""A line has so many times the power of the noise: noise reaches it once in 1e11 bins."""
+"""A peak has this many times the power of the noise: noise reaches it once in 1e11 bins."""
 MIN_PEAK_DISTANCE = 1.5
-"""Least distance of two lines that are told apart (bins)."""
+"""Least distance of two peaks that are told apart (bins)."""
 SKIRT_BINS = 10.0
-"""Distance up to which a line has a skirt (bins): 5 of the window's own width ..."""
+"""Distance up to which a peak has a skirt (bins): 5 of the window's own width ..."""
 SKIRT_AMPLITUDE_RATIO = 3.0
 """... of lines so many times fainter: a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
-"""Standard error of the frequency of a line, over the root of its clearness (bins) ..."""
+"""Standard error of the frequency of a peak, over the root of its clearness (bins) ..."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
 """... and the part of it that stays however clear the line is (bins)."""
 
@@ -61,7 +60,7 @@ class Spectrum:
     """Sample rate of the recording (Hz)."""
 
     def max_power_near(self, frequency: Floats, bins: float) -> Floats:
-        """Largest power within so many bins of frequencies (Hz)."""
+        """Return the largest power within some bins of frequencies (Hz)."""
         wide = 2 * max(round(bins * self.bin_width / self.frequency[1]), 1) + 1
         return np.asarray(np.interp(frequency, self.frequency, scipy.ndimage.maximum_filter1d(self.power, wide)))
 
@@ -77,12 +76,10 @@ class SpectralPeaks:
     clearness: Floats
     """Power over that of the noise, shape (n,)."""
 
-    def __getitem__(self, places: NDArray[np.bool_] | NDArray[np.intp]) -> SpectralPeaks:
-        """Some of them."""
+    def __getitem__(self, places: Flags | Indices) -> SpectralPeaks:
         return SpectralPeaks(self.frequency[places], self.amplitude[places], self.clearness[places])
 
     def __len__(self) -> int:
-        """Number of lines."""
         return self.frequency.size
 
     @property
@@ -91,35 +88,35 @@ class SpectralPeaks:
         return float(np.sum(self.amplitude**2))
 
     def loudest(self, count: int) -> SpectralPeaks:
-        """The loudest lines, the loudest first, so many at most."""
+        """Return the loudest peaks, the loudest first, at most `count`."""
         return self[np.argsort(-self.amplitude)[:count]]
 
     def frequency_error(self, bin_: float) -> Floats:
-        """Standard error of each frequency (Hz), shape (n,); bin_: of the spectrum (Hz)."""
+        """Return the standard error of each frequency (Hz), shape (n,); bin_: bin width of the spectrum (Hz)."""
         return np.asarray(bin_ * np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR))
 
 
 def compute_spectrum(signal: Floats, sample_rate: float) -> Spectrum:
-    """The spectrum of a part of a recording; signal in m/s^2, shape (n,)."""
+    """Compute the spectrum of a part of a recording; signal in m/s^2, shape (n,)."""
     size = scipy.fft.next_fast_len(PADDING_FACTOR * signal.size, real=True)
     power, step = compute_power(signal, size), sample_rate / size
     return Spectrum(np.arange(power.size) * step, power, _noise_level(power), sample_rate / signal.size, sample_rate)
 
 
 def compute_power(signal: Floats, size: int) -> Floats:
-    """Square of the amplitude of a sine at each frequency, shape (size // 2 + 1,); signal filled up to this size."""
+    """Compute the squared amplitude at each frequency, shape (size // 2 + 1,), of a zero-padded signal."""
     phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
     window = sum(share * np.cos(k * phase) for k, share in enumerate(BLACKMAN_HARRIS))
     return np.asarray((2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2)
 
 
 def compute_spectra(signal: Floats, sample_rate: float) -> list[Spectrum]:
-    """The spectrum of each axis; signal of shape (n,) or (axes, n)."""
+    """Compute the spectrum of each axis; signal of shape (n,) or (axes, n)."""
     return [compute_spectrum(axis, sample_rate) for axis in np.atleast_2d(signal)]
 
 
 def _noise_level(power: Floats) -> Floats:
-    """Mean power of noise whose power is distributed exponentially, from the quiet bins of each neighbourhood."""
+    """Return the mean noise power, from the quiet bins of each neighborhood (power of noise is exponential)."""
     count = max(power.size // (PADDING_FACTOR * NOISE_BINS), 2)
     blocks = np.array_split(power, count)
     level = np.array([np.quantile(block, NOISE_QUANTILE) for block in blocks]) / -np.log(1 - NOISE_QUANTILE)
@@ -129,7 +126,7 @@ def _noise_level(power: Floats) -> Floats:
 
 
 def remove_skirts(lines: SpectralPeaks, bin_: float) -> SpectralPeaks:
-    """Lines but for those beside a far louder one: a speed that wavers makes a line wide, and its slope a row of peaks.
+    """Remove peaks next to a far louder one: a wavering speed widens a peak, with a row of peaks on its slope.
 
     bin_: of the spectrum (Hz).
     """
@@ -138,14 +135,14 @@ def remove_skirts(lines: SpectralPeaks, bin_: float) -> SpectralPeaks:
 
 
 def join_peaks(axes: Sequence[SpectralPeaks]) -> SpectralPeaks:
-    """The lines of several axes."""
+    """Join the peaks of several axes."""
     return SpectralPeaks(
         *(np.concatenate([getattr(lines, name) for lines in axes]) for name in ("frequency", "amplitude", "clearness"))
     )
 
 
 def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPeaks:
-    """The lines with `clear` times the power of the noise; frequency and amplitude by a parabola through log power."""
+    """Find peaks with `clear` times the noise power; frequency and amplitude by a parabola through log power."""
     power = spectrum.power
     wide = 2 * max(round(MIN_PEAK_DISTANCE * spectrum.bin_width / spectrum.frequency[1]), 1) + 1
     at = np.flatnonzero((power == scipy.ndimage.maximum_filter1d(power, wide)) & (power > clear * spectrum.noise))

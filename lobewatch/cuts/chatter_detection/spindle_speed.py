@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
 from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     compute_spectra,
@@ -30,28 +29,29 @@ from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
 )
 
 COMB_SPEED_TOLERANCE = 0.05
-"""Relative distance from the speed that was set up to which a plain comb is looked for ..."""
+"""Relative distance from the speed that was commanded up to which a plain comb is searched ..."""
 USUAL_SPEED_TOLERANCE = 0.002
 """... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
 SAME_SPEED_TOLERANCE = 1e-3
 """... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
-many lines: it has one unknown, they have one more for each family of side bands."""
+many peaks: it has one unknown, they have one more for each family of sidebands."""
 MIN_SURE_VOTES = 6
-"""Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all of them."""
+"""Peaks that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all
+of them."""
 VOTE_SPEED_TOLERANCE = 0.021
-"""Relative distance from the speed that was set up to which votes are counted."""
+"""Relative distance from the speed that was commanded up to which votes are counted."""
 MAX_VOTE_HARMONIC = 60
-"""Multiples of the frequency of the spindle by which two of them may differ."""
+"""Harmonics of the frequency of the spindle by which two of them may differ."""
 VOTE_WIDTH = 0.25
-"""Standard deviation of a line in the count of votes (bins)."""
+"""Standard deviation of a peak in the count of votes (bins)."""
 VOTE_GRID_STEP, FINEST_VOTE_HARMONIC = 0.25, 40
-"""Step of the grid of speeds, over the standard deviation of the vote of this multiple; chosen."""
+"""Step of the grid of speeds, over the standard deviation of the vote of this harmonic; chosen."""
 OWN_PEAK_TOLERANCE = 0.5
-"""Distance up to which a line is that of the turning spindle (bins); chosen."""
+"""Distance up to which a peak is that of the rotating spindle (bins); chosen."""
 VOTE_REACH = 2
 """Standard deviations up to which a vote is spread."""
 MIN_OWN_PEAK_VOTES = 0.2
-"""A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+"""A speed whose own peak is recorded is taken where it has this much of the votes of the best one."""
 MAX_SPEED_MISFIT = 4.0
 """A speed with a larger misfit is compared with others ..."""
 MAX_RIVAL_SPEEDS = 12
@@ -59,7 +59,8 @@ MAX_RIVAL_SPEEDS = 12
 VOTE_PEAK_WIDTH = 9
 """... of as many steps of the grid around each."""
 MIN_GRID_SHARE = 0.5
-"""Share of the lines that must belong to the lattice, and must have a neighbour one or two turns or teeth away ..."""
+"""Share of the peaks that must belong to the harmonic grid, and must have a neighbour one or two turns or teeth away
+..."""
 MIN_AGREEING_PEAKS = 3
 """... and number of them that must agree: a pump that is switched on has lines of its own."""
 
@@ -67,11 +68,11 @@ MIN_AGREEING_PEAKS = 3
 def find_spindle_speed(
     cut: Floats, air: Floats, sample_rate: float, teeth: int, commanded_rpm: float
 ) -> SpindleSpeed | None:
-    """Turns a second in the steady part of a cut, near the speed that was set (rpm); None where too few lines agree.
+    """Find the spindle frequency (Hz) in the steady part of a cut, near the commanded speed (rpm), or None.
 
     cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
 
-    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+    Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
     >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
     >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
@@ -88,7 +89,7 @@ def find_spindle_speed(
 def find_speed_of_spectra(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """`find_spindle_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
+    """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
     lines, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, lines, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
@@ -100,7 +101,7 @@ def find_speed_of_spectra(
 def _find_speed_by_peaks(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """The speed by what stands clear of the noise."""
+    """Find the speed by peaks clear of the noise."""
     lines = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     of_cut, first = find_cut_peaks(spectra, air), spectra[0]
     voted = find_speed_by_votes(of_cut, join_peaks(lines), first, teeth, commanded)
@@ -120,11 +121,11 @@ def _find_speed_by_peaks(
 def find_speed_by_votes(
     cut_lines: SpectralPeaks, all_lines: SpectralPeaks, spectrum: Spectrum, teeth: int, commanded: float
 ) -> SpindleSpeed | None:
-    """Turns a second, near those that were set (Hz); None where too few lines agree.
+    """Find the spindle frequency (Hz) by votes of peaks near the commanded one, or None.
 
-    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two lines, each
-    sum and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice:
-    chatter f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two peaks, each
+    sum and each peak itself votes for the frequencies that it is a harmonic of, for harmonics of the teeth twice:
+    chatter f_c + k f counts as much as the harmonics k f. The best is made exact by least squares.
     """
     loudest = cut_lines.loudest(MAX_COMB_PEAKS)
     if len(loudest) < 2:
@@ -157,20 +158,20 @@ def find_speed_by_votes(
 
 
 def _spaced_share(lines: SpectralPeaks, frequency: float, teeth: int, bin_: float) -> float:
-    """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
+    """Return the share of peaks with another one or two turns or teeth away; a wrong frequency has few."""
     apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
     steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
     return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
 
 
-def _vote_peaks(votes: Floats) -> NDArray[np.intp]:
-    """Where there are more votes than beside, the most first."""
+def _vote_peaks(votes: Floats) -> Indices:
+    """Return the places of local maxima of the votes, the most votes first."""
     places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, VOTE_PEAK_WIDTH) == votes) & (votes > 0))
     return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]
 
 
 def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:
-    """Votes for each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    """Count the votes for each frequency of a grid (Hz); sharpness: of one peak (Hz)."""
     weight, step = np.log10(lines.clearness), grid[1] - grid[0]
     i, j = np.triu_indices(len(lines), 1)
     spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
@@ -189,29 +190,29 @@ def _count_votes(lines: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
 
 
 def _smooth_votes(votes: Floats, width: float) -> Floats:
-    """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
+    """Spread each vote over its neighbors; width: standard deviation in grid steps."""
     reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
     spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     return np.convolve(votes, spread, "same")
 
 
 TACHOMETER_TOLERANCE = 2e-3
-"""Relative difference up to which a tachometer and the lines say one speed: a column may be rounded; chosen."""
+"""Relative difference up to which a tachometer and the peaks say one speed: a column may be rounded; chosen."""
 TACHOMETER_ERROR = 5e-5
 """Relative standard error of a tachometer: a sample at each end of a second or two; chosen."""
 PULSE_RATIO_TOLERANCE = 0.02
-"""Relative distance from a whole number within which a tachometer over the speed that was set, or the inverse, speaks
-of pulses that were counted wrong; chosen."""
+"""Relative distance from a whole number within which a tachometer over the speed that was commanded, or the inverse,
+speaks of pulses that were counted wrong; chosen."""
 
 
 def check_tachometer_speed(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, measured: float
 ) -> tuple[SpindleSpeed | None, float]:
-    """Turns a second (Hz) by lines near those of a tachometer, and those that contradict it; NaN: none do.
+    """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
     commanded: as it was set, measured: by the tachometer (Hz). Where it is more than 5 % off what was set, it is
-    followed if the lines fit it alone and it is no multiple of that. Where no lines say a speed near it, it is the
-    speed by itself, if three of them are its multiples.
+    followed if the peaks fit it alone and it is no harmonic of that. Where no peaks say a speed near it, it is the
+    speed by itself, if three of them are its harmonics.
     """
     is_near = abs(measured / commanded - 1) < COMB_SPEED_TOLERANCE
     at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
@@ -226,13 +227,13 @@ def check_tachometer_speed(
 
 
 def is_pulse_multiple(ratio: float) -> bool:
-    """Whether a tachometer over the speed that was set is a whole number above 1, or one over it."""
+    """Whether a tachometer over the speed that was commanded is a whole number above 1, or one over it."""
     whole = max(ratio, 1 / ratio)
     return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
 
 
 def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
-    """The speed of the tachometer, of which the lines make none; None where hardly one is a multiple of it."""
+    """Return the speed of the tachometer if some peaks are its harmonics, else None."""
     lines, bin_ = find_cut_peaks(spectra, air), spectra[0].bin_width
     own = fold_frequency(lines.frequency, measured) < PEAK_TOLERANCE * bin_
     if np.count_nonzero(own) < MIN_AGREEING_PEAKS:
@@ -244,7 +245,7 @@ def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], 
 HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
 """Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
 MIN_DISTANT_SHARE = 0.5
-"""Share of the lines beside the multiples of a speed, or of their energy, on another that takes its place; chosen."""
+"""Share of the peaks beside the harmonics of a speed, or of their energy, on another that takes its place; chosen."""
 
 
 def find_distant_speed(
@@ -255,11 +256,11 @@ def find_distant_speed(
     heard: SpindleSpeed | None,
     beside: SpectralPeaks | None = None,
 ) -> float:
-    """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
+    """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    heard: the speed that was found, and beside: lines that are no multiples of it. Only a comb whose multiples
-    they are, and on which more lines agree, is one then. That of half of it is none, which chatter of period two makes;
-    the mains hum at multiples of theirs.
+    recorded: the speed that was found, and beside: peaks that are no harmonics of it. Only a comb whose harmonics
+    they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of period two
+    makes; the mains hum at harmonics of theirs.
     """
     lines, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth
@@ -280,7 +281,7 @@ def find_distant_speed(
 
 
 def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPeaks, bin_: float) -> bool:
-    """Whether most of what is beside the multiples of a speed is on another comb, not that of half of it."""
+    """Return whether most peaks that are no harmonics of a speed fit another comb, not that of half of it."""
     belongs = fold_frequency(beside.frequency, comb.frequency) < PEAK_TOLERANCE * bin_
     is_half = abs(2 * comb.frequency / heard.frequency - 1) < SAME_SPEED_TOLERANCE
     share = np.count_nonzero(belongs) / len(beside), beside[belongs].energy / beside.energy
@@ -288,11 +289,11 @@ def _is_better_comb(comb: SpindleSpeed, heard: SpindleSpeed, beside: SpectralPea
 
 
 def _rank_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> tuple[float, float]:
-    """Of a comb among others: the tenths of the lines that are its multiples, then its frequency: half has as many."""
+    """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
     comb = refine_comb(frequency, lines, bin_)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
 
 
 def _is_mains_speed(speed: SpindleSpeed, hum: float) -> bool:
-    """Whether a spindle turns as fast as a hum (Hz), or twice: its multiples, or those of period two, are the same."""
+    """Return whether a spindle turns as fast as a hum (Hz), or twice as fast."""
     return any(abs(speed.frequency / (times * hum) - 1) < HUM_TOLERANCE for times in (1, 2))

@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
 from lobewatch.cuts.chatter_detection.spectrum import (
-    Floats,
     SpectralPeaks,
     Spectrum,
     find_peaks,
@@ -21,45 +20,45 @@ from lobewatch.cuts.chatter_detection.spectrum import (
 )
 
 COMB_TOLERANCE = 1.2
-"""Distance from a multiple up to which a line belongs to it (bins): as wide as a line (`sorted_lines.WIDE`)."""
+"""Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""
 COMB_SPEED_WAVER = 1e-4
-"""Change of every speed, relative (`steadiness.LEAST`): by so much multiples are unsure."""
+"""Change of every speed, relative (`MIN_UNSTEADINESS`): by this much harmonics are unsure."""
 MAX_COMB_PEAKS = 40
-"""Lines that are looked at ..."""
+"""Peaks that are checked ..."""
 MAX_COMB_ANCHORS = 16
 """... and those that a comb is looked for from; chosen."""
 COMB_FIT_STEPS = 3
 """Steps of the least squares."""
 MAX_COMB_CHANCE = 1e-4
-"""A comb that as many lines as random would have more often than this, over all combs that are tried, is none."""
+"""A comb that as many peaks as random would have more often than this, over all combs that are tried, is none."""
 MAX_PEAK_WEIGHT = 3.0
-"""Most that one line counts, in log10 of its clearness: a loud one is no more than a line; chosen."""
+"""Most that one peak counts, in log10 of its clearness: a loud one is no more than a peak; chosen."""
 MIN_COMB_SHARE = 0.5
-"""Share of the lines that a comb far from the speed that was set explains at least."""
+"""Share of the peaks that a comb far from the speed that was commanded explains at least."""
 MIN_COMB_HARMONICS = 3
-"""Multiples that a comb has at least: any two lines have one."""
+"""Harmonics that a comb has at least: any two peaks have one."""
 
 
 class Comb(NamedTuple):
-    """A frequency, and the lines that are its multiples."""
+    """A frequency, and the peaks that are its harmonics."""
 
     frequency: float
     """Frequency (Hz)."""
-    is_member: NDArray[np.bool_]
-    """Which lines are multiples, shape (n,)."""
+    is_member: Flags
+    """Which peaks are harmonics, shape (n,)."""
     order: Floats
     """Order of each, shape (n,)."""
     offset: Floats
-    """Distance of each from its multiple (Hz), as that is folded, shape (n,)."""
+    """Distance of each from its harmonic (Hz), as that is folded, shape (n,)."""
 
 
 def find_comb(
     lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
 ) -> SpindleSpeed | None:
-    """The comb near a frequency (Hz), up to `around` from it, relative, that explains the most; None without one.
+    """Find the comb within `around` (relative) of a frequency (Hz) that explains the most peaks, or None.
 
-    lines: of all axes, without skirts; bin_: of the spectrum (Hz). Each line is a vote for the frequencies that it is a
-    multiple of; those of the loudest are compared, after least squares, by the lines that they explain.
+    peaks: of all axes, without skirts; bin_: of the spectrum (Hz). Each peak is a vote for the frequencies that it
+    is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
     """
     lines = lines.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
@@ -73,10 +72,10 @@ def find_comb(
 def find_distant_comb(
     lines: SpectralPeaks, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
 ) -> SpindleSpeed | None:
-    """The comb that explains the most, half or twice the frequency (Hz) at most and further than `around` from it.
+    """Find the best comb between half and twice a frequency (Hz), farther than `around` from it, or None.
 
-    Of those that explain as many tenths of the lines that of which all are tooth passing, else the highest; none of
-    which all multiples have an order in common that the teeth have not: that is a part of another.
+    Of those that explain as many tenths of the peaks that of which all are tooth passing, else the highest; none of
+    which all harmonics have an order in common that the teeth have not: that is a part of another.
     """
     lines, best, rank = lines.loudest(MAX_COMB_PEAKS), None, (0.0, False, 0.0)
     for centre in list_distant_centers(frequency, around):
@@ -92,19 +91,19 @@ def find_distant_comb(
 
 
 def list_distant_centers(frequency: float, around: float) -> list[float]:
-    """Frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
+    """List frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
     steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
     return [float(centre) for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps]))]
 
 
 def refine_comb(frequency: float, lines: SpectralPeaks, bin_: float) -> SpindleSpeed | None:
-    """A frequency (Hz) made exact by least squares over its multiples among lines; None where there are none."""
+    """Refine a frequency (Hz) by least squares over its harmonics among peaks; None without any."""
     comb = _fit_comb(frequency, lines, lines.frequency[np.newaxis], bin_)
     return _comb_speed(comb, lines, bin_) if np.any(comb.is_member) else None
 
 
 def _folded_images(lines: SpectralPeaks, sample_rate: float) -> Floats:
-    """What may have been folded to each line (Hz), itself first; shape (images, n)."""
+    """Return the frequencies that may have been folded to each peak (Hz), itself first; shape (images, n)."""
     heard = lines.frequency
     return np.stack([heard, sample_rate - heard, sample_rate + heard, 2 * sample_rate - heard])
 
@@ -120,7 +119,7 @@ def _find_best_comb(lines: SpectralPeaks, images: Floats, bin_: float, frequency
 
 
 def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float) -> Floats:
-    """Frequencies (Hz) that the loudest lines are multiples of."""
+    """Return the frequencies (Hz) that the loudest peaks are harmonics of."""
     loudest = lines.frequency[:MAX_COMB_ANCHORS]
     orders = np.arange(1, int(np.max(loudest, initial=0.0) / frequency / (1 - around)) + 1)
     parts = (loudest[:, np.newaxis] / orders).ravel()
@@ -128,7 +127,7 @@ def _candidate_frequencies(lines: SpectralPeaks, frequency: float, around: float
 
 
 def _fit_comb(frequency: float, lines: SpectralPeaks, images: Floats, bin_: float) -> Comb:
-    """A frequency made exact by least squares over its multiples."""
+    """Fit a frequency by least squares to its harmonics."""
     comb = _build_comb(frequency, images, bin_)
     for _ in range(COMB_FIT_STEPS):
         if not np.any(comb.is_member):
@@ -148,14 +147,14 @@ def _build_comb(frequency: float, images: Floats, bin_: float) -> Comb:
 
 
 def _peak_error(lines: SpectralPeaks, bin_: float) -> Floats:
-    """Standard error of each line (Hz), with what the speed wavers by."""
+    """Return the standard error of each peak (Hz), with the variation of the speed."""
     return np.hypot(lines.frequency_error(bin_), COMB_SPEED_WAVER * lines.frequency)
 
 
 def _comb_chance(comb: Comb, lines: SpectralPeaks, images: Floats, bin_: float, teeth: int, around: float) -> float:
-    """How many of all combs that are tried would have as many multiples among lines that lie anywhere.
+    """Return how many of all combs tried would have as many harmonics among random peaks.
 
-    Multiples of tooth passing alone are so much rarer.
+    Harmonics of tooth passing alone are this much rarer.
     """
     orders = np.unique(comb.order[comb.is_member])
     if orders.size < MIN_COMB_HARMONICS:
@@ -177,24 +176,24 @@ def _comb_speed(comb: Comb, lines: SpectralPeaks, bin_: float) -> SpindleSpeed:
 
 
 MIN_HARMONIC_LEVEL = 0.6
-"""log10 of its power over that of the noise from which on a multiple counts: noise is seldom so loud; chosen ..."""
+"""log10 of its power over that of the noise from which on a harmonic counts: noise is seldom so loud; chosen ..."""
 MAX_HARMONIC_LEVEL = 2.4
 """... and the most that it counts beyond that; chosen."""
 SUM_FREQUENCY_STEP = 0.25
-"""Step of the frequencies that are tried, over what moves the highest multiple by a bin; chosen."""
+"""Step of the frequencies that are tried, over what moves the highest harmonic by a bin; chosen."""
 N_SUM_LEVELS = 100
-"""Levels into which a multiple's part of the sum is divided."""
+"""Levels into which a harmonic's part of the sum is divided."""
 CLEAR_SUM_MEAN = 1 / 3
-"""Mean over the multiples below which a comb must be far rarer by chance, which takes each for itself: side bands of a
-line that is no multiple come together; chosen ..."""
+"""Mean over the harmonics below which a comb must be far rarer by chance, which takes each for itself: sidebands of
+a peak that is no harmonic come together; chosen ..."""
 FAINT_SUM_CHANCE = 1e-8
 """... as this; chosen."""
 MAX_REMAINING_CHANCE = 0.05
-"""How often chance may make the multiples that are left without those of one order; chosen."""
+"""How often chance may make the harmonics that are left without those of one order; chosen."""
 HARMONIC_BINS = 4.0
-"""Distance from a multiple up to which the spectrum is its own (bins): half the width of the window's main lobe."""
+"""Distance from a harmonic up to which the spectrum is its own (bins): half the width of the window's main lobe."""
 WEAK_PEAK_POWER = 4.0
-"""Power over that of the noise of the lines from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
+"""Power over that of the noise of the peaks from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
 
 
 def find_comb_by_sum(
@@ -206,13 +205,13 @@ def find_comb_by_sum(
     around: float,
     usual: float = 1.0,
 ) -> SpindleSpeed | None:
-    """The comb near a frequency (Hz), up to `around` from it, relative, that is loudest over noise; None without one.
+    """Find the comb within `around` (relative) of a frequency (Hz) that is loudest over the noise, or None.
 
-    spectra and air: of each axis; what is no louder than in air does not count. lines: those that stand clear, of all
-    axes; where they are many, they settle it, and there is one on a multiple of anything. The mean over all axes of
-    log10 of power over noise is summed over the multiples (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It is a
-    comb where as many frequencies that are no multiples would have that sum less often than once in ten thousand, over
-    all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
+    spectra and air: of each axis; what is no louder than in air does not count. peaks: those that stand clear, of
+    all axes; where they are many, they settle it, and there is one on a harmonic of anything. The mean over all axes
+    of log10 of power over noise is summed over the harmonics (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It
+    is a comb where as many frequencies that are no harmonics would have that sum less often than once in ten
+    thousand, over all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
     """
     if len(lines) >= MAX_COMB_PEAKS * len(spectra):
         return None
@@ -238,7 +237,7 @@ def find_comb_by_sum(
 
 
 def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
-    """log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, in the mean of all axes, 0 to `MOST`; 0 where it is of air."""
+    """Return log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, the mean of all axes; 0 where it is air."""
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):
         above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
@@ -250,7 +249,7 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
 
 
 def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
-    """Whether the multiples that are heard have an order in common that the teeth have not: it is another's comb."""
+    """Return whether the harmonics share an order that the teeth do not: the comb belongs to another frequency."""
     orders = np.arange(1, heard.size + 1)
     return any(
         _sum_chance(heard[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
@@ -258,7 +257,7 @@ def _is_partial_comb(heard: Floats, values: Floats, teeth: int) -> bool:
 
 
 def _sum_chance(heard: Floats, values: Floats) -> float:
-    """How often as many of the values, drawn anywhere, have a sum as large; noise is among them, if they are few."""
+    """Return how often random values have a sum as large."""
     count, level = heard.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
     share = (
         np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)

@@ -1,1 +1,1 @@
-"""What test cuts teach of the turning spindle: prior, likelihood, weighted draws, and the next cut worth making."""
+"""Learning from test cuts: prior, likelihood, posterior samples, and the next test cut."""

@@ -14,17 +14,17 @@ from lobewatch.machine.journal.cut_entry import CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
 
 DRIVE_POWER_SPREAD = 0.15
-"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency of
-motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
+"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency
+of motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
 EDGE_FORCE_SPREAD, UNKNOWN_EDGE_FORCE_SPREAD = 0.3, 0.5
-"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it was
-measured with), and where it is not: what is published differs by three times."""
+"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it
+was measured with), and where it is not: what is published differs by three times."""
 POWER_READING_SPREAD = 0.05
 """Standard deviation, relative, of one reading: a display that jumps, a feed or a radial depth a little off."""
 CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD = 0.89, 0.08
-"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations in
-time: edges that have left the cut do not rub, and thick chips, which it has beside thin ones, cost less. See
-docs/cuts.md."""
+"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations
+in time: edges that have left the cut do not rub, and thick chips, which it has next to thin ones, cost less.
+See docs/cuts.md."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class PowerEvidence:
 
 
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
-    """What a power says of a cut in a material."""
+    """Estimate Kt from the drive power of a cut in a material."""
     of_edges = power.edge_share / (1 + power.edge_share)
     common = math.hypot(
         DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
     )
-    middle, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
-    return PowerEvidence(power.tangential / cut.tangential / middle, common, math.hypot(POWER_READING_SPREAD, scatter))
+    median, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
+    return PowerEvidence(power.tangential / cut.tangential / median, common, math.hypot(POWER_READING_SPREAD, scatter))
 
 
 AGED_FREQUENCY_CHANGE = 0.02
@@ -66,9 +66,9 @@ class CutEvidence:
     depth: float
     """Axial depth (m)."""
     verdict: CutVerdict
-    """Word for what it sounded like."""
+    """Verdict on its sound."""
     frequency: float = math.nan
-    """Chatter frequency (Hz); NaN where none was heard or told."""
+    """Chatter frequency (Hz); NaN where none was recorded or told."""
     feed_angles: tuple[float, ...] = (0.0,)
     """Directions it may have been fed in, as angles from x (rad): the worst counts."""
     material: int = 0
@@ -88,7 +88,7 @@ class CutEvidence:
         return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
     def is_repeat_of(self, other: CutEvidence) -> bool:
-        """Whether another cut is this one made again: of one program, in one material, at one speed and depth."""
+        """Return whether another cut repeats this one: same program, material, speed and depth."""
         near = abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
         same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)
         return near and same and abs(math.log(other.depth / self.depth)) < REPEAT_DEPTH_TOLERANCE
@@ -111,30 +111,30 @@ class CutEvidence:
 
 TAKEN_SPEED_TOLERANCE, TAKEN_DEPTH_TOLERANCE = 0.01, 0.04
 """Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen: what is
-less deep than an edge (`likelihood.EDGE`) the spindles that are learnt tell by themselves ..."""
+less deep than an edge (`LIMIT_SPREAD`) the spindles that are learned tell by themselves ..."""
 REJECTED_DEPTH_TOLERANCE = 0.10
 """... but not where they do not believe it."""
 
 
 def is_setting_taken(
-    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence] = ()
+    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence] = ()
 ) -> bool:
-    """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since.
+    """Return whether chatter was recorded at a setting (rpm, m) or hardly deeper, and no stable cut there since.
 
     doubted: cuts that are not believed, which take more.
     """
     return any(
         cut.has_chatter
         and abs(math.log(speed_rpm / cut.speed_rpm)) < TAKEN_SPEED_TOLERANCE
-        and depth > (1 - (REJECTED_DEPTH_TOLERANCE if cut in doubted else TAKEN_DEPTH_TOLERANCE)) * cut.depth
+        and depth > (1 - (REJECTED_DEPTH_TOLERANCE if cut in rejected else TAKEN_DEPTH_TOLERANCE)) * cut.depth
         and not any(cut.is_repeat_of(later) and not later.has_chatter for later in cuts[place + 1 :])
         for place, cut in enumerate(cuts)
     )
 
 
-def find_cut_to_repeat(cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence]) -> CutEvidence | None:
-    """The first cut that is not believed and was made once only; None where there is none."""
+def find_cut_to_repeat(cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence]) -> CutEvidence | None:
+    """Find the first rejected cut that was made only once, or None."""
     for cut in cuts:
-        if cut in doubted and sum(cut.is_repeat_of(other) for other in cuts) == 1:
+        if cut in rejected and sum(cut.is_repeat_of(other) for other in cuts) == 1:
             return cut
     return None

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import MillingRows, build_milling_system, count_pieces, rows_at_speeds
 from lobes.floquet import largest_multipliers
 from lobes.floquet.stability_boundary import loudest_chatter_frequency
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
@@ -24,23 +24,21 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constan
 LIMIT_SPREAD = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
 MISLABELED_SHARE = 0.03
-"""Share of cuts that are written down as what they are not; chosen: 2.7 % are heard wrong, some are typed wrong."""
+"""Share of cuts that are written down as what they are not; chosen: 2.7 % are recorded wrong, some are typed wrong."""
 UNPITCHED_MISLABELED_SHARE = 0.06
-"""The same of chatter of which no frequency was told, so that nothing speaks for it but the word; chosen."""
+"""The same of chatter of which no frequency was told, so that nothing speaks for it but the verdict; chosen."""
 CHATTER_FREQUENCY_SPREAD = 0.01
 """Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
 FOREIGN_FREQUENCY_SHARE = 0.05
 """Share of chatter frequencies that say nothing; chosen, see docs/cuts.md, How good it is."""
 WRONG_KIND_SHARE = 0.1
-"""Share of chatter that is heard as that of the other kind; chosen."""
+"""Share of chatter that is recorded as that of the other kind; chosen."""
 MULTIPLIER_ACCURACY = 1e-3
 """Accuracy of a multiplier, relative."""
 FLIP_ANGLE_TOLERANCE = 1e-3
 """Distance of the angle of a multiplier from pi (rad) up to which it is that of period two."""
 MAX_LOG_EXCESS = 5.0
 """Largest logarithm of depth over limit that counts, either way: a hundred times `EDGE`."""
-
-Floats = NDArray[np.float64]
 
 
 class CutPrediction(NamedTuple):
@@ -51,8 +49,9 @@ class CutPrediction(NamedTuple):
     frequency: Floats
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
     limit_frequency: Floats
-    """Folded frequency at the limit of its speed, by zero order (Hz); may be NaN where the cut says nothing of any."""
-    is_flip: NDArray[np.bool_]
+    """Folded frequency at the limit of its speed, by the zero-order approximation (Hz); may be NaN where the cut
+    says nothing of any."""
+    is_flip: Flags
     """Whether that is of period two."""
 
     @property
@@ -66,18 +65,18 @@ class CutPrediction(NamedTuple):
         return MISLABELED_SHARE + (1 - 2 * MISLABELED_SHARE) * self.chatter_probability
 
     def frequency_distances(self, cut: CutEvidence) -> Floats:
-        """Distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
+        """Return the distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
 
-        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
-        limit of a pocket these are two modes or lobes.
+        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond
+        the limit of a pocket these are two modes or lobes.
         """
         return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
 
 
-def predict_cut(cut: CutEvidence, draws: SpindleSamples) -> CutPrediction:
-    """What draws would do in the worst of the directions of feed of a cut, at its own depth."""
-    rows = draws.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
-    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
+def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
+    """Predict what samples would do in the worst feed direction of a cut, at its own depth."""
+    rows = samples.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
+    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * samples.at_rest.speed_rpm
     rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
     predict = _predict_by_zero_order if is_force_constant(cut.cut) else _predict_by_multipliers
     fed = [predict(rows.with_feed_angle(angle), cut) for angle in cut.feed_angles]
@@ -86,27 +85,26 @@ def predict_cut(cut: CutEvidence, draws: SpindleSamples) -> CutPrediction:
 
 
 def log_likelihood(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
-    """Logarithm of the likelihood of what was written down, shape (r,).
+    """Return the log likelihood of the recorded verdict for each sample, shape (r,).
 
-    again: the same cut as it was made at other times, whose words are known: all have one truth, so that of two words
-    that differ one is wrong, however near its limit the cut is.
+    again: the same cut as it was made at other times, whose verdicts are known: all have one truth, so that of two
+    verdicts that differ one is wrong, however near its limit the cut is.
     """
     return np.asarray(np.log(sum(_likelihoods(cut, prediction, again))))
 
 
 def mislabel_probability(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence] = ()) -> Floats:
-    """Chance that the word of a cut is wrong, of spindles that are the truth, shape (r,); again: as above."""
+    """Return the probability that the verdict of a cut is wrong on each sample, shape (r,)."""
     right, wrong = _likelihoods(cut, prediction, again)
     return np.asarray(wrong / (right + wrong))
 
 
 def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> tuple[Floats, float]:
-    """Logarithm of Kt by power over that of each spindle, less what readings before it say of the error that all share,
-    shape (r,), and its variance.
+    """Return the log distance of Kt by power from that of each sample, and its variance.
 
-    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e standard
-    normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance. ValueError for a
-    cut without power.
+    force: Kt of each over that of the table. The readings are log K_i = log Kt + common_i e + own_i e_i, all e
+    standard normal: after those before, e is normal with 1 + sum (common_i / own_i)^2 as its inverse variance.
+    ValueError for a cut without power.
     """
     if cut.power is None:
         raise ValueError(f"cut {cut.id} has no power; ask for one that has")
@@ -120,7 +118,7 @@ def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence
 
 
 def power_log_likelihood(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence]) -> Floats:
-    """Logarithm of the likelihood of its power over the largest that it can be, shape (r,); 0 where nobody has read it.
+    """Return the log likelihood of the power of a cut relative to its maximum, shape (r,); 0 without a power.
 
     Arguments as of `power_distance`. A natural frequency that has moved since says nothing of Kt: an old one counts
     whole.
@@ -132,7 +130,7 @@ def power_log_likelihood(cut: CutEvidence, force: Floats, before: Sequence[CutEv
 
 
 def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[CutEvidence]) -> tuple[Floats, Floats]:
-    """Likelihood of what was written down with its word right, and with it wrong."""
+    """Return the likelihood of the recorded verdict being right, and of its being wrong."""
     truths: tuple[Floats, Floats] = prediction.chatter_probability, 1 - prediction.chatter_probability
     for other in again:
         told = [share * word for share, word in zip(truths, _label_likelihoods(other, prediction), strict=True)]
@@ -142,7 +140,7 @@ def _likelihoods(cut: CutEvidence, prediction: CutPrediction, again: Sequence[Cu
 
 
 def _label_likelihoods(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]:
-    """Likelihood of what was written down where it chatters, and where it is stable; a wrong word sounds anyhow."""
+    """Return the likelihood of the recorded verdict if the cut chatters, and if it is stable."""
     ones = np.ones(prediction.excess.shape)
     if not cut.has_chatter:
         return MISLABELED_SHARE * ones, (1 - MISLABELED_SHARE) * ones
@@ -152,7 +150,7 @@ def _label_likelihoods(cut: CutEvidence, prediction: CutPrediction) -> tuple[Flo
 
 
 def max_log_likelihood(cut: CutEvidence) -> float:
-    """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
+    """Return the largest possible `log_likelihood`: of a spindle that does what was recorded."""
     if not cut.has_frequency:
         return 0.0
     base = np.atleast_1d(_folded_chatter(cut))
@@ -161,7 +159,7 @@ def max_log_likelihood(cut: CutEvidence) -> float:
 
 
 def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Likelihood of kind and frequency that were told, where it chatters."""
+    """Return the likelihood of recorded kind and frequency if the cut chatters."""
     alike = prediction.is_flip == (cut.verdict == "flip")
     kind = np.where(alike, 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
     wide = CHATTER_FREQUENCY_SPREAD * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
@@ -173,13 +171,13 @@ def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats
 
 
 def _folded_chatter(cut: CutEvidence) -> Floats:
-    """Chatter frequency that was heard, or that of period two where none was told, folded by the teeth (Hz)."""
+    """Return the chatter frequency, or that of period two, folded by the teeth (Hz)."""
     chatter = cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2
     return fold_frequency(chatter, cut.tooth_frequency)
 
 
 def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
-    """Prediction where the mean force is all of it."""
+    """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
     limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
     excess = np.clip(np.log(cut.depth / limit), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
@@ -196,7 +194,7 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
 
 
 def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
-    """Prediction by semi-discretisation at the depth of the cut; its distance from the limit is that of its growth.
+    """Predict a cut by semi-discretization at its depth; the excess follows from the growth rate.
 
     Growth of the logarithm of the motion over the decay that the spindle has without a cut.
     """
@@ -223,7 +221,7 @@ class ExpectedChatter(NamedTuple):
 
 
 def predict_chatter(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> ExpectedChatter:
-    """What to expect at a speed (rpm): the sound at the limit is more than 1 % off in many cuts far beyond it.
+    """Predict whether a cut chatters at its depth and a speed (rpm), and at which frequency.
 
     The multiplier is that of the cut's own depth. ValueError for an assembly without modes.
     """

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
+from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD
@@ -19,18 +19,17 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constan
 from modal import Mode
 
 SPEED_GRID_STEP = 0.008
-"""Relative step of the speeds that are looked at."""
+"""Relative step of the speeds that are checked."""
 TRIED_SPEED_STEP_RPM, TRIED_DEPTH_STEP_MM = 10.0, 0.05
 """Steps that can be set at a machine (rpm and mm)."""
 DEPTH_ROUNDING = 1e-6
 """Share of a step of depth that rounding of numbers may miss."""
 N_COMPARED_SPEEDS = 80
-"""Number of speeds at which zero order is compared with semi-discretisation."""
+"""Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
-"""Least and largest ratio of true limit to zero order that is believed; chosen."""
+"""Least and largest ratio of true limit to the zero-order limit that is believed; chosen."""
 
 TipModes = Sequence[Mode] | None
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +45,19 @@ class CutGrid:
     max_depths: Floats
     """Depth that tool and drive allow at each (m), shape (s,)."""
     zero_order_trust: Floats
-    """True limit in the middle over that by zero order, at each speed, shape (s,)."""
+    """True median limit over that by the zero-order approximation, at each speed, shape (s,)."""
 
     def contains(self, speed: float) -> bool:
-        """Whether a speed (rpm) lies within, as far as a heard one may be off."""
+        """Return whether a speed (rpm) lies within the grid, with the tolerance of a recorded speed."""
         return bool(self.speeds[0] * (1 - SPEED_GRID_STEP) <= speed <= self.speeds[-1] * (1 + SPEED_GRID_STEP))
 
     def build_evidence(self, speed: float, depth: float, word: CutVerdict = "stable") -> CutEvidence:
-        """A cut of it."""
+        """Build the evidence of a cut with this program."""
         return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 
 
 def list_speeds(low: float, high: float) -> Floats:
-    """Speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
+    """List the speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
     number = max(int(np.log(high / low) / SPEED_GRID_STEP) + 1, 2)
     return np.unique(
         np.clip(np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM, low, high)
@@ -66,16 +65,16 @@ def list_speeds(low: float, high: float) -> Floats:
 
 
 def floor_depth(depth: float) -> float:
-    """The deepest depth (m) that can be set and is not deeper."""
+    """Round a depth (m) down to one that can be set."""
     return round(math.floor(depth * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING) * TRIED_DEPTH_STEP_MM, 6) / 1e3
 
 
 def compare_zero_order(
     x: TipModes, y: TipModes, cut: Cut, feed_angles: tuple[float, ...], speeds: Floats, deepest: float
 ) -> Floats:
-    """True limit over that by zero order at speeds (rpm), shape (s,); 1 where neither is less than a depth (m).
+    """Return the true limit over the zero-order limit at speeds (rpm), shape (s,).
 
-    x and y: modes of the spindle in the middle. Semi-discretisation at fewer speeds, between them interpolated.
+    x and y: modes of the spindle in the median. Semi-discretisation at fewer speeds, between them interpolated.
     """
     if is_force_constant(cut):
         return np.ones(speeds.shape)
@@ -90,25 +89,25 @@ def compare_zero_order(
 MIN_STABLE_PROBABILITY = 0.5
 """Chance of being stable that a test cut has at least."""
 TRIED_STABLE_PROBABILITIES = (0.51, 0.6, 0.7, 0.8, 0.9)
-"""Chances of being stable, of the depths that are looked at; chosen."""
+"""Chances of being stable, of the depths that are checked; chosen."""
 MAX_CANDIDATE_SPEEDS, MIN_CANDIDATE_DISTANCE = 8, 0.02
-"""Largest number of speeds that are looked at, and their least relative distance; chosen."""
+"""Largest number of speeds that are checked, and their least relative distance; chosen."""
 N_EXPECTED_FREQUENCIES = 4
-"""Number of chatter frequencies that may be heard, of which it is worked out what they would tell."""
+"""Number of chatter frequencies that may be recorded, of which it is worked out what they would tell."""
 FREQUENCY_ERROR_FACTOR = 1.5
 """Factor on the error of a chatter frequency, since that at the limit stands for that at the depth; chosen."""
 LIMIT_DEPTH_MARGIN = 1e-6
 """Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
 MAX_LABEL_DEVIATION = 2.0
-"""Edges (`likelihood.EDGE`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
-the word is more likely wrong."""
+"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond
+it the verdict is more likely wrong."""
 EQUAL_DEPTH_TOLERANCE = 1e-9
 """Difference of two depths that is none (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitCharts:
-    """Limits of draws of equal weight over the speeds of a grid."""
+    """Limits of samples of equal weight over the speeds of a grid."""
 
     grid: CutGrid
     """Speeds and depths that a cut may be chosen from."""
@@ -116,17 +115,17 @@ class LimitCharts:
     """Limits in the worst direction of feed, as deep as is allowed (m), shape (r, s)."""
     frequencies: Floats
     """Chatter frequencies at them, folded by how often the cut repeats (Hz), shape (r, s)."""
-    depth_order: NDArray[np.intp]
-    """Draws of each speed by their limits, the deepest first, shape (r, s)."""
+    depth_order: Indices
+    """Samples of each speed by their limits, the deepest first, shape (r, s)."""
     typical_frequency: float
     """A natural frequency (Hz)."""
     removal_rates: Floats
     """Speed times the deepest depth that can be set and is stable (rpm m) for each of them, shape (r, s)."""
 
     @classmethod
-    def of(cls, draws: SpindleSamples, grid: CutGrid) -> LimitCharts:
-        """Limits of draws at speed."""
-        rows = replace(draws.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
+    def of(cls, samples: SpindleSamples, grid: CutGrid) -> LimitCharts:
+        """Compute the limits of samples at speed."""
+        rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
         fed = [
             ZeroOrderBatch.of(rows.with_feed_angle(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles
@@ -145,15 +144,15 @@ class LimitCharts:
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def true_best_rates(self, cuts: Sequence[CutEvidence]) -> Floats:
-        """Largest removal rate (rpm m) of the cuts that were heard stable and are so, in each draw, shape (r,)."""
+        """Return the largest removal rate (rpm m) of cuts that are truly stable in each sample, shape (r,)."""
         best = np.zeros(len(self.limits))
         for cut in cuts:
             if not cut.has_chatter:
                 best = np.maximum(best, np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth))
         return best
 
-    def is_label_wrong(self, cut: CutEvidence) -> NDArray[np.bool_]:
-        """Whether the word of a cut is wrong in each draw, shape (r,)."""
+    def is_label_wrong(self, cut: CutEvidence) -> Flags:
+        """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
         excess = np.log(cut.depth / self.limits[:, row])
         return np.asarray(
@@ -163,8 +162,7 @@ class LimitCharts:
         )
 
     def expected_gains(self, weights: Floats, best: float | Floats) -> Floats:
-        """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,); best: that so far, of each
-        draw or of all."""
+        """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
         more = self.removal_rates > np.min(best)
         speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
         order, chips = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
@@ -178,7 +176,7 @@ class LimitCharts:
         return best_gains
 
     def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
-        """Speeds, by their place, and depths (m) that are worth looking at."""
+        """Yield candidate speeds, by their place, and depths (m)."""
         gains = self.expected_gains(np.full(len(self.limits), 1 / len(self.limits)), best)
         places = list[int]()
         for row in np.argsort(-gains).tolist():
@@ -197,8 +195,7 @@ class LimitCharts:
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
-        """Worth of a cut (rpm m): what it gains, and where more are left what the best next one gains then; best: as
-        for `gains`."""
+        """Return the worth of a cut (rpm m): its own gain, and that of the best next cut."""
         stable = self.limits[:, row] >= depth - EQUAL_DEPTH_TOLERANCE
         chance, chips = float(np.mean(stable)), float(self.grid.speeds[row]) * depth
         if chance <= MIN_STABLE_PROBABILITY:
@@ -209,8 +206,8 @@ class LimitCharts:
         after = chance * self._next_gain(stable / np.sum(stable), np.maximum(best, chips))
         return gain + after + (1 - chance) * self._gain_after_chatter(row, ~stable, best)
 
-    def _gain_after_chatter(self, row: int, chatters: NDArray[np.bool_], best: float | Floats) -> float:
-        """Gain of the next cut, over frequencies that may be heard."""
+    def _gain_after_chatter(self, row: int, chatters: Flags, best: float | Floats) -> float:
+        """Return the gain of the next cut, averaged over possible chatter frequencies."""
         places = np.flatnonzero(chatters)
         if not places.size:
             return 0.0
@@ -228,5 +225,5 @@ class LimitCharts:
         return float(np.mean(gains))
 
     def _next_gain(self, weights: Floats, best: float | Floats) -> float:
-        """Gain of the best cut at any speed (rpm m)."""
+        """Return the gain of the best cut at any speed (rpm m)."""
         return float(np.max(self.expected_gains(weights, best)))

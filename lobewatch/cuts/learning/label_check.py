@@ -20,9 +20,9 @@ from lobewatch.cuts.learning.cut_likelihood import (
 from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
 
 MAX_WRONG_PROBABILITY = 0.5
-"""Chance that the word of a cut is wrong, given all cuts, from which it is not believed."""
+"""Chance that the verdict of a cut is wrong, given all cuts, from which it is not believed."""
 N_CHECK_SAMPLES = 300
-"""Number of draws that are asked what they say of a cut."""
+"""Number of samples that are asked what they say of a cut."""
 MAX_FREQUENCY_DEVIATION = 4.0
 """Distance (standard deviations) from all frequencies predicted at which chatter is that of something else, and from
 the Kt that was known at which a power is not believed; chosen."""
@@ -56,13 +56,13 @@ class InconsistentCut:
 
 
 def wrong_label_probability(evidence: NewEvidence) -> float:
-    """Chance that the word of a cut is wrong under spindles that explain all."""
+    """Return the probability that the verdict of a cut is wrong on spindles that explain all cuts."""
     cut, before = evidence.cut, evidence.prior
     return float(np.sum(before.weights * mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))))
 
 
 def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
-    """What is wrong with a cut under spindles that explain all; None where nothing is."""
+    """Find what contradicts a cut on spindles that explain all cuts, or None."""
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
     wrong = wrong_label_probability(evidence)
     if np.isfinite(cut.frequency) and cut.has_chatter:
@@ -79,7 +79,7 @@ def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
 
 
 def is_power_inconsistent(evidence: NewEvidence) -> bool:
-    """Whether the power of a cut says another Kt than all that was known before."""
+    """Return whether the power of a cut implies another Kt than all earlier cuts."""
     cut, before = evidence.cut, evidence.prior
     if cut.power is None:
         return False
@@ -90,31 +90,31 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
     )
 
 
-def find_inconsistent_cuts(learnt: Posterior) -> tuple[InconsistentCut, ...]:
-    """Cuts that are not believed, of those that were learnt from: each counts as its chance to be right says."""
-    few = learnt.resample(N_CHECK_SAMPLES)
-    doubted = (find_contradiction(few.predict(cut)) for cut in learnt.cuts)
-    return tuple(doubt for doubt in doubted if doubt is not None)
+def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
+    """Find the cuts to reject, of those that were learned from."""
+    few = posterior.resample(N_CHECK_SAMPLES)
+    rejected = (find_contradiction(few.predict(cut)) for cut in posterior.cuts)
+    return tuple(uncertainty for uncertainty in rejected if uncertainty is not None)
 
 
 def inconsistent_cut_remarks(
-    learnt: Posterior, contradicting: Sequence[InconsistentCut], about: str
+    posterior: Posterior, contradicting: Sequence[InconsistentCut], about: str
 ) -> Iterator[Remark]:
-    """What was left out, and where the spindle is not what it was tapped as; about: the program."""
+    """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, contradicting)
-    if learnt.is_frequency_unusual:
+    if posterior.is_frequency_unusual:
         between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
         text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 
-def _repeats_of(cut: CutEvidence, learnt: Posterior) -> list[CutEvidence]:
-    """The same cut as it was made at other times."""
-    return [other for other in learnt.cuts if other is not cut and cut.is_repeat_of(other)]
+def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
+    """Return the same cut as made at other times."""
+    return [other for other in posterior.cuts if other is not cut and cut.is_repeat_of(other)]
 
 
 def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
-    """Remark on a cut that is not believed."""
+    """Build the remark on a rejected cut."""
     cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
@@ -126,16 +126,17 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
         ),
         Contradiction.CHATTERS: (
             f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
-            "cut it again, or take it out with lobewatch exclude; tap again if it stays",
+            "cut it again, or take it out with folder_updates.exclude_entry; tap again if it stays",
         ),
         Contradiction.STABLE: (
             f"stable {at}, {wrong}: a slip, another depth or speed than told?",
-            "cut it again, or take it out with lobewatch exclude",
+            "cut it again, or take it out with folder_updates.exclude_entry",
         ),
         Contradiction.POWER: (
             f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
             "another depth, worn edges?",
-            "read it again, or take the cut whose power was misread out with lobewatch exclude; its word counts",
+            "read it again, or take the cut whose power was misread out with folder_updates.exclude_entry; "
+            "its word counts",
         ),
     }[contradicting.contradiction]
     return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

@@ -30,7 +30,7 @@ PROGRAM_SPEED_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class PocketDepth:
-    """A pocket with what was heard in it."""
+    """A pocket with what was recorded in it."""
 
     pocket: SpeedPocket
     """Pocket by f_n and damping."""
@@ -39,7 +39,7 @@ class PocketDepth:
     cuts: tuple[CutEvidence, ...]
     """Cuts of the same cutter, material and immersion in its window."""
     max_depth: float
-    """Deepest cut that machine and tool bear there (m)."""
+    """Deepest cut that machine and tool allow there (m)."""
 
     @property
     def chatter_depth(self) -> float:
@@ -48,12 +48,12 @@ class PocketDepth:
 
     @property
     def stable_depth(self) -> float:
-        """Deepest depth that was heard stable, shallower than all chatter (m); 0 where none was."""
+        """Deepest depth that was recorded stable, shallower than all chatter (m); 0 where none was."""
         stable = (cut.depth for cut in self.cuts if not cut.has_chatter)
         return max((depth for depth in stable if depth < self.chatter_depth), default=0.0)
 
     def next_depth(self, first: float) -> float | None:
-        """Depth of the next cut (m), twice as deep or between what was heard; None where none is worth making.
+        """Choose the depth of the next cut (m): twice the stable one, or between stable and chatter, or None.
 
         first: depth to begin with (m).
         """
@@ -76,7 +76,7 @@ class PocketDepth:
 def find_pocket_depths(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
 ) -> list[PocketDepth]:
-    """The best pockets of a program with what was heard in each, that nearest to its own speed first."""
+    """Find the best pockets of a program with their test cuts, the nearest to its own speed first."""
     own, reach = _find_own_cuts(table, assembly, machine, cuts), CutRange.of(machine, table)
     told = []
     for pocket in find_speed_pockets(table, assembly, machine):
@@ -87,13 +87,12 @@ def find_pocket_depths(
 
 
 def choose_first_depth(table: ProgramTable) -> float:
-    """Depth of the first cut (m): a part of that of the program."""
+    """Choose the depth of the first cut (m): a part of that of the program."""
     return max(round_down_depth_mm(FIRST_DEPTH_SHARE * table.depth_mm), DEPTH_STEP_MM) / 1e3
 
 
 def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> Verdict:
-    """A verdict on a program whose limit is not known, with the word of the cuts that were heard at its very speed:
-    doubtful at best, for they tell nothing of what is not known."""
+    """Set the stability of a program without a limit from test cuts at its speed; doubtful at best."""
     program = verdict.program
     at_speed = [
         cut
@@ -116,7 +115,7 @@ def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts
 def _find_own_cuts(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
 ) -> list[CutEvidence]:
-    """Cuts of this very program, at the speeds that are now what theirs were then: f_n may have moved since."""
+    """Find the cuts of this program, at speeds corrected for the change of the natural frequency."""
     shape = geometry_key(machine.build_cut(table))
     evidence = collect_tool_evidence(cuts, table, assembly, machine)
     own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]

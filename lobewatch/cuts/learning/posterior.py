@@ -1,4 +1,4 @@
-"""What was learnt of the turning spindle: draws from the prior, weighted by how well they explain its cuts."""
+"""What was learned of the rotating spindle: samples from the prior, weighted by how well they explain its cuts."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import (
     CutPrediction,
@@ -22,29 +22,28 @@ from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.uncertainty import Uncertainty
 
 N_PRIOR_SAMPLES = 2000
-"""Number of draws."""
+"""Number of samples."""
 N_REFRESHED_SAMPLES = 500
-"""Number of draws that are made anew where few have any weight left ..."""
+"""Number of samples that are redrawn where few have any weight left ..."""
 MIN_EFFECTIVE_SAMPLES = 120
 """... which is when the effective sample size is less."""
 N_MARKOV_MOVES, MARKOV_STEP_SHARE = 4, 0.5
 """Number of times that each is then moved, and how far, as a share of their own spread; chosen."""
 ADDED_VARIANCE = 1e-4
-"""Variance that is added to that of the draws before they are moved: a few alike have none of their own."""
+"""Variance that is added to that of the samples before they are moved: a few alike have none of their own."""
 NEGLIGIBLE_WEIGHT = 1e-6
-"""Share of the largest weight below which a draw is not looked at any more."""
+"""Share of the largest weight below which a sample is not checked any more."""
 MIN_CHATTER_FREQUENCIES, OPEN_FREQUENCY_INTERVAL = 2, (0.90, 1.05)
-"""Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is; chosen."""
+"""Chatter frequencies without which it is unknown how far a spindle at speed may be off, and how far that is;
+chosen."""
 USUAL_FREQUENCY_INTERVAL = (0.945, 1.025)
-"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `priors.FREQUENCY`."""
+"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `ROTATING_FREQUENCY_FACTOR`."""
 INTERVAL_LEVEL = 0.95
 """Share of the weight that an interval holds."""
 
-Floats = NDArray[np.float64]
-
 
 class Interval(NamedTuple):
-    """A number that is learnt, as a factor on that at rest (on that of the table, of coefficients)."""
+    """A number that is learned, as a factor on that at rest (on that of the table, of coefficients)."""
 
     mean: float
     """Weighted mean."""
@@ -56,28 +55,28 @@ class Interval(NamedTuple):
     """Weighted standard deviation."""
 
     def no_narrower(self, low: float, high: float) -> Interval:
-        """An interval that has both of these inside."""
+        """Return an interval that includes both values."""
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Weighted draws of the turning spindle."""
+    """Weighted samples of the rotating spindle."""
 
     samples: SpindleSamples
     """Spindles at speed."""
     log_weight: Floats
     """Logarithm of the weight of each, up to a constant, shape (r,)."""
     cuts: tuple[CutEvidence, ...] = ()
-    """Cuts that they were learnt from."""
+    """Cuts that they were learned from."""
     n_refreshed: int = 0
-    """Number of times that the draws were made anew."""
+    """Number of times that the samples were redrawn."""
     seed: int = 0
-    """Seed of all draws."""
+    """Seed of all samples."""
 
     @property
     def weights(self) -> Floats:
-        """Weight of each draw, sum 1, shape (r,)."""
+        """Weight of each sample, sum 1, shape (r,)."""
         return _normalize_weights(self.log_weight)
 
     @property
@@ -87,7 +86,7 @@ class Posterior:
 
     @property
     def intervals(self) -> dict[str, Interval]:
-        """Intervals by name (`SpindleSamples.ratios`); of natural frequencies they stay open until chatter was heard twice."""
+        """Intervals by name; those of natural frequencies stay open until chatter was recorded twice."""
         intervals = {name: _weighted_interval(values, self.weights) for name, values in self.samples.ratios().items()}
         if self.n_frequencies < MIN_CHATTER_FREQUENCIES:
             intervals |= {
@@ -99,7 +98,7 @@ class Posterior:
 
     @property
     def n_frequencies(self) -> int:
-        """Cuts whose chatter was heard with its frequency: without any, nothing is learnt of natural frequencies."""
+        """Number of cuts with a chatter frequency; without any, natural frequencies cannot be learned."""
         return sum(cut.has_frequency for cut in self.cuts)
 
     @property
@@ -113,24 +112,24 @@ class Posterior:
         )
 
     def learn_from(self, cut: CutEvidence) -> Posterior:
-        """What is known after one more cut."""
+        """Update with one more cut."""
         return self.predict(cut).update()
 
     def predict(self, cut: CutEvidence) -> NewEvidence:
-        """A cut, and what it would sound like on the spindles that are not ruled out."""
+        """Predict a cut on the samples that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
-        draws = self.samples[likely].with_materials(cut.material + 1, self.seed)
-        before = replace(self, samples=draws, log_weight=self.log_weight[likely])
-        return NewEvidence(before, cut, predict_cut(cut, draws))
+        samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
+        before = replace(self, samples=samples, log_weight=self.log_weight[likely])
+        return NewEvidence(before, cut, predict_cut(cut, samples))
 
     def draw(self, count: int) -> SpindleSamples:
-        """Draws of equal weight."""
+        """Draw samples of equal weight."""
         return self.samples[
             _resample_indices(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))
         ]
 
     def resample(self, count: int) -> Posterior:
-        """The same by so many draws of equal weight."""
+        """Resample to a number of samples of equal weight."""
         return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
 
 
@@ -139,36 +138,37 @@ class NewEvidence:
     """A cut before it teaches anything."""
 
     prior: Posterior
-    """Posterior without it: draws that have any weight left, with coefficients of its material."""
+    """Posterior without it: samples that have any weight left, with coefficients of its material."""
     cut: CutEvidence
     """The cut."""
     prediction: CutPrediction
-    """Sound that each of these draws would make in it."""
+    """Sound that each of these samples would make in it."""
 
     def update(self) -> Posterior:
-        """What is known with it."""
+        """Update the posterior with the cut."""
         log_weight = self.prior.log_weight + _cut_log_likelihood(
             self.cut, self.prior.samples, self.prediction, self.prior.cuts
         )
-        learnt = replace(self.prior, log_weight=log_weight, cuts=(*self.prior.cuts, self.cut))
-        return _refresh(learnt) if learnt.effective_size < MIN_EFFECTIVE_SAMPLES else learnt
+        posterior = replace(self.prior, log_weight=log_weight, cuts=(*self.prior.cuts, self.cut))
+        return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
-def build_prior(middle: MillingRows, doubt: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
-    """What is known before the first cut.
+def build_prior(
+    median: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0
+) -> Posterior:
+    """Build the posterior before the first cut.
 
-    middle: the spindle at rest in the middle of the doubt (a row).
+    middle: the spindle at rest in the median estimate (a row).
     """
-    return Posterior(sample_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(median, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(
-    cut: CutEvidence, draws: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
+    cut: CutEvidence, samples: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
 ) -> Floats:
-    """Logarithm of the likelihood of one cut after those before it; the word of an old one counts less, the more the
-    frequency has moved since."""
+    """Return the log likelihood of one cut after those before it; an old cut counts less."""
     word = log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    return cut.weight * word + power_log_likelihood(cut, draws.force_factors(cut.material), before)
+    return cut.weight * word + power_log_likelihood(cut, samples.force_factors(cut.material), before)
 
 
 def _normalize_weights(log_weight: Floats) -> Floats:
@@ -176,44 +176,44 @@ def _normalize_weights(log_weight: Floats) -> Floats:
     return np.asarray(weights / np.sum(weights))
 
 
-def _refresh(learnt: Posterior) -> Posterior:
-    """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
-    weights, draws, cuts = learnt.weights, learnt.samples, learnt.cuts
-    random = np.random.default_rng((learnt.seed, 3, len(cuts)))
-    spread = np.cov(draws.normal.T, aweights=weights) + ADDED_VARIANCE * np.eye(draws.normal.shape[1])
+def _refresh(posterior: Posterior) -> Posterior:
+    """Resample to equal weights, and move each sample by Metropolis-Hastings steps."""
+    weights, samples, cuts = posterior.weights, posterior.samples, posterior.cuts
+    random = np.random.default_rng((posterior.seed, 3, len(cuts)))
+    spread = np.cov(samples.normal.T, aweights=weights) + ADDED_VARIANCE * np.eye(samples.normal.shape[1])
     root = np.linalg.cholesky(spread) * MARKOV_STEP_SHARE
     chosen, copies = np.unique(_resample_indices(weights, N_REFRESHED_SAMPLES, random), return_inverse=True)
-    value = _joint_log_density(draws[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
-    draws = draws[chosen[copies]]
+    value = _joint_log_density(samples[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
+    samples = samples[chosen[copies]]
     for _ in range(N_MARKOV_MOVES):
-        step = random.standard_normal(draws.normal.shape) @ root.T
-        moved = replace(draws, normal=draws.normal + step)
-        least = value + np.log(random.uniform(size=len(draws)))
+        step = random.standard_normal(samples.normal.shape) @ root.T
+        moved = replace(samples, normal=samples.normal + step)
+        least = value + np.log(random.uniform(size=len(samples)))
         moved_value = _joint_log_density(moved, cuts, least)
         taken = moved_value > least
-        normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
-        draws, value = replace(draws, normal=normal), np.where(taken, moved_value, value)
-    return replace(learnt, samples=draws, log_weight=np.zeros(len(draws)), n_refreshed=learnt.n_refreshed + 1)
+        normal = np.where(taken[:, np.newaxis], moved.normal, samples.normal)
+        samples, value = replace(samples, normal=normal), np.where(taken, moved_value, value)
+    return replace(posterior, samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
 
 
-def _joint_log_density(draws: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
-    """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
+def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
+    """Return the log of prior times likelihood of all cuts; -inf where that is not above the least (r,).
 
-    A draw that cannot come to more any more is not asked about further cuts.
+    A sample that cannot come to more any more is not asked about further cuts.
     """
-    value: Floats = -np.sum(draws.normal**2, axis=1) / 2
+    value: Floats = -np.sum(samples.normal**2, axis=1) / 2
     hope = [cut.weight * max_log_likelihood(cut) for cut in cuts]
     for k, cut in enumerate(cuts):
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            left = draws[asked]
+            left = samples[asked]
             value[asked] += _cut_log_likelihood(cut, left, predict_cut(cut, left), cuts[:k])
     return value
 
 
-def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> NDArray[np.intp]:
-    """Places drawn by weight, systematically: each as often as its weight says, but for one."""
+def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> Indices:
+    """Draw indices by weight, systematically: each as often as its weight says, give or take one."""
     at = (np.arange(count) + random.uniform()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), at), weights.size - 1)
 

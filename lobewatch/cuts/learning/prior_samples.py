@@ -2,8 +2,8 @@
 
 Standard deviations: f_n -1.5 +- 2 %, for each mode apart; zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1
 +- 30 %, for each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen:
-plausible, not measured. They are joined with the doubt of the program. Each number is a function of one that is
-standard normal, so that draws can be moved without leaving the prior out of sight.
+plausible, not measured. They are joined with the uncertainty of the program. Each number is a function of one that
+is standard normal, so that samples can be moved without leaving the prior out of sight.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from functools import cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from lobes import MillingRows
+from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts.program_samples import (
     ROTATING_DAMPING_FACTOR,
     ROTATING_FORCE_SPREAD,
@@ -28,8 +28,8 @@ ROTATING_FORCE_PRIOR = (1.1, ROTATING_FORCE_SPREAD)
 """Middle of Kt at speed over that of the table, chosen, and its standard deviation relative to that; as FREQUENCY,
 DAMPING and STIFFNESS, which are those of the chance of chatter beside a verdict (the deviation of f_n absolute)."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
-"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle is
-far off."""
+"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle
+is far off."""
 MIN_PRIOR_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 MAX_SAMPLED_DAMPING = 0.95
@@ -37,12 +37,10 @@ MAX_SAMPLED_DAMPING = 0.95
 OPEN_FORCE_RATIO_SHARE = 0.3
 """Share of the ratios Kr/Kt that are anything from 0 to 1, whatever is published or written down; chosen."""
 NUMBERS_PER_SPINDLE, NUMBERS_PER_MATERIAL = 4, 3
-"""Numbers of a draw beside the f of each mode: (zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as doubted) of
-each material."""
+"""Numbers of a sample beside the f of each mode: (zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as uncertain)
+of each material."""
 MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS = 18, 3601
-"""End (standard deviations) and number of points of the table that `_quantiles` makes of the mixture."""
-
-Floats = NDArray[np.float64]
+"""End (standard deviations) and number of points of the table that `_mixture_quantiles` makes of the mixture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +52,16 @@ class SpindleSamples:
     at_rest: MillingRows
     """The spindles at rest, with the error of tap tests, r rows; their speeds are what a speed of 1 is truly."""
     uncertainty: Uncertainty
-    """Doubt that the coefficients were drawn from."""
+    """Uncertainty that the coefficients were drawn from."""
 
     def __len__(self) -> int:
-        """Number of draws."""
         return len(self.normal)
 
-    def __getitem__(self, places: NDArray[np.intp] | slice) -> SpindleSamples:
-        """Some of them."""
+    def __getitem__(self, places: Indices | slice) -> SpindleSamples:
         return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
     def with_materials(self, count: int, seed: int) -> SpindleSamples:
-        """The same with coefficients of so many materials at least, new ones as the prior has them."""
+        """Add cutting coefficients from the prior until there are `count` materials."""
         missing = self._material_index(count) - self.normal.shape[1]
         if missing <= 0:
             return self
@@ -73,7 +69,7 @@ class SpindleSamples:
         return replace(self, normal=np.hstack((self.normal, more)))
 
     def ratios(self) -> dict[str, Floats]:
-        """What differs from rest as factors: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each.
+        """Return all learned factors by name: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each.
 
         "frequency_x" is that of the mode in x which gives way most, "frequency_x_2" of the next.
         """
@@ -90,16 +86,16 @@ class SpindleSamples:
         return values
 
     def force_factors(self, material: int) -> Floats:
-        """Factors of Kt of a material, shape (r,)."""
-        first, doubted = self._material_index(material), self.uncertainty.tangential
+        """Return the factors of Kt of a material, shape (r,)."""
+        first, rejected = self._material_index(material), self.uncertainty.tangential
         at_speed, normal = self.normal[:, first : first + 2].T
-        force = doubted.low + (doubted.high - doubted.low) * scipy.special.ndtr(normal)
+        force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
         return np.asarray(
             ROTATING_FORCE_PRIOR[0] * np.maximum(1 + ROTATING_FORCE_PRIOR[1] * at_speed, MIN_PRIOR_FACTOR) * force
         )
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
-        """Spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
+        """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._side_factors()[:, self.at_rest.axes[self.at_rest.direction]]
         push, ratio = self._coefficient_factors(material, tangential, radial)
         return replace(
@@ -132,8 +128,8 @@ class SpindleSamples:
         first = self.at_rest.direction.size
         normal = self.normal[:, first : first + NUMBERS_PER_SPINDLE].reshape(-1, 2, 2)
         parts = (
-            middle * np.maximum(1 + spread * normal[..., place], MIN_PRIOR_FACTOR)
-            for place, (middle, spread) in enumerate((ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR))
+            median * np.maximum(1 + spread * normal[..., place], MIN_PRIOR_FACTOR)
+            for place, (median, spread) in enumerate((ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR))
         )
         return np.stack(tuple(parts), axis=-1)
 
@@ -144,43 +140,43 @@ class SpindleSamples:
         return self.force_factors(material), np.maximum(ratio, 0.0)
 
 
-def sample_prior(middle: MillingRows, doubt: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
-    """Draws from the prior around a spindle at rest (a row), the same for a seed."""
-    at_rest = doubt.sample(replace(middle, speed_rpm=np.ones(1)), count, seed, without="coefficients")
+def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
+    """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
+    at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     normal = np.random.default_rng((seed, 2)).standard_normal(
-        (count, _count_spindle_numbers(middle) + NUMBERS_PER_MATERIAL)
+        (count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL)
     )
-    return SpindleSamples(normal, at_rest, doubt)
+    return SpindleSamples(normal, at_rest, uncertainty)
 
 
 def _count_spindle_numbers(rows: MillingRows) -> int:
-    """Number of numbers of a draw that are not of a material."""
+    """Return the count of normal numbers per sample that belong to the spindle."""
     return rows.direction.size + NUMBERS_PER_SPINDLE
 
 
-def _force_ratio_factors(share: Floats, doubted: FactorRange, middle: float) -> Floats:
-    """Factors on a ratio Kr/Kt below which shares of the prior lie: within its doubt, or anything from 0 to 1.
+def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:
+    """Return factors of Kr/Kt at probabilities: uniform within its range, or with some probability from 0 to 1.
 
-    Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as doubted.
+    Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as uncertain.
     """
-    if middle <= 0:
-        return np.asarray(doubted.low + (doubted.high - doubted.low) * share)
-    ends = np.sort([doubted.low, doubted.high, 0.0, 1 / middle])
-    width = max(doubted.high - doubted.low, 1e-9)
+    if median <= 0:
+        return np.asarray(rejected.low + (rejected.high - rejected.low) * share)
+    ends = np.sort([rejected.low, rejected.high, 0.0, 1 / median])
+    width = max(rejected.high - rejected.low, 1e-9)
     below = (1 - OPEN_FORCE_RATIO_SHARE) * np.clip(
-        (ends - doubted.low) / width, 0, 1
-    ) + OPEN_FORCE_RATIO_SHARE * np.clip(ends * middle, 0, 1)
+        (ends - rejected.low) / width, 0, 1
+    ) + OPEN_FORCE_RATIO_SHARE * np.clip(ends * median, 0, 1)
     return np.asarray(np.interp(share, below, ends))
 
 
 def _to_heavy_tailed(normal: Floats) -> Floats:
-    """Standard normal numbers as those of a mixture of which a share is wider, of the same order."""
+    """Map standard normal numbers to a mixture with heavy tails, in the same order."""
     return np.asarray(np.interp(normal, *_mixture_quantiles()))
 
 
 @cache
 def _mixture_quantiles() -> tuple[Floats, Floats]:
-    """Standard normal numbers, and those of the mixture that as many lie below."""
+    """Return standard normal numbers and the mixture quantiles of the same probabilities."""
     value = np.linspace(-MIXTURE_TABLE_END, MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS)
     beyond = (1 - WIDE_FREQUENCY_SHARE) * scipy.special.ndtr(
         -np.abs(value)

@@ -24,22 +24,23 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import find_by_name
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency
-from lobewatch.verdicts.program_samples import build_median_row, build_program
+from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import uncertainty_of
 
 
 @dataclass(frozen=True, eq=False)
 class LearningResult:
-    """What was learnt for one program."""
+    """What was learned for one program."""
 
     program: ProgramTable
-    """Program as it stands in machine.toml."""
+    """Program as in machine.toml."""
     prior: Posterior
     """Spindle and coefficients as known without any cut."""
     posterior: Posterior
     """Spindle and coefficients as known with the cuts."""
     inconsistent_cuts: tuple[InconsistentCut, ...]
-    """Cuts that are not believed; of some it is their power alone, without which they were learnt from."""
+    """Cuts that are not believed; of some it is their power alone, without which they were learned from."""
     own_cuts: tuple[CutEvidence, ...]
     """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
 
@@ -65,49 +66,49 @@ class NextCut:
     cuts_left: int
     """Number of test cuts that are still to be made."""
     cut_range: CutRange
-    """Speeds and depths that machine and tool bear."""
+    """Speeds and depths that machine and tool allow."""
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:
-    """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
+    """Find a program of machine.toml by its name or the beginning of it; ValueError if there is none."""
     return find_by_name({table.name: table for table in machine.program}, name)
 
 
 def learn_program(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
 ) -> LearningResult:
-    """Learn from the cuts of a machine; those of other tools say nothing of this one."""
+    """Learn from the cuts of a machine; cuts of other tools do not count."""
     start = build_prior(
         build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
     )
-    learnt, odd_powers = start, []
+    posterior, odd_powers = start, []
     for cut in collect_tool_evidence(cuts, table, assembly, machine):
-        evidence = learnt.predict(cut)
+        evidence = posterior.predict(cut)
         if is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
             evidence = replace(evidence, cut=replace(cut, power=None))
-        learnt = evidence.update()
+        posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
-    own_cuts = tuple(cut for cut in learnt.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    return LearningResult(table, start, learnt, (*find_inconsistent_cuts(learnt), *odd_powers), own_cuts)
+    own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
+    return LearningResult(table, start, posterior, (*find_inconsistent_cuts(posterior), *odd_powers), own_cuts)
 
 
 def find_next_cut(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
 ) -> NextCut:
-    """The next test cut of a program of which so many shall be made at most."""
-    lesson = learn_program(table, assembly, machine, cuts)
-    left = max(most - len(lesson.own_cuts), 0)
+    """Find the next test cut of a program, of `most` cuts."""
+    learning = learn_program(table, assembly, machine, cuts)
+    left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
     if not left or reach.is_empty:
-        return NextCut(lesson, None, left, reach)
+        return NextCut(learning, None, left, reach)
     grid = build_cut_grid(table, assembly, machine)
-    cut = suggest_cut(lesson.posterior, grid, lesson.own_cuts, left, lesson.rejected_cuts, table.depth_mm / 1e3)
-    return NextCut(lesson, cut, left, reach)
+    cut = suggest_cut(learning.posterior, grid, learning.own_cuts, left, learning.rejected_cuts, table.depth_mm / 1e3)
+    return NextCut(learning, cut, left, reach)
 
 
 def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:
-    """Speeds of the machine, and depths that tool and drive allow."""
+    """Build the grid of speeds and the depths that tool and drive allow."""
     reach = CutRange.of(machine, table)
     speeds = reach.speeds(SPEED_GRID_STEP)
     deepest = reach.depth_limits(speeds) / 1e3
@@ -119,7 +120,7 @@ def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) ->
 def collect_tool_evidence(
     cuts: Sequence[CutEntry], table: ProgramTable, assembly: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
-    """The cuts of the same tool that count, oldest first."""
+    """Collect the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
     evidence = []
@@ -151,7 +152,7 @@ def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvid
 
 
 def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
-    """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where not known."""
+    """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
     pairs = [
         (interpolate_frequency(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series
     ]

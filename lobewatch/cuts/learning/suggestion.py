@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.cut_evidence import CutEvidence, find_cut_to_repeat, is_setting_taken
 from lobewatch.cuts.learning.cut_likelihood import predict_cut
 from lobewatch.cuts.learning.expected_gain import MIN_STABLE_PROBABILITY, CutGrid, LimitCharts, floor_depth
@@ -17,13 +17,13 @@ from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_SUGGESTION_SAMPLES = 300
-"""Number of draws that chances are worked out from."""
+"""Number of samples that chances are worked out from."""
 TRIED_DEPTH_SHARES = (1.0, 0.85, 0.7, 0.5, 0.35)
-"""Shares of a depth that are looked at in turn where zero order is not exact; chosen."""
+"""Shares of a depth that are checked in turn where the zero-order approximation is not exact; chosen."""
 MAX_FIRST_CUT_RISK, FIRST_CUT_DEPTH_FACTOR = 0.2, 1.5
-"""Greatest chance of chatter of a first test cut that is deeper than so many times the depth of its program."""
+"""Greatest chance of chatter of a first test cut that is deeper than this many times the depth of its program."""
 FIRST_CUT_DEPTH_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
-"""Shares of a depth that are looked at in turn for such a first cut; chosen."""
+"""Shares of a depth that are checked in turn for such a first cut; chosen."""
 MIN_REPEAT_PROBABILITY = 0.05
 """Chance that a word "chatter" is wrong, from which it is asked for again while another cut is left; chosen, see
 docs/cuts.md: the last of five cuts gains 4 % of the optimum, a word that is wrong costs 20 %."""
@@ -31,8 +31,6 @@ MIN_EXPECTED_GAIN = 0.005
 """Share of the best removal rate so far below which an expected gain is none; chosen."""
 MIN_REMOVAL_RATE_SHARE = 1e-3
 """Share of the largest removal rate of the grid that the best so far is taken for at least."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class Suggestion:
     chatter_probability: float
     """Chance that it chatters."""
     gain: float
-    """Expected gain of removal rate, relative to the best heard stable so far; inf where there is none."""
+    """Expected gain of removal rate, relative to the best recorded stable so far; inf where there is none."""
     most_informative: str
     """Name of what it tells most of (as in `SpindleSamples.ratios`)."""
     repeats: str = ""
@@ -54,61 +52,61 @@ class Suggestion:
 
 
 def find_best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
-    """Largest speed times depth (rpm m) that was heard stable; 0 where none was."""
+    """Return the largest stable speed times depth (rpm m); 0 without a stable cut."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.has_chatter), default=0.0)
 
 
 def suggest_cut(
-    learnt: Posterior,
+    posterior: Posterior,
     grid: CutGrid,
     cuts: Sequence[CutEvidence],
     left: int = 1,
-    doubted: Collection[CutEvidence] = (),
+    rejected: Collection[CutEvidence] = (),
     programmed: float = 0.0,
 ) -> Suggestion | None:
-    """The next test cut; None where nothing more is to be gained.
+    """Suggest the next test cut, or None if nothing more can be gained.
 
-    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
-    are not believed. One of those that lies within the grid is made again, once, but for a stable one with the last
-    cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut is
-    worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its chance
-    to be right says. A diagram by zero order proposes; what is chosen was judged by semi-discretisation. programmed:
-    depth of the program (m); the first cut is about as deep, or chatters hardly.
+    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts
+    that are not believed. One of those that lies within the grid is made again, once, but for a stable one with the
+    last cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut
+    is worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its
+    chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by
+    semi-discretization. programmed: depth of the program (m); the first cut is about as deep, or chatters hardly.
     """
     best, few = (
-        find_best_removal_rate([cut for cut in cuts if cut not in doubted]),
-        learnt.resample(N_SUGGESTION_SAMPLES),
+        find_best_removal_rate([cut for cut in cuts if cut not in rejected]),
+        posterior.resample(N_SUGGESTION_SAMPLES),
     )
-    draws, chart = few.samples, LimitCharts.of(few.samples, grid)
-    if (again := _find_repeat(few, [cut for cut in cuts if grid.contains(cut.speed_rpm)], left, doubted)) is not None:
-        return replace(_build_suggestion(grid, again.speed_rpm, again.depth, best, draws), repeats=again.id)
+    samples, chart = few.samples, LimitCharts.of(few.samples, grid)
+    if (again := _find_repeat(few, [cut for cut in cuts if grid.contains(cut.speed_rpm)], left, rejected)) is not None:
+        return replace(_build_suggestion(grid, again.speed_rpm, again.depth, best, samples), repeats=again.id)
     true = np.maximum(
-        chart.true_best_rates(cuts), find_best_removal_rate([cut for cut in cuts if cut not in learnt.cuts])
+        chart.true_best_rates(cuts), find_best_removal_rate([cut for cut in cuts if cut not in posterior.cuts])
     )
     least = MIN_EXPECTED_GAIN * max(best, MIN_REMOVAL_RATE_SHARE * float(np.max(chart.removal_rates)))
     careful_from = np.inf if cuts else FIRST_CUT_DEPTH_FACTOR * programmed
     speeds = grid.speeds.tolist()
     places = [
-        (row, deep) for row, deep in chart.candidates(true) if not is_setting_taken(speeds[row], deep, cuts, doubted)
+        (row, deep) for row, deep in chart.candidates(true) if not is_setting_taken(speeds[row], deep, cuts, rejected)
     ]
     worth = {place: chart.expected_worth(place[0], place[1], true, left) for place in places}
     for row, depth in sorted(worth, key=lambda place: -worth[place]):
         if worth[row, depth] < least:
             return None
-        suggestion = _find_likely_stable(grid, float(grid.speeds[row]), depth, best, draws, careful_from)
+        suggestion = _find_likely_stable(grid, float(grid.speeds[row]), depth, best, samples, careful_from)
         if suggestion is not None:
             return suggestion
     return None
 
 
 def _find_repeat(
-    few: Posterior, cuts: Sequence[CutEvidence], left: int, doubted: Collection[CutEvidence]
+    few: Posterior, cuts: Sequence[CutEvidence], left: int, rejected: Collection[CutEvidence]
 ) -> CutEvidence | None:
-    """The cut whose word is to be asked for again; None where all are sure enough, or were asked for.
+    """Find the cut whose verdict is worth a repetition, or None.
 
     The last cut makes none again whose word "stable" is not believed: that would gain nothing.
     """
-    again = find_cut_to_repeat(cuts, [cut for cut in doubted if cut.has_chatter or left > 1])
+    again = find_cut_to_repeat(cuts, [cut for cut in rejected if cut.has_chatter or left > 1])
     if again is not None or left <= 1:
         return again
     once = [cut for cut in cuts if cut in few.cuts and find_cut_to_repeat(cuts, [cut])]
@@ -120,14 +118,14 @@ def _find_repeat(
 
 
 def _find_likely_stable(
-    grid: CutGrid, speed: float, depth: float, best: float, draws: SpindleSamples, careful_from: float
+    grid: CutGrid, speed: float, depth: float, best: float, samples: SpindleSamples, careful_from: float
 ) -> Suggestion | None:
-    """The cut, or one not as deep where it is more likely to chatter than not; deeper than careful_from (m) hardly."""
+    """Find the cut, or a shallower one, that is likely stable; deeper than careful_from (m) with little risk."""
     nearby = (1.0,) if is_force_constant(grid.cut) else TRIED_DEPTH_SHARES
     for share in nearby if depth <= careful_from else FIRST_CUT_DEPTH_SHARES:
         deep = floor_depth(share * depth)
         if deep > 0:
-            suggestion = _build_suggestion(grid, speed, deep, best, draws)
+            suggestion = _build_suggestion(grid, speed, deep, best, samples)
             if suggestion.chatter_probability < 1 - MIN_STABLE_PROBABILITY and (
                 deep <= careful_from or suggestion.chatter_probability <= MAX_FIRST_CUT_RISK
             ):
@@ -135,17 +133,17 @@ def _find_likely_stable(
     return None
 
 
-def _build_suggestion(grid: CutGrid, speed: float, depth: float, best: float, draws: SpindleSamples) -> Suggestion:
-    """A cut with what it promises."""
-    prediction = predict_cut(grid.build_evidence(speed, depth), draws)
+def _build_suggestion(grid: CutGrid, speed: float, depth: float, best: float, samples: SpindleSamples) -> Suggestion:
+    """Build the suggestion of a cut."""
+    prediction = predict_cut(grid.build_evidence(speed, depth), samples)
     chance = float(np.mean(prediction.chatter_probability))
     gain = (1 - chance) * (speed * depth - best)
-    settles = _most_informative(draws.ratios(), prediction.label_probability)
+    settles = _most_informative(samples.ratios(), prediction.label_probability)
     return Suggestion(speed, depth, chance, gain / best if best else np.inf, settles)
 
 
 def _most_informative(ratios: Mapping[str, Floats], chance: Floats) -> str:
-    """Name of what differs most, in its standard deviations, between spindles on which a cut chatters and others."""
+    """Return the factor that differs most, in its standard deviations, between stable and chattering samples."""
     contrast = {}
     for name, values in ratios.items():
         chatters, stable = (float(np.sum(values * share) / np.sum(share)) for share in (chance, 1 - chance))

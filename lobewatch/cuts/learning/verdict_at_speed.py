@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
 from lobes import StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
 from lobewatch.cuts.learning.posterior import Posterior
@@ -19,65 +19,67 @@ from lobewatch.machine import CutTable, Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row, build_program
+from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty import TEST_CUT_CAUSE, FactorRange, LearnedSamples, Uncertainty
+from lobewatch.verdicts.uncertainty import FactorRange, LearnedSamples, Uncertainty
+from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program
 
 INTERVAL_QUANTILES = (0.025, 0.975)
-"""Quantiles that 95 % of draws lie between."""
-
-Floats = NDArray[np.float64]
+"""Quantiles that 95 % of samples lie between."""
 
 
 def evaluate_at_speed(
     table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
 ) -> Verdict:
-    """The verdict on a program, or why its tool is not known; at speed as far as cuts have taught, else at rest."""
-    learnt = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
-    verdict = evaluate_program(table, tool, machine, learnt)
+    """Evaluate a program, at speed as far as cuts have been learned from."""
+    posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
+    verdict = evaluate_program(table, tool, machine, posterior)
     if isinstance(tool, DataError) or tool.directions or not tool.without_stiffness:
         return verdict
     return apply_test_cuts(verdict, tool, machine, cuts)
 
 
 def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> SpindleAtSpeed:
-    """What cuts have taught of a program and its spindle; nothing of the reference cut."""
+    """Learn the spindle at speed from the cuts of a program; nothing for the reference cut."""
     if not isinstance(table, ProgramTable) or not tool.directions:
         return NO_TEST_CUTS
     if not any(cut.tool == table.tool and cut.is_usable for cut in cuts):
         return NO_TEST_CUTS
-    lesson = learn_program(table, tool, machine, cuts)
-    remarks = tuple(inconsistent_cut_remarks(lesson.posterior, lesson.inconsistent_cuts, table.name))
-    return _build_spindle(lesson, tool, machine, remarks) if lesson.accepted_cuts else SpindleAtSpeed(remarks=remarks)
+    learning = learn_program(table, tool, machine, cuts)
+    remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
+    return (
+        _build_spindle(learning, tool, machine, remarks) if learning.accepted_cuts else SpindleAtSpeed(remarks=remarks)
+    )
 
 
 def _build_spindle(
-    lesson: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
+    learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
 ) -> SpindleAtSpeed:
-    """The middle of what a lesson has left, and the draws around it."""
-    at_rest, draws = (
-        build_median_row(build_program(lesson.program, machine), tool),
-        lesson.posterior.draw(N_PROGRAM_SAMPLES),
+    """Build the spindle at speed from a learning result."""
+    at_rest, samples = (
+        build_median_row(build_program(learning.program, machine), tool),
+        learning.posterior.draw(N_PROGRAM_SAMPLES),
     )
-    rows = draws.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
+    rows = samples.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
     parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
-    middle, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
-    force, direction = (draws.ratios()[name] for name in ("tangential", "ratio"))
+    median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
+    force, direction = (samples.ratios()[name] for name in ("tangential", "ratio"))
     push, ratio = float(np.mean(force)), float(np.mean(direction))
     left = LearnedSamples(
-        frequency=parts[0] / middle[0],
-        damping_ratio=parts[1] / middle[1],
-        stiffness=parts[2] / middle[2],
+        frequency=parts[0] / median[0],
+        damping_ratio=parts[1] / median[1],
+        stiffness=parts[2] / median[2],
         phase_change=phases,
         tangential=force / np.mean(force),
         ratio=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
     )
     return SpindleAtSpeed(
-        n_cuts=len(lesson.accepted_cuts),
+        n_cuts=len(learning.accepted_cuts),
         remarks=remarks,
         uncertainty=Uncertainty(
-            modes={TEST_CUT_CAUSE: _half_widths(parts, phases)},
+            modes={TEST_CUTS.name: _half_widths(parts, phases)},
             tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
             speed=machine.doubt.speed_percent / 100,
             tangential=_factor_range(force),
@@ -85,16 +87,16 @@ def _build_spindle(
             axes=tool.principal_directions,
             learned=left,
         ),
-        factors=np.stack(middle, axis=1),
+        factors=np.stack(median, axis=1),
         tangential=float(at_rest.tangential[0]) * push / 1e6,
         radial=float(at_rest.radial[0]) * push * ratio / 1e6,
-        prior_ranges=_factor_ranges(lesson.prior),
-        posterior_ranges=_factor_ranges(lesson.posterior),
+        prior_ranges=_factor_ranges(learning.prior),
+        posterior_ranges=_factor_ranges(learning.posterior),
     )
 
 
 def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
-    """Half-widths of 95 % of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
+    """Return 95 % half-widths of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
     relative = [
         np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
     ]
@@ -102,29 +104,29 @@ def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
 
 
 def _factor_ranges(posterior: Posterior) -> dict[str, FactorRange]:
-    """Intervals of all that is learnt, over the values at rest."""
+    """Return the intervals of all learned factors."""
     return {name: FactorRange(interval.low, interval.high) for name, interval in posterior.intervals.items()}
 
 
 def _factor_range(values: Floats) -> FactorRange:
-    """95 % of some draws over their mean."""
+    """Return the 95 % range of samples over their mean."""
     low, high = np.quantile(values, INTERVAL_QUANTILES) / np.mean(values) if np.mean(values) > 0 else (1.0, 1.0)
     return FactorRange(min(float(low), 1.0), max(float(high), 1.0))
 
 
 class LobesAtSpeed(NamedTuple):
-    """Lobes of a cut by zero order with the spindle at speed."""
+    """Lobes of a cut by the zero-order approximation with the spindle at speed."""
 
     n_cuts: int
-    """Number of test cuts that they were learnt from."""
+    """Number of test cuts that they were learned from."""
     lobes: StabilityLobes
-    """Lobes in the middle of what was learnt."""
+    """Lobes in the learned median."""
     band: LimitBand
     """Band of the limits that the cuts have left open."""
 
 
 def compute_lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:
-    """The lobes of programs with the same cut, from their verdicts; None where no test cut has taught anything."""
+    """Compute the lobes of programs with the same cut, or None without learned test cuts."""
     for verdict in verdicts:
         tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
         if tool is None or not at_speed.n_cuts:

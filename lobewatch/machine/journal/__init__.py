@@ -1,1 +1,1 @@
-"""The journal and its lines: tap tests, events, exclusions, test cuts; each line proves the one before it."""
+"""Journal of a machine and its lines."""

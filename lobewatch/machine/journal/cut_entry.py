@@ -11,14 +11,14 @@ from lobes import Cut
 from lobewatch.machine.settings.drive_power import CutPower
 
 CutVerdict = Literal["stable", "chatter", "flip", "cannot tell"]
-"""Word on the sound of a cut; flip: chatter whose period is two teeth."""
+"""Result of a test cut; flip: chatter with the period of two teeth."""
 CUT_LINE_KIND = "cut"
-"""Kind of its line in the journal."""
+"""Kind of its journal line."""
 
 
 @dataclass(frozen=True)
 class RecordingFile:
-    """File of a recording, as the journal vouches for it."""
+    """File of a recorded cut, as committed to the journal."""
 
     id: str
     """Identity of the cut."""
@@ -29,84 +29,83 @@ class RecordingFile:
 
     @property
     def file(self) -> str:
-        """Place of the file in the folder of the machine."""
+        """Path of the file in the machine folder."""
         return f"cuts/{self.id}.h5"
 
 
 @dataclass(frozen=True)
 class CutEntry:
-    """A test cut, as it was cut and heard; what it was cut with stands here as it was then, whatever becomes of it."""
+    """Test cut with its result; the settings are those at the time of the cut."""
 
     id: str
-    """Number in the journal, "c1" on."""
+    """Identity in the journal, "c1" on."""
     at: datetime
-    """Time at which it was cut (UTC)."""
+    """Time of the cut (UTC)."""
     program: str | None
-    """Cutting program that it was a cut of; None for the reference cut."""
+    """Name of the program; None for the reference cut."""
     tool: str
     """Tool in the spindle."""
     cut: Cut
-    """Teeth and their pitch, immersion, direction and the coefficients that it was judged with."""
+    """Teeth, pitch, immersion, direction and cutting coefficients."""
     coefficients: str
-    """Material that these are of; empty where machine.toml gave the numbers themselves."""
+    """Material of the coefficients; empty if machine.toml gave the numbers."""
     feed: str
-    """Axis of the machine that it was fed along, "x" or "y"; "both" where that is not known."""
+    """Axis of the feed, "x" or "y"; "both" if unknown."""
     feed_per_tooth: float | None
-    """Feed per tooth (m); None where machine.toml does not say."""
+    """Feed per tooth (m); None if unknown."""
     commanded_rpm: float
-    """Spindle speed as it was set (rpm)."""
+    """Commanded spindle speed (rpm)."""
     speed_rpm: float
-    """Spindle speed as it was heard (rpm); as it was set where that was by ear."""
+    """Detected spindle speed (rpm); the commanded one without a recording."""
     depth: float
-    """Axial depth of cut (m)."""
+    """Axial depth of cut ap (m)."""
     word: CutVerdict
-    """Word on its sound."""
+    """Result of the cut."""
     chatter_frequency_hz: float | None
-    """Chatter frequency (Hz); None where it was none, or nobody knows."""
+    """Chatter frequency (Hz); None without chatter or if unknown."""
     by: Literal["ear", "accelerometer", "microphone"]
-    """Ear or instrument that heard it."""
+    """Ear or instrument that detected the result."""
     software: str
-    """Version of lobewatch that wrote it down."""
+    """Version of lobewatch that wrote the line."""
     chatter_frequency_std_hz: float | None = None
-    """Standard error of the chatter frequency (Hz); None where nobody knows."""
+    """Standard error of the chatter frequency (Hz); None if unknown."""
     reason: str = ""
-    """Code of the reason why the word cannot be told; empty where it can."""
+    """Code of the reason of "cannot tell"; empty otherwise."""
     recording: RecordingFile | None = None
-    """Recording of its sound; None for what was heard by ear."""
+    """Recording of the cut; None without one."""
     power: CutPower | None = None
-    """Power of the cut; None where nobody has read it."""
+    """Power of the cut; None if nobody has read it."""
     excluded: str = ""
-    """Reason why a person has taken it out; empty where it counts; lines of their own."""
+    """Reason of its exclusion, from other lines; empty if included."""
 
     def __post_init__(self) -> None:
-        """Refuse a word that is none."""
         if self.word not in get_args(CutVerdict):
             raise ValueError(f"word={self.word!r} is none of {', '.join(get_args(CutVerdict))}")
 
     @property
     def is_usable(self) -> bool:
-        """Whether anything can be learnt from it."""
+        """Whether the cut counts for learning."""
         return not self.excluded and self.word != "cannot tell"
 
     @property
     def has_chatter(self) -> bool:
-        """Whether chatter was heard, of either kind."""
+        """Whether chatter of any kind was detected."""
         return self.word in ("chatter", "flip")
 
     @property
     def line(self) -> dict[str, Any]:
-        """Line of the journal."""
+        """Journal line."""
         fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
         return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
 
 
 def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
-    """Properties that two cuts with one cutter at one immersion have alike, whatever the material and the feed."""
+    """Return the properties that cuts with the same cutter and immersion share."""
     return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch
 
 
 def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
-    """Test cut of the line that `CutEntry.line` has made."""
+    """Read a test cut from its journal line."""
     fields = {name: line[name] for name in CutEntry.__dataclass_fields__ if name in line}
     fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
     recording, power = line.get("recording"), line.get("power")
@@ -116,7 +115,7 @@ def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
 
 
 def read_cuts(entries: Sequence[Mapping[str, Any]], excluded: Mapping[str, str]) -> tuple[CutEntry, ...]:
-    """Test cuts of a journal, oldest first by their time; excluded: reasons why some are, by identity."""
+    """Read the test cuts of a journal, oldest first; excluded: reasons by identity."""
     lines = {line["id"]: line for line in entries if line["kind"] == CUT_LINE_KIND}
     cuts = [parse_cut_line(line, excluded.get(name, "")) for name, line in lines.items()]
     return tuple(sorted(cuts, key=lambda cut: cut.at))

@@ -1,7 +1,4 @@
-"""Journal lines for events, exclusions, mode edits, acknowledged alarms and fleet scatter.
-
-It is kept as it was known then, so that what is judged with it does not hang on the others later on.
-"""
+"""Journal lines for events, exclusions, mode edits, acknowledged alarms and fleet scatter."""
 
 from __future__ import annotations
 
@@ -20,20 +17,20 @@ from modal import ModeEdits
 
 @dataclass(frozen=True)
 class MaintenanceEvent:
-    """Something done to the machine."""
+    """Maintenance of the machine."""
 
     id: str
-    """Number in the journal, "e1" on."""
+    """Identity in the journal, "e1" on."""
     time: datetime
-    """Time at which it was done (UTC)."""
+    """Time of the maintenance (UTC)."""
     text: str
-    """Text that says what was done."""
+    """Description of the work."""
     new_baseline: bool
-    """Whether the tap tests after it are compared with none before it."""
+    """Whether later tap tests are compared with none before it."""
 
 
 def read_events(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent, ...]:
-    """Events of a journal that are not withdrawn, oldest first by their time."""
+    """Read the events of a journal that are not withdrawn, oldest first."""
     events: dict[str, MaintenanceEvent] = {}
     for line in entries:
         if line["kind"] == "event" and "withdraws" in line:
@@ -52,20 +49,20 @@ def make_event(
     new_baseline: bool,
     now: datetime,
 ) -> MaintenanceEvent:
-    """An event to be written down; date: None for now, without a zone local time, at midnight the whole day.
+    """Make an event; date: None for now, local time without a zone, the whole day at midnight.
 
-    ValueError for an empty text, a date in the future, an event that is there already, and for a new baseline on a
-    whole day with tap tests: nobody knows which of them were before it.
+    Raises ValueError for an empty text, a date in the future, a duplicate, and a new baseline on a whole day with tap
+    tests, whose order is then unknown.
     """
     if not text.strip():
         raise ValueError('the event has no text; say what was done, such as "bearings replaced"')
     check_name(text, "event")
     time = now if date is None else _to_utc(date)
     if time - now > timedelta(days=1):
-        raise ValueError(f"--date {date}: lies in the future; give the day on which it was done")
+        raise ValueError(f"MaintenanceEvent.time {date}: lies in the future; give the day on which it was done")
     same = [event.id for event in read_events(entries) if (event.time, event.text) == (time, text)]
     if same:
-        raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; lobewatch history lists all events")
+        raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; MachineFolder.contents lists all events")
     if new_baseline and date is not None and date.time() == datetime.min.time():
         _refuse_tapped_day(taps, time)
     number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
@@ -76,7 +73,7 @@ def _to_utc(date: datetime) -> datetime:
     try:
         return date.astimezone(UTC)
     except (OverflowError, ValueError) as error:
-        raise ValueError(f"--date {date}: is out of range; give a date after 1970-01-01") from error
+        raise ValueError(f"MaintenanceEvent.time {date}: is out of range; give a date after 1970-01-01") from error
 
 
 def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
@@ -86,18 +83,18 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
         raise ValueError(
             f"{begin.astimezone():%Y-%m-%d}: tapped on that day at {clock}; give the time of the new baseline too, "
-            f"such as --date {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
+            f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
         )
 
 
 def make_event_line(event: MaintenanceEvent, now: datetime) -> dict[str, Any]:
-    """Line of an event for the journal."""
+    """Make the journal line of an event."""
     fields = {"id": event.id, "date": event.time.isoformat(), "text": event.text, "new_baseline": event.new_baseline}
     return {"kind": "event", **fields, "time": now.isoformat()}
 
 
 def make_withdrawal_line(entries: Sequence[Mapping[str, Any]], event_id: str, now: datetime) -> dict[str, Any]:
-    """Line that withdraws an event; ValueError where there is none of that name."""
+    """Make the line that withdraws an event; ValueError for an unknown identity."""
     ids = [event.id for event in read_events(entries)]
     if event_id not in ids:
         raise ValueError(f"{event_id}: no such event; there are {', '.join(ids) or 'none'}")
@@ -105,50 +102,49 @@ def make_withdrawal_line(entries: Sequence[Mapping[str, Any]], event_id: str, no
 
 
 ExcludableEntry = TapEntry | CutEntry
-"""Entry of the journal that can be taken out."""
+"""Entry that can be excluded."""
 
 
 def find_excludable_entry(
     name: str, taps: Sequence[TapEntry], cuts: Sequence[CutEntry], folder: str
 ) -> ExcludableEntry:
-    """Test cut of this identity, or tap test with this identity, file, or part of an identity.
+    """Find the test cut of an identity, or the tap test of an identity, a part of it, or a file.
 
-    ValueError where it is none, or several have it.
+    Raises ValueError if there is none or there are several.
     """
     for cut in cuts:
         if cut.id == name:
             return cut
     part = name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
     exact = [tap for tap in taps if tap.id == part]
-    fitting = exact or [tap for tap in taps if part and part in tap.id]
-    if len(fitting) == 1:
-        return fitting[0]
-    if fitting:
-        raise ValueError(
-            f"{name}: part of {len(fitting)} tap tests ({fitting[0].id}, {fitting[1].id}, ...); give one whole"
-        )
-    raise ValueError(f"{name!r}: no such tap test in {folder}; lobewatch history {folder} lists all {len(taps)}")
+    matches = exact or [tap for tap in taps if part and part in tap.id]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        examples = f"({matches[0].id}, {matches[1].id}, ...)"
+        raise ValueError(f"{name}: part of {len(matches)} tap tests {examples}; give one whole")
+    raise ValueError(f"{name!r}: no such tap test in {folder}; MachineFolder.contents {folder} lists all {len(taps)}")
 
 
 def make_exclusion_line(entry: ExcludableEntry, reason: str, now: datetime) -> dict[str, Any]:
-    """Line that takes one out; ValueError where it is out already, or there is no reason."""
+    """Make the line that excludes an entry; ValueError if it is excluded or has no reason."""
     if entry.excluded:
         raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
     if not reason.strip():
-        raise ValueError(f"{entry.id}: no reason; say why it does not count with --reason")
+        raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
     check_name(reason, "reason")
     return {"kind": "exclude", "tap": entry.id, "reason": reason, "time": now.isoformat()}
 
 
 def make_inclusion_line(entry: ExcludableEntry, now: datetime) -> dict[str, Any]:
-    """Line that takes one back; ValueError where it is not out."""
+    """Make the line that includes an entry again; ValueError if it is not excluded."""
     if not entry.excluded:
         raise ValueError(f"{entry.id}: is not excluded; it counts already")
     return {"kind": "include", "tap": entry.id, "time": now.isoformat()}
 
 
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Reasons why tap tests and test cuts are out, by identity."""
+    """Read the reasons of all exclusions, by identity."""
     reasons: dict[str, str] = {}
     for line in entries:
         if line["kind"] == "exclude":
@@ -159,88 +155,90 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
 
 
 def make_mode_edits_line(tap_id: str, edits: ModeEdits, now: datetime) -> dict[str, Any]:
-    """Line that says it; edits that say nothing take back what was said before."""
+    """Make the line of the mode edits of a tap test; empty edits revoke earlier ones."""
     return {"kind": "modes", "tap": tap_id, **asdict(edits), "time": now.isoformat()}
 
 
 def read_mode_edits(entries: Sequence[Mapping[str, Any]]) -> dict[str, ModeEdits]:
-    """What was said of the modes of tap tests, by identity."""
+    """Read the mode edits by identity of the tap test; the newest line counts."""
     return {line["tap"]: msgspec.convert(line, ModeEdits) for line in entries if line["kind"] == "modes"}
 
 
 class Acknowledgement(msgspec.Struct, frozen=True):
-    """Word of a person that an alarm is known; it quiets repeats, never the light."""
+    """Acknowledgement of an alarm by a person; it stops repeats but keeps the status."""
 
     code: str
-    """Code of the reason that rings."""
+    """Code of the reason of the alarm."""
     about: str
-    """Series or program that it is about."""
+    """Series or program of the alarm."""
     raised_by: str
-    """Tap test that raised it, as it was then."""
+    """Tap test that triggered the alarm."""
     newest: datetime
-    """Time of the newest tap test of the machine then."""
+    """Time of the newest tap test at the acknowledgement."""
     baseline: datetime | None
-    """Baseline of then."""
+    """Baseline at the acknowledgement."""
     time: datetime
-    """Time at which it was acknowledged."""
+    """Time of the acknowledgement."""
     operator: str = ""
     """Name of the person."""
     until: datetime | None = None
-    """Time from which it rings again; None for as long as it is open."""
+    """Time from which the alarm repeats; None for as long as it is open."""
     note: str = ""
-    """Reason, or what is being done."""
+    """Reason or countermeasure."""
 
     @property
     def alarm_id(self) -> str:
-        """Identity of the alarm as it was then."""
+        """Identity of the alarm."""
         return format_alarm_id(self.code, self.about, self.raised_by)
 
     def is_active_at(self, now: datetime) -> bool:
-        """Whether it still holds at a time."""
+        """Tell whether the acknowledgement holds at a time."""
         return self.until is None or now < self.until
 
     @property
     def line(self) -> dict[str, Any]:
-        """Line for the journal."""
+        """Journal line."""
         fields: dict[str, Any] = msgspec.to_builtins(self)
         return {"kind": "ack", **fields}
 
     def __str__(self) -> str:
-        """In words."""
         by = f" by {self.operator}" if self.operator else ""
         until = f" until {self.until.astimezone():%Y-%m-%d}" if self.until else ""
         return f"acknowledged {self.time.astimezone():%Y-%m-%d}{by}{until}{': ' if self.note else ''}{self.note}"
 
 
 def format_alarm_id(code: str, about: str, raised_by: str) -> str:
-    """Name of an alarm for people and other programs, without blanks: what rings, of what, and the tap test."""
+    """Return the identity of an alarm without blanks: code, subject and tap test."""
     return f"{code}:{about.replace(', ', ':').replace(' ', '_')}:{raised_by}"
 
 
 def read_acknowledgements(entries: Sequence[Mapping[str, Any]]) -> tuple[Acknowledgement, ...]:
-    """Acknowledgements of a journal, oldest first."""
+    """Read the acknowledgements of a journal, oldest first."""
     return tuple(msgspec.convert(line, Acknowledgement) for line in entries if line["kind"] == "ack")
 
 
 class FleetScatter(msgspec.Struct, frozen=True):
-    """Standard deviation (%) from clamping to clamping, and the degrees of freedom that it is worth."""
+    """Reclamping scatter of the other machines of a fleet, as known when it was first needed.
+
+    Each pair is a standard deviation (%) with its degrees of freedom.
+    """
 
     time: datetime
-    """Time of the tap test, or of the new baseline, that it was asked for with."""
+    """Time of the tap test or the new baseline that needed it."""
     alone: tuple[float, float]
-    """That of one direction."""
+    """Scatter of one direction."""
     common: tuple[float, float]
-    """That of the mean of x and y."""
+    """Scatter of the mean of x and y."""
     series: int
-    """Number of the series that it follows from."""
+    """Number of series behind it."""
 
     @property
     def line(self) -> dict[str, Any]:
-        """Line for the journal."""
+        """Journal line."""
         fields: dict[str, Any] = msgspec.to_builtins(self)
         return {"kind": "scatter", **fields}
 
 
 def read_fleet_scatters(entries: Sequence[Mapping[str, Any]]) -> tuple[FleetScatter, ...]:
-    """Those of a journal, oldest first."""
+    """Read the fleet scatters of a journal, oldest first."""
     return tuple(msgspec.convert(line, FleetScatter) for line in entries if line["kind"] == "scatter")

@@ -1,8 +1,8 @@
-"""The journal of a machine: a line for each thing that was committed, in two files, so that each proves the other.
+"""Journal of a machine: a line for each commit, in two files that prove each other.
 
 A line is JSON with the SHA-256 of the line before it (`previous`), its number (`number`) and a CRC-32 (`crc`). It is
-written to journal.jsonl, which is the commit, then to journal.copy.jsonl: after a crash the copy may be one line short,
-never longer.
+written to journal.jsonl, which is the commit, then to journal.copy.jsonl: after a crash the copy may be one line
+short, never longer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_te
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_COPY_NAME = "journal.copy.jsonl"
 BATCH_KEY = "batch"
-"""Key of the number of the first line that was written together with a line; where it was written alone, none."""
+"""Key of the number of the first line of the same write; missing for a single line."""
 
 
 @dataclass(frozen=True)
@@ -36,22 +36,22 @@ class JournalReading:
     """Lines that the two files prove together."""
 
     lines: tuple[bytes, ...]
-    """All sound lines, oldest first, without their ends."""
+    """All sound lines, oldest first, without line ends."""
     damage: tuple[Remark, ...]
-    """Remarks on what is wrong with the files; until it is mended nothing is written."""
+    """Damage of the files; until it is repaired nothing is written."""
     torn: bytes = b""
-    """Remains of a line in journal.jsonl after a crash; count for nothing."""
+    """Rest of a line in journal.jsonl after a crash."""
     is_clean: bool = False
-    """Whether both files hold just these lines."""
+    """Whether both files contain exactly these lines."""
 
     @cached_property
     def entries(self) -> list[JournalEntry]:
-        """The lines as JSON objects."""
+        """Lines as JSON objects."""
         return _decode_lines(self.lines)
 
     @cached_property
     def tap_lines(self) -> list[bytes]:
-        """Lines that `decode_tap_entries` reads."""
+        """Lines for `decode_tap_entries`."""
         return [line for line in self.lines if line.startswith(TAP_LINE_PREFIX)]
 
     @cached_property
@@ -66,17 +66,16 @@ def _decode_lines(lines: Iterable[bytes]) -> list[JournalEntry]:
 
 
 class Journal:
-    """The two files in the folder of a machine."""
+    """The two journal files of a machine folder."""
 
     def __init__(self, folder: Path) -> None:
-        """Nothing is read yet."""
         self.path, self.copy_path = folder / JOURNAL_NAME, folder / JOURNAL_COPY_NAME
         self.line_count = 0
         """Number of lines once this had appended its newest."""
         self._text = JournalFileState(exists=False)
 
     def read(self) -> JournalReading:
-        """Read all sound lines of both files, and what is wrong with these; neither need be there."""
+        """Read all sound lines of both files and their damage; the files may be missing."""
         journal = scan_journal_file(self.path, self._text)
         copy = scan_journal_file(self.copy_path, journal)
         self._text = journal
@@ -93,9 +92,11 @@ class Journal:
         return JournalReading(lines, tuple(damage), journal.torn, tidy)
 
     def append(self, *entries: JournalEntry, reading: JournalReading | None = None) -> None:
-        """One write, one fsync: committed when this returns. DataError, and nothing is written, where it is damaged.
+        """Append entries with one write and one fsync; they are committed on return.
 
-        reading: of just now, where there is one and nobody else can have written since.
+        reading: fresh reading if nobody else can have written since. Raises DataError, and writes nothing, for a
+        damaged
+        journal.
         """
         reading = reading or self.read()
         self.refuse_damage(reading)
@@ -114,13 +115,13 @@ class Journal:
             return
 
     def refuse_damage(self, reading: JournalReading | None = None) -> None:
-        """DataError where something is to be mended before anything is written."""
+        """Raise DataError if the journal is damaged."""
         damage = (reading or self.read()).damage
         if damage:
             raise DataError(f"{self.path.parent}: {'; '.join(map(str, damage))}; nothing is written before")
 
     def rewrite(self, entries: list[JournalEntry]) -> None:
-        """Write both files anew from these lines, in a chain of their own; what was there is kept beside them."""
+        """Write both files with these entries in a new chain, and keep the old files."""
         for path in (self.path, self.copy_path):
             if path.exists():
                 back_up_bytes(path, read_regular_file(path), "damaged")
@@ -132,7 +133,7 @@ class Journal:
         atomic_write(self.copy_path, content)
 
     def _repair(self, reading: JournalReading) -> None:
-        """Mend the files after a crash: keep the torn end in a file of its own and cut it away, bring up the copy."""
+        """Repair the files after a crash: move a torn end to a file of its own, and update the copy."""
         whole = b"".join(line + b"\n" for line in reading.lines)
         if reading.torn:
             back_up_bytes(self.path, reading.torn, "torn")
@@ -169,9 +170,9 @@ class Journal:
 
 
 def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
-    """Fault of a journal whose tap tests are all missing and of another machine; else empty.
+    """Return the fault of a journal whose tap tests are all missing and of another machine, else "".
 
-    Such a folder was mixed up. Looks no farther than the first tap file that is there.
+    Such a folder was mixed up. The search ends at the first existing tap file.
     """
     missing = []
     for tap_id in (entry["id"] for entry in map(json.loads, lines) if entry["kind"] == "tap"):
@@ -196,20 +197,20 @@ def _read_machine_name(folder: Path) -> str:
 
 
 def _are_one_batch(lines: Sequence[bytes]) -> bool:
-    """Whether a crash can have kept all of these from the copy: one line, or lines that were written together."""
+    """Tell whether a crash can have kept all of these lines from the copy."""
     written = {json.loads(line).get(BATCH_KEY, -number) for number, line in enumerate(lines)}
     return len(written) < 2
 
 
 def encode_line(entry: JournalEntry, number: int, last: bytes) -> bytes:
-    """Line of an entry, without its end; last: the line before, without its end too."""
+    """Encode an entry without its line end; last: previous line, without its line end."""
     fields = {name: value for name, value in entry.items() if name != "crc"}
     fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
     return json.dumps(fields | {"crc": compute_crc(fields)}).encode()
 
 
 def back_up_bytes(path: Path, content: bytes, why: str) -> Path:
-    """Keep bytes that are to be cut away or written over in a new file beside: PATH.1.torn, PATH.2.torn, ..."""
+    """Write bytes to a new file PATH.1.REASON, PATH.2.REASON, ... before they are overwritten."""
     number = 1
     while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():
         number += 1
@@ -218,17 +219,16 @@ def back_up_bytes(path: Path, content: bytes, why: str) -> Path:
 
 
 def journal_damage_remark(path: Path, fault: str) -> Remark:
-    """Remark on a file of the journal."""
+    """Return the remark on a damaged journal file."""
     return Remark("journal-damaged", path.name, fault, f"mend it with {format_command('rebuild', path.parent)}")
 
 
 def format_command(name: str, folder: Path) -> str:
-    """Command of lobewatch for a machine, to be copied."""
+    """Return a command of lobewatch for a machine, ready to copy."""
     return shlex.join(["lobewatch", name, str(folder)])
 
 
 def _append_lines(path: Path, lines: Sequence[bytes]) -> None:
-    """Append lines and their ends in one write."""
     new, content = not path.exists(), b"".join(line + b"\n" for line in lines)
     try:
         handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)

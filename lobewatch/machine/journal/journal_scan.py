@@ -15,35 +15,35 @@ from acquisition.file_io import open_regular_file
 
 JournalEntry = dict[str, Any]
 PREVIOUS_DIGEST_KEY = b'"previous": "'
-"""Bytes of a line before the SHA-256 of the line before it."""
+"""Bytes of a line before the SHA-256 of the previous line."""
 MAX_JOURNAL_BYTES = 200_000_000
-"""Bytes of a journal; chosen, some ten times that of 20 000 tap tests."""
+"""Largest size of a journal (bytes); chosen, ten times that of 20 000 tap tests."""
 COMPARE_CHUNK_BYTES = 1 << 18
-"""Bytes that are compared at once."""
+"""Size of a chunk that is compared at once (bytes)."""
 
 
 @dataclass(frozen=True)
 class JournalFileState:
-    """One of the two files as it stands on the disk."""
+    """State of one journal file on the disk."""
 
     exists: bool
-    """Whether there is such a file."""
+    """Whether the file exists."""
     chain: tuple[bytes, ...] = ()
-    """Lines from the first on, each naming the one before, without their ends."""
+    """Lines from the first one on, each proved by the next, without line ends."""
     chain_bytes: bytes = b""
-    """The bytes of these lines, with their ends."""
+    """Bytes of these lines with their line ends."""
     first_broken_line: int = 0
-    """Number of the first line that does not continue the chain; 0 where all do."""
+    """Number of the first line that does not continue the chain; 0 without one."""
     line_ending: bytes = b"\n"
-    """Bytes that end the last line of the chain."""
+    """Line end of the last line of the chain."""
     torn: bytes = b""
-    """Remains of a line after a crash."""
+    """Rest of a line after a crash."""
     unchained_lines: tuple[bytes, ...] = ()
-    """Sound lines behind a broken one."""
+    """Sound lines after a broken one."""
 
 
 def scan_journal_file(path: Path, before: JournalFileState) -> JournalFileState:
-    """Read a file of the journal line by line, from where it is as it was read before on."""
+    """Read a journal file line by line, from the part that was read before on."""
     if not path.exists():
         return JournalFileState(exists=False)
     with open_regular_file(path, MAX_JOURNAL_BYTES) as file:
@@ -71,7 +71,7 @@ def scan_journal_file(path: Path, before: JournalFileState) -> JournalFileState:
 
 
 def _starts_with(file: FileIO, start: bytes) -> bool:
-    """Whether the first bytes of a file are these; read in pieces, for it is only compared."""
+    """Tell whether a file starts with these bytes."""
     at = 0
     while at < len(start):
         part = file.read(min(COMPARE_CHUNK_BYTES, len(start) - at))
@@ -82,7 +82,7 @@ def _starts_with(file: FileIO, start: bytes) -> bool:
 
 
 def _continue_chain(chain: list[bytes], lines: list[bytes]) -> bool:
-    """Whether all of these continue the chain: each but the last is proved by the SHA-256 in the line behind it."""
+    """Tell whether all lines continue the chain; the digest in a line proves the line before it."""
     if len(lines) < 2 or not (_continues_chain(chain, lines[0]) and _continues_chain(lines[:-1], lines[-1])):
         return False
     return all(
@@ -91,7 +91,7 @@ def _continue_chain(chain: list[bytes], lines: list[bytes]) -> bool:
 
 
 def _read_previous_digest(line: bytes) -> bytes:
-    """SHA-256 that a line says of the one before it; anything where it is damaged."""
+    """Return the SHA-256 of the previous line as stated in a line; garbage if it is damaged."""
     begin = line.rfind(PREVIOUS_DIGEST_KEY) + len(PREVIOUS_DIGEST_KEY)
     return line[begin : begin + 64]
 
@@ -102,7 +102,7 @@ def _continues_chain(chain: list[bytes], line: bytes) -> bool:
 
 
 def _parse_line(line: bytes) -> JournalEntry | None:
-    """A sound line as a JSON object; None for any other."""
+    """Return a sound line as a JSON object, else None."""
     try:
         entry: JournalEntry = json.loads(line)
         crc = entry.pop("crc")
@@ -112,5 +112,5 @@ def _parse_line(line: bytes) -> JournalEntry | None:
 
 
 def compute_crc(entry: JournalEntry) -> int:
-    """CRC-32 of a journal entry without its crc."""
+    """Return the CRC-32 of an entry without its crc."""
     return zlib.crc32(json.dumps(entry, sort_keys=True).encode())

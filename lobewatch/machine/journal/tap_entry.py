@@ -1,4 +1,4 @@
-"""One committed tap test as the journal tells of it."""
+"""Journal lines for tap tests."""
 
 from __future__ import annotations
 
@@ -13,31 +13,41 @@ from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, Remark, TapTe
 from modal import ModeEdits
 
 NO_MODE_EDITS = ModeEdits()
-"""Nobody chose modes."""
+"""No mode edits."""
 FIELDS_OF_OTHER_LINES = ("accepted", "excluded", "by_hand")
-"""Fields of a tap test that other lines of the journal say."""
+"""Fields of a tap test that come from other journal lines."""
 TAP_LINE_PREFIX = b'{"kind": "tap", '
 """Beginning of the line of a tap test."""
 
 
 class DamagedTapError(DataError):
-    """The file of a committed tap test is missing, altered or unreadable."""
+    """Raised when the file of a committed tap test is missing, altered or unreadable."""
 
     def __init__(self, remark: Remark, entry: TapEntry, path: Path) -> None:
-        """path: of the folder."""
+        """Make the error for a file.
+
+        Parameters
+        ----------
+        remark
+            Damage of the file.
+        entry
+            Journal entry of the tap test.
+        path
+            Machine folder.
+        """
         super().__init__(f"{path}/{remark}")
         self.remark, self.entry = remark, entry
 
 
 class TapEntry(msgspec.Struct, frozen=True, gc=False):
-    """One committed tap test, a line of the journal."""
+    """Committed tap test, a line of the journal."""
 
     id: str
-    """Name of its file in taps/, without .h5."""
+    """Name of the file in taps/, without .h5."""
     sha256: str
-    """SHA-256 of that file."""
+    """SHA-256 of the file."""
     size: int
-    """Size of that file (bytes)."""
+    """Size of the file (bytes)."""
     time: str
     """Time of the tap test (ISO 8601)."""
     tool: str
@@ -45,23 +55,31 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     source_sha256: str
-    """SHA-256 of the recording it was replayed from; empty for a live test."""
+    """SHA-256 of the replayed recording; empty for a live test."""
     conditions: Conditions = UNKNOWN_CONDITIONS
-    """Conditions that it was taken under; unknown in lines of older versions."""
+    """Conditions of the tap test; unknown in lines of older versions."""
     asked: tuple[str, ...] = ()
-    """Questions about its time when it was committed, by code; lines of older versions have none."""
+    """Codes of the questions about its time at the commit; empty in lines of older versions."""
     operator: str = ""
-    """Who held the hammer; empty where nobody said so, and in lines of older versions."""
+    """Name of the operator; empty if unknown and in lines of older versions."""
     accepted: tuple[str, ...] = ()
-    """Questions about it that a person has accepted, by code; lines of their own."""
+    """Codes of its accepted questions, from other lines."""
     excluded: str = ""
-    """Reason why a person has taken it out of the series; empty where it counts; lines of their own."""
+    """Reason of its exclusion, from other lines; empty if included."""
     by_hand: ModeEdits = NO_MODE_EDITS
-    """Modes of it that a person chose; lines of their own."""
+    """Mode edits, from other lines."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
-        """Entry of a tap test; content: of its file."""
+        """Make the entry of a tap test.
+
+        Parameters
+        ----------
+        tap
+            Tap test.
+        content
+            Bytes of its file.
+        """
         about = tap.circumstances
         source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
@@ -76,20 +94,32 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         excluded: str = "",
         by_hand: ModeEdits = NO_MODE_EDITS,
     ) -> Self:
-        """Entry of the line of the journal that `line` has made."""
+        """Read the entry from its journal line.
+
+        Parameters
+        ----------
+        line
+            Fields of the line.
+        accepted
+            Codes of the accepted questions.
+        excluded
+            Reason of the exclusion; empty if included.
+        by_hand
+            Mode edits.
+        """
         fields = line if line.get("conditions") else {key: line[key] for key in line if key != "conditions"}
         entry = msgspec.convert({**fields, "accepted": accepted, "excluded": excluded}, cls)
         return msgspec.structs.replace(entry, by_hand=by_hand)
 
     @property
     def line(self) -> dict[str, Any]:
-        """Line of the journal."""
+        """Journal line."""
         fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in FIELDS_OF_OTHER_LINES}
         return {"kind": "tap", **fields, "conditions": self.conditions.specified, "asked": list(self.asked)}
 
     @property
     def file(self) -> str:
-        """Place of the file in the folder of the machine."""
+        """Path of the file in the machine folder."""
         return f"taps/{self.id}.h5"
 
 
@@ -117,9 +147,9 @@ def decode_tap_entries(
     excluded: Mapping[str, str],
     by_hand: Mapping[str, ModeEdits],
 ) -> Iterator[TapEntry]:
-    """Entries of lines of the journal that begin with `TAP_LINE_PREFIX`, and what others say of them, by identity.
+    """Yield the entries of lines with `TAP_LINE_PREFIX`, with the fields of other lines by identity.
 
-    Twenty times as fast as `TapEntry.from_line` of each.
+    It is twenty times as fast as `TapEntry.from_line` for each line.
     """
     for line in _decode_tap_lines(b"[" + b",".join(lines) + b"]"):
         conditions = msgspec.convert(line.conditions, Conditions) if line.conditions else UNKNOWN_CONDITIONS

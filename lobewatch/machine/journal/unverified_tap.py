@@ -1,7 +1,7 @@
 """Read tap files that the journal does not list, in a subprocess where HDF5 may crash.
 
-A file with a seal that fits is read here. HDF5 may crash or hang on any other that is damaged, so that is read by a
-program of its own, which is ended after a while.
+A file with a valid checksum is read here. HDF5 may crash or hang on any other damaged file, so a subprocess with a
+time limit reads it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from lobewatch.machine.journal.tap_entry import TapEntry
 
 
 def read_unverified_tap(path: Path) -> TapEntry | None:
-    """Entry of the tap test in a file; None where it is no whole one."""
+    """Return the entry of the tap test in a file; None if the file is damaged."""
     try:
         content = read_regular_file(path)
     except IrregularFileError:
@@ -38,7 +38,7 @@ def _read_tap_entry(path: Path) -> TapEntry | None:
 
 
 def has_readable_hits(path: Path) -> bool:
-    """Whether the hits of a file without a seal can be read."""
+    """Tell whether the hits of a file without a checksum can be read."""
     return not has_wrong_checksum(read_regular_file(path)) and _run_in_subprocess("hits", path) is not None
 
 
@@ -48,7 +48,7 @@ def _read_in_subprocess(path: Path) -> TapEntry | None:
 
 
 def _run_in_subprocess(part: str, path: Path) -> dict[str, Any] | None:
-    """Output of this file as a program of its own; None where it failed or took too long."""
+    """Return the output of this module as a program; None if it fails or takes too long."""
     try:
         output: dict[str, Any] | None = json.loads(run_in_subprocess(__name__, part, str(path)))
         return output
@@ -57,7 +57,7 @@ def _run_in_subprocess(part: str, path: Path) -> dict[str, Any] | None:
 
 
 def main() -> None:
-    """Print as JSON the part of a file that is named: of a "tap" its line, of "hits" that they can be read."""
+    """Print a part of a file as JSON: the line of a "tap", or {} for readable "hits"."""
     _, part, name = sys.argv
     if part == "hits":
         read_tap_hits(name)

@@ -1,1 +1,1 @@
-"""machine.toml: its tables, checked, in SI units where something is computed from them."""
+"""Tables of machine.toml, checked, in SI units for computation."""

@@ -13,28 +13,28 @@ from lobes.cut import normalize_pitch
 from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
-"""Angles from x to the feed (rad), by axis of the machine."""
+"""Angle from x to the feed (rad) by axis."""
 MAX_ENGAGEMENT_STEP = math.radians(15)
-"""Engagements of a path are looked at no further apart (rad)."""
+"""Largest step between the engagement angles along a path (rad)."""
 ValueRange = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
-"""Least and greatest value. Of fixed length, `tuple[A, B]`, msgspec 0.22 reads it wrongly beside a number."""
+"""Lower and upper limit. msgspec 0.22 misreads the fixed length `tuple[A, B]` in a union with a number."""
 ToolWear = Literal["new", "used", "worn"]
-"""How worn the edges of a tool may be."""
+"""Wear of the cutting edges."""
 IsoMaterialGroup = Literal["P", "M", "K", "N", "S", "H"]
 """Group of materials by ISO 513."""
 
 
 def convert_pitch(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
-    """Pitches (rad) of a cutter, () where its teeth are evenly spaced; ValueError for what is none."""
+    """Convert pitch angles to radians, () for equal pitch; ValueError for invalid pitches."""
     return normalize_pitch([math.radians(angle) for angle in pitch_deg or ()], teeth)
 
 
 def corner_engagement(tool: float, radial: float, corner: float) -> float:
-    """Angle of engagement (rad) of a tool of this radius in a corner; all lengths in one unit.
+    """Return the engagement angle (rad) of a tool radius in a corner; all lengths in one unit.
 
-    radial: its radial depth on the way there; corner: radius that is left in the corner, not below that of the tool.
-    The wall before the corner is an arc about the same centre: law of cosines between the two centres and where they
-    meet.
+    radial: radial depth on the straight before the corner; corner: remaining radius of the corner, at least that of the
+    tool. The wall before the corner is an arc about the same centre: law of cosines between the two centres and their
+    intersection.
     """
     path = corner - tool
     if path == 0:
@@ -44,7 +44,7 @@ def corner_engagement(tool: float, radial: float, corner: float) -> float:
 
 
 def immersion_steps(least: float, most: float) -> tuple[float, ...]:
-    """Radial depths over diameter from one to another, at most `MAX_ENGAGEMENT_STEP` apart as angles of engagement."""
+    """Return rising immersions between two, at most `MAX_ENGAGEMENT_STEP` of engagement apart."""
     low, high = (math.acos(1 - 2 * immersion) for immersion in (least, most))
     steps = math.ceil((high - low) / MAX_ENGAGEMENT_STEP - 1e-9)
     between = [(1 - math.cos(low + (high - low) * i / steps)) / 2 for i in range(1, steps)]
@@ -52,7 +52,7 @@ def immersion_steps(least: float, most: float) -> tuple[float, ...]:
 
 
 class CutTable(TomlTable, frozen=True):
-    """[reference_cut], and what it shares with a program.
+    """Table [reference_cut], and the shared part of a program.
 
     >>> pocket = CutTable(4, (2.0, 8.0), 16.0, "down", material="AA 7075")  # radial depth 2 to 8 mm
     >>> pocket.immersion, pocket.feeds
@@ -60,58 +60,57 @@ class CutTable(TomlTable, frozen=True):
     """
 
     teeth: Annotated[int, Meta(ge=1)]
-    """Number of teeth."""
+    """Number of teeth (flutes)."""
     radial_depth_mm: Positive | ValueRange
-    """Radial depth (mm), or the least and the greatest that it meets."""
+    """Radial depth of cut ae (mm), or its range along the path."""
     tool_diameter_mm: Positive
-    """Diameter of the tool (mm)."""
+    """Tool diameter (mm)."""
     direction: Direction
     """Direction of milling, "up" (conventional) or "down" (climb)."""
     material: str | None = None
-    """Name of the material, of the list or of a [[material]]."""
+    """Name of the material, built-in or of a [[material]]."""
     tangential_n_per_mm2: Positive | None = None
     """Tangential cutting coefficient Kt (N/mm2); None: that of the material."""
     radial_n_per_mm2: NotNegative | None = None
     """Radial cutting coefficient Kr (N/mm2); None: that of the material."""
     helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
-    """Helix angle (deg); None for straight teeth."""
+    """Helix angle (deg); None for straight flutes."""
     feed_per_tooth_mm: Positive | None = None
-    """Feed per tooth (mm); None: no torque is known."""
+    """Feed per tooth (mm); None: torque is unknown."""
     flute_length_mm: Positive | None = None
-    """Length of the flutes (mm)."""
+    """Flute length (mm)."""
     pitch_deg: tuple[float, ...] | None = None
-    """Angles from tooth to tooth (deg); None for evenly spaced ones."""
+    """Angles from tooth to tooth (deg); None for equal pitch."""
     feed: str = "both"
-    """Axis of the machine that it is fed along, "x", "y" or "both"."""
+    """Axis of the feed, "x", "y" or "both"."""
 
     @property
     def feed_axes(self) -> tuple[str, ...]:
-        """Axes of the machine that it is fed along."""
+        """Axes of the feed."""
         return tuple(FEED_ANGLES) if self.feed == "both" else (self.feed,)
 
     @property
     def radial_mm(self) -> tuple[float, float]:
-        """Least and greatest radial depth on the straight part of its path (mm)."""
+        """Smallest and largest radial depth on the straight path (mm)."""
         depths = self.radial_depth_mm if isinstance(self.radial_depth_mm, tuple) else (self.radial_depth_mm,)
         return depths[0], depths[-1]
 
     @property
     def immersion(self) -> float:
-        """Greatest radial depth on the straight part of its path over diameter (-)."""
+        """Largest radial depth on the straight path over diameter (-)."""
         return self.radial_mm[1] / self.tool_diameter_mm
 
     @property
     def immersions(self) -> tuple[float, ...]:
-        """Radial depths over diameter that it meets on its way, rising: one, or so many that none lies far between."""
+        """Rising immersions along the path (-)."""
         return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
 
     @property
     def deepest_mm(self) -> float:
-        """Greatest depth of cut of the tool (mm); where the length of its flutes is not known, one diameter."""
+        """Flute length, else the diameter (mm)."""
         return self.tool_diameter_mm if self.flute_length_mm is None else self.flute_length_mm
 
     def __post_init__(self) -> None:
-        """Refuse a cut wider than the tool, and coefficients that are missing or stand twice."""
         least, most = self.radial_mm
         if least > most:
             raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise; give [least, greatest]")
@@ -126,7 +125,7 @@ class CutTable(TomlTable, frozen=True):
 
 
 class ProgramTable(CutTable, frozen=True, kw_only=True):
-    """[[program]]: one cut that the shop runs, or one whose speed or depth, NaN then, is asked for.
+    """Table [[program]]: a cut that the shop runs; NaN for a speed or depth that is requested.
 
     >>> program = ProgramTable(4, 8.0, 16.0, "down", material="AA 7075", name="A", speed_rpm=12000.0)
     >>> program.is_open  # its depth is asked for
@@ -136,22 +135,21 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     """
 
     name: Annotated[str, Meta(min_length=1)]
-    """Name, of its own among all programs."""
+    """Unique name."""
     tool: str = "reference"
-    """Name of its tool."""
+    """Name of the tool."""
     speed_rpm: Positive = math.nan
-    """Spindle speed (rpm); NaN where it is asked for."""
+    """Spindle speed (rpm); NaN if requested."""
     depth_mm: Positive = math.nan
-    """Axial depth (mm); NaN where it is asked for."""
+    """Axial depth of cut ap (mm); NaN if requested."""
     corner_radius_mm: Positive | None = None
-    """Radius of the tightest corner on its path (mm); None for a straight one."""
+    """Radius of the tightest corner on the path (mm); None for a straight path."""
     wear: ToolWear | None = None
-    """Wear of the tool that it may be run with; None: that of [doubt]."""
+    """Allowed tool wear; None: that of [doubt]."""
     thin: bool = False
-    """Whether the wall that is cut gives way: then it is never called stable."""
+    """Whether the cut wall is flexible: then the verdict is never stable."""
 
     def __post_init__(self) -> None:
-        """Refuse a cut deeper than the flutes."""
         super().__post_init__()
         if self.flute_length_mm is not None and self.depth_mm > self.flute_length_mm:
             raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
@@ -160,20 +158,28 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
 
     @property
     def is_incomplete(self) -> bool:
-        """Whether its speed or its depth is asked for."""
+        """Whether speed or depth is requested."""
         return math.isnan(self.speed_rpm) or math.isnan(self.depth_mm)
 
     @property
     def immersions(self) -> tuple[float, ...]:
-        """Radial depths over diameter that it meets on its way, those into its corners too."""
+        """Rising immersions along the path and into its corners (-)."""
         if self.corner_radius_mm is None:
             return super().immersions
         return immersion_steps(self.radial_mm[0] / self.tool_diameter_mm, self.corner_immersion(self.corner_radius_mm))
 
     def corner_immersion(self, radius_mm: float) -> float:
-        """Radial depth over diameter of a straight cut that is engaged as this one in a corner of that radius (mm).
+        """Return the immersion of a straight cut with the same engagement as this one in a corner.
 
-        ValueError for a corner tighter than the tool.
+        Parameters
+        ----------
+        radius_mm
+            Remaining radius of the corner (mm).
+
+        Raises
+        ------
+        ValueError
+            For a corner tighter than the tool.
         """
         tool = self.tool_diameter_mm / 2
         if radius_mm < tool:
@@ -185,12 +191,12 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
 
     @property
     def deepest_mm(self) -> float:
-        """Greatest depth of cut of the tool (mm); without a known length of flutes one diameter or what it cuts now."""
+        """Flute length, else the diameter or the present depth (mm)."""
         return max(super().deepest_mm, 0.0 if math.isnan(self.depth_mm) else self.depth_mm)
 
 
 class MaterialTable(TomlTable, frozen=True):
-    """[[material]]: cutting coefficients of one's own, Ktc and Krc or Ks and beta, with edge coefficients if known."""
+    """Table [[material]]: Ktc and Krc, or Ks and beta, with edge coefficients if known."""
 
     name: Annotated[str, Meta(min_length=1)]
     tangential_n_per_mm2: Positive | None = None
@@ -203,36 +209,26 @@ class MaterialTable(TomlTable, frozen=True):
     iso_group: IsoMaterialGroup | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a material without one whole pair of coefficients."""
-        pairs = (
-            (self.tangential_n_per_mm2, self.radial_n_per_mm2),
-            (self.specific_force_n_per_mm2, self.force_angle_deg),
-        )
-        if sorted(sum(value is not None for value in pair) for pair in pairs) != [0, 2]:
-            raise ValueError(
-                "give either tangential_n_per_mm2 and radial_n_per_mm2, or specific_force_n_per_mm2 and force_angle_deg"
-            )
+        first, second = ("tangential_n_per_mm2", "radial_n_per_mm2"), ("specific_force_n_per_mm2", "force_angle_deg")
+        counts = [sum(getattr(self, key) is not None for key in pair) for pair in (first, second)]
+        if sorted(counts) != [0, 2]:
+            raise ValueError(f"give either {' and '.join(first)}, or {' and '.join(second)}")
 
     def build(self) -> CuttingCoefficients:
-        """The coefficients in SI units."""
+        """Build the coefficients in SI units."""
         tangential, radial = self.tangential_n_per_mm2, self.radial_n_per_mm2
         if self.specific_force_n_per_mm2 is not None and self.force_angle_deg is not None:
             tangential, radial = tangential_and_radial(
                 self.specific_force_n_per_mm2, math.radians(self.force_angle_deg)
             )
-        return CuttingCoefficients(
-            self.name,
-            (tangential or 0.0) * 1e6,
-            (radial or 0.0) * 1e6,
-            self.tangential_edge_n_per_mm * 1e3,
-            self.radial_edge_n_per_mm * 1e3,
-            source=self.source,
-            iso_group=self.iso_group or "",
-        )
+        pressures = (tangential or 0.0) * 1e6, (radial or 0.0) * 1e6
+        edges = self.tangential_edge_n_per_mm * 1e3, self.radial_edge_n_per_mm * 1e3
+        iso_group = self.iso_group or ""
+        return CuttingCoefficients(self.name, *pressures, *edges, source=self.source, iso_group=iso_group)
 
 
 class DriveTable(TomlTable, frozen=True):
-    """[drive]: power and torque of the spindle motor; optional."""
+    """Table [drive]: power and torque of the spindle motor."""
 
     power_kw: PositiveOrInfinite = math.inf
     torque_nm: PositiveOrInfinite = math.inf
@@ -242,27 +238,27 @@ Percent = Annotated[float, Meta(ge=0, le=100)]
 
 
 class UncertaintyTable(TomlTable, frozen=True):
-    """Half-widths (%) of independent uniform distributions. docs/lobes.md says where the defaults come from."""
+    """Table [doubt]: half-widths (%) of independent uniform distributions; defaults: docs/lobes.md."""
 
     frequency_percent: Percent | None = None
-    """Natural frequency from tap test to tap test; None: the series' own scatter from 8 tests on, before that 0.3."""
+    """Natural frequency from test to test; None: scatter of the series from 8 tests on, before that 0.3."""
     damping_percent: Percent | None = None
-    """Damping ratio from tap test to tap test; None: likewise, before that 10."""
+    """Damping ratio from test to test; None: scatter of the series from 8 tests on, before that 10."""
     stiffness_percent: Percent | None = None
-    """Modal stiffness from tap test to tap test; None: likewise, before that 3."""
+    """Modal stiffness from test to test; None: scatter of the series from 8 tests on, before that 3."""
     speed_percent: Percent = 1.0
     """Spindle speed."""
     coefficients_percent: Percent = 20.0
-    """Cutting coefficients and their ratio, where no published range is known."""
+    """Cutting coefficients and their ratio without a published range."""
     predicted_frequency_percent: Percent = 3.0
-    """Natural frequencies of a tool that was never tapped."""
+    """Natural frequencies of a predicted tool."""
     predicted_damping_percent: Percent = 30.0
-    """Damping ratios of such a tool."""
+    """Damping ratios of a predicted tool."""
     predicted_stiffness_percent: Percent = 15.0
-    """Modal stiffnesses of such a tool."""
+    """Modal stiffnesses of a predicted tool."""
     untapped_frequency_percent: Percent = 5.0
-    """Natural frequencies in a direction that was not tapped, against the other one."""
+    """Natural frequencies in an untapped direction, relative to the other one."""
     untapped_stiffness_percent: Percent = 30.0
-    """Modal stiffnesses in such a direction."""
+    """Modal stiffnesses in an untapped direction, relative to the other one."""
     wear: ToolWear = "new"
-    """How worn tools may be; a program may say otherwise."""
+    """Allowed tool wear of programs without their own."""

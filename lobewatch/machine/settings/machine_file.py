@@ -1,4 +1,4 @@
-"""machine.toml: what is known of one machine, hand-editable, in the units of the shop (each key names its own)."""
+"""Machine file machine.toml: all tables, in the units of the shop."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import msgspec
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
+from lobewatch.machine.settings import toml_schema
 from lobewatch.machine.settings.cut_tables import (
     FEED_ANGLES,
     CutTable,
@@ -25,24 +26,17 @@ from lobewatch.machine.settings.cut_tables import (
     convert_pitch,
 )
 from lobewatch.machine.settings.notify_table import NotifyTable
-from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_schema import (
-    TomlTable,
-    check_control_characters,
-    explain_validation_error,
-    suggest_decimal_point,
-)
 from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
 
 REFERENCE_CUT = "reference cut"
-"""Name of [reference_cut] beside the names of programs."""
+"""Name of [reference_cut] among the names of programs."""
 USER_SOURCE = "machine.toml"
-"""Source of what a person has entered."""
+"""Source of cutting coefficients that a person has entered."""
 
 
-class Machine(TomlTable, frozen=True):
+class Machine(toml_schema.TomlTable, frozen=True):
     """All tables of machine.toml.
 
     >>> from pathlib import Path
@@ -61,45 +55,43 @@ class Machine(TomlTable, frozen=True):
     machine: MachineTable
     """Identity of the machine: [machine]."""
     tap: TapTable = TapTable()
-    """Way in which it is tapped: [tap]."""
+    """Setup of the tap test: [tap]."""
     daq: DaqTable = DaqTable()
-    """Device and its sensors: [daq]."""
+    """DAQ and its sensors: [daq]."""
     mode: ModeTable = ModeTable()
-    """Mode that is followed: [mode]."""
+    """Choice of the followed mode: [mode]."""
     limits: LimitsTable = LimitsTable()
-    """Falls from which it warns and alarms: [limits]."""
+    """Frequency drops that warn and alarm: [limits]."""
     speed: SpeedTable = SpeedTable()
-    """Speeds of the diagrams: [speed]."""
+    """Speed range of the lobe diagrams: [speed]."""
     drive: DriveTable = DriveTable()
-    """Power and torque of the spindle: [drive]."""
+    """Power and torque of the spindle motor: [drive]."""
     doubt: UncertaintyTable = UncertaintyTable()
-    """Widths of what is not known: [doubt]."""
+    """Uncertainty of the inputs: [doubt]."""
     notify: NotifyTable = NotifyTable()
-    """Where alarms are sent: [notify]."""
+    """Broker for alarms: [notify]."""
     material: tuple[MaterialTable, ...] = ()
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
-    """Cut that is watched beside the programs: [reference_cut]."""
+    """Cut that is watched besides the programs: [reference_cut]."""
     all_programs: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
-    """Programs as they stand in the file: those that are run, and those whose speed or depth is asked for."""
+    """All [[program]] tables, those without a speed or depth included."""
     spindle: SpindleTable | None = None
-    """Shaft and bearings of the model: [spindle]; None without one."""
+    """Spindle model: [spindle]; None without one."""
     tool: tuple[ToolTable, ...] = ()
     """Tools: each [[tool]]."""
 
     def __post_init__(self) -> None:
-        """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
         self._check_tools()
         self._check_hammer()
         names = [program.name for program in self.all_programs]
         for i, program in enumerate(self.all_programs, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
                 raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
-            if not (math.isnan(program.speed_rpm) or self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm):
-                raise ValueError(
-                    f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
-                    f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
-                )
+            low, high = self.speed.low_rpm, self.speed.high_rpm
+            if not (math.isnan(program.speed_rpm) or low <= program.speed_rpm <= high):
+                speed = f"speed_rpm={program.speed_rpm:g}"
+                raise ValueError(f"program {i}: {speed} is outside [speed] {low:g}..{high:g} rpm")
         names = [material.name for material in self.material]
         for i, name in enumerate(names, 1):
             if fold_material_name(name) in map(fold_material_name, names[: i - 1]):
@@ -112,18 +104,28 @@ class Machine(TomlTable, frozen=True):
 
     @property
     def program(self) -> tuple[ProgramTable, ...]:
-        """Programs that are run, with a speed and a depth."""
+        """Programs with speed and depth."""
         return tuple(program for program in self.all_programs if not program.is_incomplete)
 
     @property
     def incomplete_programs(self) -> tuple[ProgramTable, ...]:
-        """Programs whose speed or depth is asked for."""
+        """Programs whose speed or depth is requested."""
         return tuple(program for program in self.all_programs if program.is_incomplete)
 
     def coefficients(self, table: CutTable) -> CuttingCoefficients:
-        """Cutting coefficients of a cut: its own, else those of its material; ValueError for one that is not known.
+        """Return the cutting coefficients of a cut: its own, else those of its material.
 
-        A material goes by any of its names; case and blanks do not count, and a [[material]] comes first.
+        Any name of a material is valid, in any case and with any blanks. A [[material]] takes precedence.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+
+        Raises
+        ------
+        ValueError
+            If the material is unknown.
         """
         tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
         if table.material is None:
@@ -139,12 +141,18 @@ class Machine(TomlTable, frozen=True):
         by_name = {**materials_by_name(), **own}
         if fold_material_name(name) not in by_name:
             near = nearest_material_name(name, by_name)
-            known = f"is {near!r} meant? lobewatch materials lists those that are known; or add a [[material]]"
+            known = f"is {near!r} meant? lobes.materials_by_name lists those that are known; or add a [[material]]"
             raise ValueError(f"material={name!r} is not known; {known}")
         return by_name[fold_material_name(name)]
 
     def build_cut(self, table: CutTable) -> Cut:
-        """A cut in SI units, at its greatest radial depth on the straight, the feed along x."""
+        """Build a cut in SI units at its largest radial depth on a straight path, feed along x.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
         coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
         return Cut(
             teeth=table.teeth,
@@ -153,36 +161,70 @@ class Machine(TomlTable, frozen=True):
             tangential=coefficients.tangential,
             radial=coefficients.radial,
             helix_lag=2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter,
-            pitch=convert_pitch(self._pitch_deg(table), table.teeth),
+            pitch=convert_pitch(self.pitch_deg(table), table.teeth),
         )
 
     def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
-        """A cut in all engagements that it meets on its way, the feed along x."""
+        """Return a cut at each radial depth along its path, feed along x.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
         cut = self.build_cut(table)
         return tuple(replace(cut, immersion=immersion) for immersion in table.immersions)
 
     def helix_deg(self, table: CutTable) -> float | None:
-        """Helix angle of a cut (deg): its own, else that of its [[tool]]; None where neither says it."""
+        """Return the helix angle of a cut or its [[tool]] (deg); None if unknown.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
         tool = self.find_tool(table)
         return tool.helix_deg if table.helix_deg is None and tool else table.helix_deg
 
-    def _pitch_deg(self, table: CutTable) -> Sequence[float] | None:
-        """Pitches of a cut (deg): its own, else those of its [[tool]]."""
+    def pitch_deg(self, table: CutTable) -> Sequence[float] | None:
+        """Return the pitch angles of a cut or its [[tool]] (deg); None for equal pitch.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
         tool = self.find_tool(table)
         return tool.pitch_deg if table.pitch_deg is None and tool else table.pitch_deg
 
     def find_tool(self, table: CutTable) -> ToolTable | None:
-        """The [[tool]] of a program; None where there is none, and of the reference cut, which never changes."""
+        """Return the [[tool]] of a program; None without one, and for the reference cut.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
         name = table.tool if isinstance(table, ProgramTable) else None
+        return self.tool_table(name)
+
+    def tool_table(self, name: str | None) -> ToolTable | None:
+        """Return the [[tool]] of a name; None without one.
+
+        Parameters
+        ----------
+        name
+            Name of the tool.
+        """
         return next((tool for tool in self.tool if tool.name == name), None)
 
     def _check_tool_of(self, place: str, program: ProgramTable) -> None:
-        """Refuse what its [[tool]] cannot be: pitches of other teeth, flutes shorter than its depth."""
+        """Refuse a [[tool]] whose pitches or flutes do not fit its program."""
         tool = self.find_tool(program)
         if tool is None:
             return
         try:
-            convert_pitch(self._pitch_deg(program), program.teeth)
+            convert_pitch(self.pitch_deg(program), program.teeth)
         except ValueError as error:
             raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
@@ -191,9 +233,8 @@ class Machine(TomlTable, frozen=True):
 
     def _check_hammer(self) -> None:
         if self.tap.hammer == "force" and {channel.quantity for channel in self.daq.channel} == {"acceleration"}:
-            raise ValueError(
-                'daq: a [[daq.channel]] of acceleration alone; add that of the hammer, or hammer = "none" to [tap]'
-            )
+            cure = 'add that of the hammer, or hammer = "none" to [tap]'
+            raise ValueError(f"daq: a [[daq.channel]] of acceleration alone; {cure}")
 
     def _check_tools(self) -> None:
         names = [tool.name for tool in self.tool]
@@ -208,9 +249,8 @@ class Machine(TomlTable, frozen=True):
                     "leave them out here, or give another name"
                 )
             if self.spindle is None or self.spindle.tool_length_mm is None:
-                raise ValueError(
-                    f"tool {i}: needs [spindle] tool_length_mm, the part of the shaft that is {self.tap.tool!r}"
-                )
+                part = f"the part of the shaft that is {self.tap.tool!r}"
+                raise ValueError(f"tool {i}: needs [spindle] tool_length_mm, {part}")
             try:
                 self.model(tool.name)
             except ValueError as error:
@@ -220,9 +260,20 @@ class Machine(TomlTable, frozen=True):
             raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is off the shaft, 0 to {length:g} mm")
 
     def model(self, tool: str) -> Spindle:
-        """The spindle with a tool in it, in SI units; DataError where there is no model of it."""
+        """Build the spindle model with a tool, in SI units.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+
+        Raises
+        ------
+        DataError
+            Without [spindle], or without a shape of the tool.
+        """
         if self.spindle is None:
-            raise DataError("no model: add a [spindle] table (lobewatch init FOLDER --example shows one)")
+            raise DataError("no model: add a [spindle] table (make_machine_folder.template shows one)")
         spindle = self.spindle.build()
         if tool == self.tap.tool:
             return spindle
@@ -230,16 +281,22 @@ class Machine(TomlTable, frozen=True):
 
     @property
     def modelled_tools(self) -> list[ToolTable]:
-        """Tools with a shape of their own that the model can put into the spindle."""
+        """Tools that have a shape for the spindle model."""
         return [tool for tool in self.tool if tool.segments]
 
     @property
     def drawing_tolerance(self) -> float:
-        """Standard error of each diameter of the model, relative (-); 0 without a model."""
+        """Relative standard error of each diameter of the model (-); 0 without a model."""
         return self.spindle.tolerance if self.spindle else 0.0
 
     def find_modelled_tool(self, name: str) -> ToolTable:
-        """A [[tool]] with a shape; DataError where there is none of this name."""
+        """Return the [[tool]] of a name that has a shape; DataError without one.
+
+        Parameters
+        ----------
+        name
+            Name of the tool.
+        """
         for tool in self.modelled_tools:
             if tool.name == name:
                 return tool
@@ -247,67 +304,62 @@ class Machine(TomlTable, frozen=True):
         raise DataError(f"tool {name!r} has no model; modelled are {names}: add a [[tool]] table with its segments")
 
     def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
-        """Reference cut and programs that run with a tool, by name, fed along x, y or both."""
-        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
-        tables |= {program.name: program for program in self.program if program.tool == tool}
+        """Return the reference cut and the programs of a tool by name, for each feed direction and engagement.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        """
+        tables = {
+            name: table
+            for name, table in self.cut_tables.items()
+            if not isinstance(table, ProgramTable) or table.tool == tool
+        }
         return {
             name: tuple(
-                replace(cut, feed_angle=FEED_ANGLES[feed])
+                replace(cut, feed_angle=FEED_ANGLES[axis])
                 for cut in self.engaged_cuts(table)
-                for feed in table.feed_axes
+                for axis in table.feed_axes
             )
             for name, table in tables.items()
         }
 
     @property
     def cut_names(self) -> list[str]:
-        """Names of the reference cut and of all programs, whatever their tool."""
-        return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
+        """Names of the reference cut and of all programs."""
+        return list(self.cut_tables)
+
+    @property
+    def cut_tables(self) -> dict[str, CutTable]:
+        """Reference cut and all programs by name."""
+        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
+        return tables | {program.name: program for program in self.program}
 
     @property
     def settings_hash(self) -> str:
-        """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
-        return _hash_settings(
-            "questions, K against the model",
-            self.mode,
-            self.spindle,
-            [(tool.name, tool.segments, tool.masses) for tool in self.modelled_tools],
-            self.tap.tool,
-            self.tap.position_mm,
-            self.tap.sensor,
-        )
-
-    @property
-    def program_hashes(self) -> dict[str, str]:
-        """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
-        hashes = {}
-        for program in self.program:
-            asked = [doubted.statement for doubted in find_program_questions(self, program, on_model=True)]
-            tool = self._pitch_deg(program), self.helix_deg(program)
-            decides = program, tool, self.coefficients(program), self.doubt, asked
-            hashes[program.name] = _hash_settings("four words over the doubt, plausible or asked", *decides)
-        return hashes
-
-
-def _hash_settings(*settings: object) -> str:
-    return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+        """SHA-256 of all settings that decide the results of a tap test, except verdicts."""
+        tools = [(tool.name, tool.segments, tool.masses) for tool in self.modelled_tools]
+        tap = self.tap.tool, self.tap.position_mm, self.tap.sensor
+        settings = ("questions, K against the model", self.mode, self.spindle, tools, *tap)
+        return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
 def read_machine_file(path: Path) -> Machine:
-    """The machine file; DataError with the place for what is wrong in it, OSError where it cannot be read."""
+    """Read a machine file; DataError with the place of a fault, OSError if it cannot be read."""
     return parse_machine_file(read_toml_text(path), str(path))
 
 
 def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
-    """The machine file from its text; DataError with the place for what is wrong in it."""
+    """Parse the text of a machine file; DataError with the place of a fault."""
     tables: dict[str, Any] = {}
     try:
         tables = parse_toml_tables(text)
-        check_control_characters(tables)
+        toml_schema.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{suggest_decimal_point(text)}") from error
+        raise DataError(f"{name}: {error}{toml_schema.suggest_decimal_point(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {explain_validation_error(str(error), tables, Machine)}") from error
+        raise DataError(f"{name}: {toml_schema.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error

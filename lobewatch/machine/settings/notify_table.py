@@ -1,4 +1,4 @@
-"""[notify]: who is told how the machine stands."""
+"""Table [notify] of machine.toml: the MQTT broker for alarms."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from urllib.parse import quote, unquote, urlsplit
 from lobewatch.machine.settings.toml_schema import TomlTable
 
 DEFAULT_MQTT_PORTS = {"mqtt": 1883, "mqtts": 8883}
-"""Port by scheme, where the address names none; mqtts is encrypted."""
+"""Default port by scheme; mqtts is encrypted."""
 PASSWORD_VARIABLE = "LOBEWATCH_MQTT_PASSWORD"
-"""Variable of the environment: machine.toml is copied into each tap file, so the password need not stand in it."""
+"""Environment variable of the password, which keeps it out of machine.toml and of its copies in tap files."""
 PASSWORD_HOST_VARIABLE = "LOBEWATCH_MQTT_HOST"
-"""Variable of the environment: host, or host:port, that the password is for, whomever a machine.toml names."""
+"""Environment variable of the host, or host:port, that may get the password."""
 
 
 class Broker(NamedTuple):
-    """An MQTT broker, and the place of our topics in it."""
+    """MQTT broker with the prefix of all topics."""
 
     scheme: str
     """Scheme of the address, "mqtt" or "mqtts"."""
@@ -26,15 +26,15 @@ class Broker(NamedTuple):
     port: int
     """Port of the broker."""
     user: str
-    """Name of the user; empty where none is asked for."""
+    """User name; empty without login."""
     password: str
-    """Password of the user; empty where none is asked for."""
+    """Password; empty without login."""
     prefix: str
     """First levels of all topics."""
 
     @property
     def address(self) -> str:
-        """Address for people: without the password."""
+        """Address without the password."""
         return f"{self.scheme}://{self.host_port}"
 
     @property
@@ -44,37 +44,38 @@ class Broker(NamedTuple):
 
     @property
     def without_password(self) -> str:
-        """Address that can be kept: with user and prefix."""
+        """Address with user and prefix, for storage."""
         user = f"{quote(self.user, safe='')}@" if self.user else ""
         return f"{self.scheme}://{user}{self.host_port}/{self.prefix}"
 
     @property
     def password_warning(self) -> str:
-        """Why this user goes without the password of the environment; empty where there is no such password."""
+        """Reason why the password of the environment is not used; empty otherwise."""
         if not self.user or self.password or not os.environ.get(PASSWORD_VARIABLE):
             return ""
-        named = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
-        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {named}; set it to {self.host_port} if this broker may have it"
+        host = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
+        cure = f"set it to {self.host_port} if this broker may have it"
+        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {host}; {cure}"
 
 
 class NotifyTable(TomlTable, frozen=True):
-    """[notify]: nobody is told where nothing stands."""
+    """Table [notify]."""
 
     mqtt: str = ""
+    """Address of the MQTT broker; empty without one."""
 
     def __post_init__(self) -> None:
-        """Refuse an address that is none."""
         if self.mqtt:
             parse_broker(self.mqtt)
 
     @property
     def broker(self) -> Broker | None:
-        """Broker of `mqtt`; None where nobody is told."""
+        """Broker of `mqtt`; None without one."""
         return parse_broker(self.mqtt) if self.mqtt else None
 
 
 def parse_broker(address: str) -> Broker:
-    """Broker of mqtt://[user[:password]@]host[:port][/prefix]; ValueError for what is none."""
+    """Parse mqtt://[user[:password]@]host[:port][/prefix]; ValueError for any other text."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
     allowed = "give mqtt://HOST, mqtt://USER@HOST:PORT/PREFIX, or mqtts:// where it is encrypted"
     refusal = f"mqtt={hidden!r} is no address of a broker; {allowed}"
@@ -92,7 +93,7 @@ def parse_broker(address: str) -> Broker:
 
 
 def _find_password(host: str, port: int) -> str:
-    """Password of the environment, where it is for this host; else empty."""
+    """Return the password of the environment if it is for this host, else an empty text."""
     try:
         named = urlsplit(f"//{os.environ.get(PASSWORD_HOST_VARIABLE, '')}")
         is_for_it = named.hostname == host and named.port in (None, port)

@@ -1,141 +1,211 @@
-"""What a machine.toml is asked about before a word is said of a program, and which of it was accepted."""
+"""Questions about implausible settings of machine.toml."""
 
 from __future__ import annotations
 
+import hashlib
+import math
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+
+import msgspec
 
 from lobes import fold_material_name
-from lobewatch.machine.settings.cut_tables import CutTable, DriveTable, MaterialTable, ProgramTable, UncertaintyTable
-from lobewatch.machine.settings.plausibility import (
-    TEMPLATE_BEARING_STIFFNESS,
-    ImplausibleSetting,
-    check_cut,
-    check_drive,
-    check_material,
-    check_program_tool,
-    check_ranges,
-    check_same_tool,
-    check_spindle,
-    check_stick_out,
-    check_tool,
-    check_tool_shape,
-)
-from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
-from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
+from lobewatch.machine.settings import plausibility as ranges
+from lobewatch.machine.settings.cut_tables import CutTable, MaterialTable, ProgramTable
+from lobewatch.machine.settings.machine_file import Machine
+from lobewatch.machine.settings.plausibility import ImplausibleSetting, SettingFault, check_ranges, check_ratio
+from lobewatch.machine.settings.spindle_tables import MassTable, SpindleTable, ToolTable
+from lobewatch.machine.settings.toml_schema import TomlTable
 
 
-class MachineTables(Protocol):
-    """The tables of machine.toml, as `Machine` has them."""
-
-    @property
-    def machine(self) -> MachineTable: ...  # noqa: D102
-    @property
-    def tap(self) -> TapTable: ...  # noqa: D102
-    @property
-    def daq(self) -> DaqTable: ...  # noqa: D102
-    @property
-    def mode(self) -> ModeTable: ...  # noqa: D102
-    @property
-    def limits(self) -> LimitsTable: ...  # noqa: D102
-    @property
-    def speed(self) -> SpeedTable: ...  # noqa: D102
-    @property
-    def drive(self) -> DriveTable: ...  # noqa: D102
-    @property
-    def doubt(self) -> UncertaintyTable: ...  # noqa: D102
-    @property
-    def material(self) -> Sequence[MaterialTable]: ...  # noqa: D102
-    @property
-    def reference_cut(self) -> CutTable | None: ...  # noqa: D102
-    @property
-    def program(self) -> Sequence[ProgramTable]: ...  # noqa: D102
-    @property
-    def spindle(self) -> SpindleTable | None: ...  # noqa: D102
-    @property
-    def tool(self) -> Sequence[ToolTable]: ...  # noqa: D102
+def find_program_questions(machine: Machine, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
+    """Return the open questions for the verdict on a program; on_model: whether the verdict uses [spindle]."""
+    model = _check_model(machine, program) if on_model else ()
+    return _remove_accepted(machine, [*_check_program(machine, program), *model])
 
 
-def find_program_questions(machine: MachineTables, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
-    """Open questions that the word on a program waits for; on_model: whether that rests on [spindle], too."""
-    return _remove_accepted(
-        machine, [*_check_program(machine, program), *(_check_model(machine, program) if on_model else ())]
-    )
-
-
-def find_all_questions(machine: MachineTables) -> list[ImplausibleSetting]:
-    """All open questions of a machine.toml."""
-    asked = [*_check_machine(machine)]
+def find_all_questions(machine: Machine) -> list[ImplausibleSetting]:
+    """Return all open questions about a machine.toml."""
+    questions = [*_check_machine(machine)]
     for program in machine.program:
-        asked += _check_program(machine, program)
-        asked += _check_model(machine, program)
+        questions += [*_check_program(machine, program), *_check_model(machine, program)]
     if machine.spindle is not None:
-        asked += check_spindle(machine.spindle)
+        questions += _check_spindle(machine.spindle)
     if machine.reference_cut is not None:
-        asked += _check_cut_and_material(machine, machine.reference_cut, "[reference_cut]")
-    return _remove_accepted(machine, asked)
+        questions += _check_cut_and_material(machine, machine.reference_cut, "[reference_cut]")
+    return _remove_accepted(machine, questions)
 
 
-def find_template_bearings(machine: MachineTables) -> ImplausibleSetting | None:
-    """Question about a bearing stiffness that nobody has given; None where somebody has, or has accepted it."""
-    spindle = machine.spindle
-    if spindle is None or spindle.bearing_stiffness_n_per_um != TEMPLATE_BEARING_STIFFNESS:
+def find_template_bearings(machine: Machine) -> ImplausibleSetting | None:
+    """Return the question about a bearing stiffness that is still that of the template; None if replaced."""
+    spindle, template = machine.spindle, ranges.TEMPLATE_BEARING_STIFFNESS
+    if spindle is None or spindle.bearing_stiffness_n_per_um != template:
         return None
     why = "is what a new machine.toml holds, and no tap test has found it yet: all of the model rests on it"
-    key = "bearing_stiffness_n_per_um"
-    asked = ImplausibleSetting("setting-guessed", "[spindle]", key, f"{TEMPLATE_BEARING_STIFFNESS:g}", why)
-    return next(iter(_remove_accepted(machine, [asked])), None)
+    location, key = "[spindle]", "bearing_stiffness_n_per_um"
+    question = ImplausibleSetting(SettingFault.TEMPLATE_VALUE, location, key, f"{template:g}", why)
+    return next(iter(_remove_accepted(machine, [question])), None)
 
 
-def _remove_accepted(machine: MachineTables, asked: list[ImplausibleSetting]) -> list[ImplausibleSetting]:
-    """Each question once, without those that a person has answered."""
-    by_claim = {doubted.statement: doubted for doubted in asked}
-    return [doubted for claim, doubted in by_claim.items() if claim not in machine.machine.accepted]
+def hash_programs(machine: Machine) -> dict[str, str]:
+    """Return the SHA-256 of all settings that decide the verdict on each program, besides `Machine.settings_hash`."""
+    hashes = {}
+    for program in machine.program:
+        questions = [question.statement for question in find_program_questions(machine, program, on_model=True)]
+        tool = machine.pitch_deg(program), machine.helix_deg(program)
+        decisive = program, tool, machine.coefficients(program), machine.doubt, questions
+        content = msgspec.json.encode(("four words over the doubt, plausible or asked", *decisive))
+        hashes[program.name] = hashlib.sha256(content).hexdigest()
+    return hashes
 
 
-def _check_machine(machine: MachineTables) -> Iterator[ImplausibleSetting]:
-    """What every word rests on."""
-    tables = {
-        "[machine]": machine.machine,
-        "[tap]": machine.tap,
-        "[daq]": machine.daq,
-        "[mode]": machine.mode,
-        "[limits]": machine.limits,
-        "[speed]": machine.speed,
-        "[doubt]": machine.doubt,
-    }
-    for place, table in tables.items():
-        yield from check_ranges(table, place)
+def _remove_accepted(machine: Machine, questions: list[ImplausibleSetting]) -> list[ImplausibleSetting]:
+    by_statement = {question.statement: question for question in questions}
+    return [question for statement, question in by_statement.items() if statement not in machine.machine.accepted]
+
+
+def _check_machine(machine: Machine) -> Iterator[ImplausibleSetting]:
+    for name in ("machine", "tap", "daq", "mode", "limits", "speed", "doubt"):
+        yield from check_ranges(getattr(machine, name), f"[{name}]")
     for i, channel in enumerate(machine.daq.channel, 1):
         yield from check_ranges(channel, f"[[daq.channel]] {i}")
-    yield from check_drive(machine.drive, machine.speed)
+    yield from _check_drive(machine)
 
 
-def _check_program(machine: MachineTables, program: ProgramTable) -> Iterator[ImplausibleSetting]:
+def _check_drive(machine: Machine) -> Iterator[ImplausibleSetting]:
+    """Yield a power that the drive reaches only outside the speed range."""
+    drive = machine.drive
+    yield from check_ranges(drive, "[drive]")
+    if math.isfinite(drive.power_kw) and math.isfinite(drive.torque_nm):
+        corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi
+        if not 50 <= corner <= 2 * machine.speed.high_rpm:
+            why = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm, where [speed] ends at "
+            why += f"{machine.speed.high_rpm:g}"
+            yield ImplausibleSetting(SettingFault.CONTRADICTION, "[drive]", "power_kw", f"{drive.power_kw:g}", why)
+
+
+def _check_program(machine: Machine, program: ProgramTable) -> Iterator[ImplausibleSetting]:
     yield from _check_machine(machine)
     place = f"program {program.name!r}"
     yield from _check_cut_and_material(machine, program, place)
-    if program in machine.program:  # of a cut that is only asked about, its geometry was just said
-        same_tool = {f"program {other.name!r}": other for other in machine.program if other.tool == program.tool}
-        yield from (doubted for doubted in check_same_tool(same_tool) if doubted.location == place)
+    if program in machine.program:  # a requested cut takes its geometry from these programs
+        yield from _check_same_tool(program, place, [p for p in machine.program if p.tool == program.tool])
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from check_tool(tool, f"tool {tool.name!r}")
-            yield from check_program_tool(program, tool, place)
-    if program.tool == machine.tap.tool:
-        yield from check_stick_out(machine.tap, {place: program})
+            yield from _check_tool(tool)
+            yield from _check_program_tool(program, tool, place)
+    if program.tool == machine.tap.tool and machine.tap.stick_out_mm is not None:
+        limits, diameter = ranges.STICK_OUT_RATIO_RANGE, program.tool_diameter_mm
+        unit = f"{limits.unit} of {diameter:g} mm"
+        yield from check_ratio("[tap]", "stick_out_mm", machine.tap.stick_out_mm, diameter, limits, unit)
 
 
-def _check_cut_and_material(machine: MachineTables, cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
-    yield from check_cut(cut, place)
+def _check_cut_and_material(machine: Machine, cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
+    yield from _check_cut(cut, place)
     for material in machine.material:
         if cut.material is not None and fold_material_name(material.name) == fold_material_name(cut.material):
-            yield from check_material(material, f"material {material.name!r}")
+            place = f"material {material.name!r}"
+            yield from check_ranges(material, place)
+            if material.tangential_n_per_mm2 and material.radial_n_per_mm2:
+                yield from _check_radial_coefficient(material, place)
 
 
-def _check_model(machine: MachineTables, program: ProgramTable) -> Iterator[ImplausibleSetting]:
+def _check_cut(cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
+    yield from check_ranges(cut, place)
+    diameter = cut.tool_diameter_mm
+    if cut.tangential_n_per_mm2 and cut.radial_n_per_mm2 is not None:
+        yield from _check_radial_coefficient(cut, place)
+        if (cut.tangential_n_per_mm2, cut.radial_n_per_mm2) == ranges.TEMPLATE_COEFFICIENTS:
+            kt, kr = ranges.TEMPLATE_COEFFICIENTS
+            why = f"with radial_n_per_mm2 = {kr:g} is what a new machine.toml holds: nobody has given it"
+            yield ImplausibleSetting(SettingFault.TEMPLATE_VALUE, place, "tangential_n_per_mm2", f"{kt:g}", why)
+    for radial in dict.fromkeys(cut.radial_mm):
+        yield from check_ratio(place, "radial_depth_mm", radial, diameter, ranges.RADIAL_DEPTH_RATIO_RANGE)
+    if cut.flute_length_mm is not None:
+        yield from check_ratio(place, "flute_length_mm", cut.flute_length_mm, diameter, ranges.FLUTE_LENGTH_RATIO_RANGE)
+    if isinstance(cut, ProgramTable):
+        yield from check_ratio(place, "depth_mm", cut.depth_mm, diameter, ranges.DEPTH_RATIO_RANGE)
+        speed = math.pi * diameter / 1000 * cut.speed_rpm
+        rpm_per_speed = cut.speed_rpm / speed
+        yield from check_ratio(place, "speed_rpm", cut.speed_rpm, rpm_per_speed, ranges.CUTTING_SPEED_RANGE)
+
+
+def _check_radial_coefficient(table: CutTable | MaterialTable, place: str) -> Iterator[ImplausibleSetting]:
+    kt, kr = table.tangential_n_per_mm2 or math.nan, table.radial_n_per_mm2 or 0.0
+    return check_ratio(place, "radial_n_per_mm2", kr, kt, ranges.KR_RATIO_RANGE)
+
+
+def _check_same_tool(
+    program: ProgramTable, place: str, same_tool: Sequence[ProgramTable]
+) -> Iterator[ImplausibleSetting]:
+    """Yield diameter or teeth of a program that another program of its tool contradicts."""
+    for key in ("tool_diameter_mm", "teeth"):
+        value = getattr(program, key)
+        other = next((other for other in same_tool if getattr(other, key) != value), None)
+        if other is not None:
+            why = f"where {other.name!r} of the same tool has {getattr(other, key):g}: a radius, an inch, another tool?"
+            yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
+
+
+def _check_program_tool(program: ProgramTable, tool: ToolTable, place: str) -> Iterator[ImplausibleSetting]:
+    """Yield values of a program that its [[tool]] contradicts."""
+    for key, tool_key in {
+        "teeth": "teeth",
+        "tool_diameter_mm": "diameter_mm",
+        "flute_length_mm": "flute_length_mm",
+    }.items():
+        value, tool_value = getattr(program, key), getattr(tool, tool_key)
+        if None not in (value, tool_value) and value != tool_value:
+            why = f"where {tool_key} of [[tool]] {tool.name!r} is {tool_value:g}: a radius, an inch, another tool?"
+            yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
+
+
+def _check_tool(tool: ToolTable) -> Iterator[ImplausibleSetting]:
+    place, limits = f"tool {tool.name!r}", ranges.FLUTE_LENGTH_RATIO_RANGE
+    yield from check_ranges(tool, place)
+    if tool.flute_length_mm is not None and tool.diameter_mm is not None:
+        yield from check_ratio(place, "flute_length_mm", tool.flute_length_mm, tool.diameter_mm, limits)
+
+
+def _check_model(machine: Machine, program: ProgramTable) -> Iterator[ImplausibleSetting]:
     if machine.spindle is not None:
-        yield from check_spindle(machine.spindle)
+        yield from _check_spindle(machine.spindle)
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from check_tool_shape(tool, f"tool {tool.name!r}")
+            yield from _check_tool_shape(tool)
+
+
+def _check_spindle(spindle: SpindleTable) -> Iterator[ImplausibleSetting]:
+    yield from check_ranges(spindle, "[spindle]")
+    yield from _check_parts("[spindle] segment", spindle.segments)
+    yield from _check_parts("[spindle] bearing", spindle.bearings)
+    yield from _check_parts("[spindle] joint", spindle.joints)
+    yield from _check_parts("[spindle] mass", spindle.masses)
+
+
+def _check_parts(place: str, parts: Sequence[TomlTable]) -> Iterator[ImplausibleSetting]:
+    for i, part in enumerate(parts, 1):
+        yield from check_ranges(part, f"{place} {i}")
+        if isinstance(part, MassTable):
+            yield from _check_gyration_radius(part, f"{place} {i}")
+
+
+def _check_gyration_radius(mass: MassTable, place: str) -> Iterator[ImplausibleSetting]:
+    for key in ("diametral_inertia_kg_mm2", "polar_inertia_kg_mm2"):
+        if (inertia := getattr(mass, key)) and mass.mass_kg:
+            radius, limits = math.sqrt(inertia / mass.mass_kg), ranges.GYRATION_RADIUS_RANGE
+            if not limits.holds(radius):
+                why = f"with {mass.mass_kg:g} kg lies at {radius:.3g} {limits.unit}"
+                yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, key, f"{inertia:g}", why)
+
+
+def _check_tool_shape(tool: ToolTable) -> Iterator[ImplausibleSetting]:
+    place = f"tool {tool.name!r}"
+    yield from _check_parts(f"{place} segment", tool.segments)
+    yield from _check_parts(f"{place} mass", tool.masses)
+    if not tool.segments:
+        return
+    length, thickest = sum(part.length_mm for part in tool.segments), max(part.outer_mm for part in tool.segments)
+    limits = ranges.STICK_OUT_RATIO_RANGE
+    if length > limits.high * thickest:
+        why = f"add up to {length / thickest:.3g} {limits.unit}, more than {limits.high:g}"
+        yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, "segments", f"{length:g} mm", why)

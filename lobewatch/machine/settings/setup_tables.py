@@ -24,31 +24,31 @@ from acquisition.text_boards import FrameFormat, OutputFormat
 from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
-"""Ways to fix an accelerometer."""
+"""How an accelerometer is fixed."""
 SENSOR_MASS_STD_RATIO = 0.02
-"""Standard error of the mass of the accelerometer, relative: as its data sheet says it, or weighed; chosen."""
+"""Relative standard error of the sensor mass from a data sheet or a scale; chosen."""
 CABLE_MASS_SHARE, CABLE_MASS_STD_RATIO = 0.5, 0.25
-"""Share of the mass of the cable, up to where it is held, that moves along, and its standard error; chosen."""
+"""Share of the cable mass that moves with the sensor, and its standard error; chosen."""
 MAX_SENSOR_MASS_G = 2000.0
-"""Mass that no accelerometer has (g)."""
+"""Largest plausible sensor mass (g)."""
 
 
 @dataclass(frozen=True)
 class SensorLoading:
-    """The accelerometer at the tip; ValueError for a mass that none has."""
+    """Accelerometer at the tool tip; ValueError for an implausible mass."""
 
     mass: float | None = None
-    """Mass that moves along with the structure (kg); None where nobody said."""
+    """Mass that moves with the structure (kg); None if unknown."""
     mass_std: float = 0.0
-    """Standard error of that (kg)."""
+    """Standard error of the mass (kg)."""
     mounting: SensorMounting | Literal[""] | None = None
-    """Way it is fixed; "" where nobody said, None where nobody is asked."""
+    """Mounting of the accelerometer; "" if unknown, None if irrelevant."""
 
     @classmethod
     def of(
         cls, sensor_g: float | None, cable_g: float = 0.0, mounting: SensorMounting | Literal[""] | None = None
     ) -> Self:
-        """From the masses of accelerometer and cable in grams."""
+        """Make it from the masses of accelerometer and cable (g)."""
         if sensor_g is None:
             return cls(mounting=mounting)
         if not (isfinite(sensor_g) and 0 <= sensor_g <= MAX_SENSOR_MASS_G):
@@ -58,48 +58,49 @@ class SensorLoading:
 
 
 class MachineTable(TomlTable, frozen=True):
-    """[machine]."""
+    """Table [machine]."""
 
     name: Annotated[str, Meta(min_length=1)]
+    """Name of the machine."""
     tap_interval_days: Positive = 30.0
+    """Planned interval of tap tests (days)."""
     accepted: tuple[str, ...] = ()
-    """What was asked about numbers of this file, and is right: lines of `lobewatch check --accept_questions`."""
+    """Accepted questions about implausible settings."""
 
 
 class TapTable(TomlTable, frozen=True):
-    """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
+    """Table [tap]: how the tap test is done; trial hits choose a missing record_s and trigger_n."""
 
     tool: str = "reference"
-    """Name of the tool that is tapped."""
+    """Name of the tapped tool."""
     hammer: Literal["force", "none"] = "force"
-    """Whether a hammer measures its force; with "none" hits are seen by the acceleration alone, and K stays unknown."""
+    """Whether the hammer measures force; with "none" the acceleration detects hits, and K stays unknown."""
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
     """Number of good hits."""
     record_s: Positive | None = None
-    """Length of a record (s); None: chosen by trial hits."""
+    """Record length (s); None: chosen by trial hits."""
     pre_trigger_s: Positive = 0.02
-    """Part of a record before the hit (s)."""
+    """Pre-trigger time (s)."""
     trigger_n: Positive | None = None
-    """Force that starts a record (N); None: chosen by trial hits."""
+    """Trigger level of the force (N); None: chosen by trial hits."""
     position_mm: NotNegative = 0.0
-    """Place of the hammer, from the tool tip (mm)."""
+    """Distance of the hammer from the tool tip (mm)."""
     stick_out_mm: float | None = None
     """Stick-out of the tool (mm)."""
     drawbar_kn: float | None = None
-    """Force of the drawbar (kN)."""
+    """Drawbar force (kN)."""
     state: str = ""
-    """State of the machine, in a word or two of the shop's."""
+    """State of the machine, a word or two."""
     sensor_mass_g: Annotated[float, Meta(ge=0, le=MAX_SENSOR_MASS_G)] | None = None
-    """Mass of the accelerometer that rides on the tool, with its magnet (g); None where nobody said so."""
+    """Mass of the accelerometer with its magnet (g); None if unknown."""
     cable_mass_g: NotNegative = 0.0
-    """Mass of the cable that it carries (g)."""
+    """Mass of the cable carried by the accelerometer (g)."""
     mounting: SensorMounting | None = None
     """Mounting of the accelerometer."""
     sensor_band_hz: Positive | None = None
-    """Highest frequency that the accelerometer passes, from its data sheet; None: that of the sample rate."""
+    """Upper frequency limit of the accelerometer from its data sheet (Hz); None: that of the sample rate."""
 
     def __post_init__(self) -> None:
-        """Refuse what no spindle has."""
         self.conditions(self.tool)
         if self.hammer == "none" and self.trigger_n is not None:
             raise ValueError(
@@ -110,53 +111,59 @@ class TapTable(TomlTable, frozen=True):
 
     @property
     def quantity(self) -> ChannelQuantity:
-        """Quantity by which hits are seen."""
+        """Quantity that detects hits."""
         return "acceleration" if self.hammer == "none" else "force"
 
     @property
     def sensor(self) -> SensorLoading:
-        """The accelerometer."""
+        """Mass and mounting of the accelerometer."""
         return SensorLoading.of(self.sensor_mass_g, self.cable_mass_g, self.mounting or "")
 
     def conditions(self, tool: str) -> Conditions:
-        """Conditions of a tap test with a tool; the stick-out of `tool` alone."""
+        """Return the conditions of a tap test; the stick-out is that of the tapped tool only.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool in the spindle.
+        """
         stick_out = self.stick_out_mm if tool == self.tool else None
         return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
 
 
 class ModeTable(TomlTable, frozen=True):
-    """[mode]: which mode is followed."""
+    """Table [mode]: choice of the followed mode."""
 
     band_hz: tuple[NotNegative, Positive] | None = None
+    """Frequency band of the followed mode (Hz); None for all frequencies."""
     model_mode: Annotated[int, Meta(ge=1, le=50)] = 1
+    """Number of the same mode in the spindle model, from 1."""
 
     def __post_init__(self) -> None:
-        """Refuse an empty band."""
         if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
             raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
 
 
 class LimitsTable(TomlTable, frozen=True):
-    """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
+    """Table [limits]: frequency drops that warn and alarm; the defaults are the paper's."""
 
     frequency_warn_percent: Positive = 5.0
-    """Fall from which it warns (%)."""
+    """Frequency drop that warns (%)."""
     frequency_alarm_percent: Positive = 10.0
-    """Fall from which it alarms (%)."""
+    """Frequency drop that alarms (%)."""
 
 
 class SpeedTable(TomlTable, frozen=True):
-    """[speed]: the range of the lobe diagrams."""
+    """Table [speed]: speed range of the lobe diagrams."""
 
     low_rpm: Positive = 1000.0
-    """Slowest speed (rpm)."""
+    """Lowest speed (rpm)."""
     high_rpm: Positive = 24000.0
-    """Fastest speed (rpm)."""
+    """Highest speed (rpm)."""
     steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
     """Number of speeds of a diagram."""
 
     def __post_init__(self) -> None:
-        """Refuse an empty range."""
         if not self.low_rpm < self.high_rpm:
             around = (
                 f"of a spindle of one speed give what is around it, {0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
@@ -166,11 +173,11 @@ class SpeedTable(TomlTable, frozen=True):
 
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""Sensitivity of either sign: an accelerometer may be mounted the other way round."""
+"""Sensitivity of either sign: an accelerometer may be mounted reversed."""
 
 
 class ChannelTable(TomlTable, frozen=True):
-    """[[daq.channel]]: a sensor on an input of a device that does not describe its sensors."""
+    """Table [[daq.channel]]: a sensor on an input of a DAQ that does not describe its sensors."""
 
     input: Annotated[int, Meta(ge=0)]
     quantity: Literal["force", "acceleration"]
@@ -185,7 +192,6 @@ class ChannelTable(TomlTable, frozen=True):
     skew_us: Annotated[float, Meta(ge=-1e6, le=1e6)] = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a sensitivity that is missing, stands twice, is zero, or belongs to another quantity."""
         key = "sensitivity_mv_per_n" if self.quantity == "force" else "sensitivity_mv_per_g"
         if (self.sensitivity_mv_per_n is None) == (self.sensitivity_mv_per_g is None):
             raise ValueError("give exactly one of sensitivity_mv_per_n (force) and sensitivity_mv_per_g (acceleration)")
@@ -196,7 +202,7 @@ class ChannelTable(TomlTable, frozen=True):
             raise ValueError(f"{key}=0 is not the sensitivity of any sensor; take it from its calibration sheet")
 
     def build(self) -> SensorInput:
-        """The input in SI units: volts at the device per N or per m/s^2."""
+        """Build the sensor input in SI units: volts per N or per m/s^2."""
         if self.sensitivity_mv_per_n is not None:
             sensitivity = self.sensitivity_mv_per_n / 1e3
         else:
@@ -214,7 +220,7 @@ class ChannelTable(TomlTable, frozen=True):
 
 
 class PrintingTable(TomlTable, frozen=True):
-    """[daq.printing]: what a board with driver = "lines" prints."""
+    """Table [daq.printing]: output format of a board with driver = "lines"."""
 
     adc_bits: Annotated[int, Meta(ge=8, le=24)] | None = None
     frame_start: str = ""
@@ -223,7 +229,7 @@ class PrintingTable(TomlTable, frozen=True):
     baud_rate: Annotated[int, Meta(ge=300, le=20_000_000)] = 115200
 
     def build(self) -> OutputFormat:
-        """The same with the start of a frame as bytes; ValueError where that is no hexadecimal number."""
+        """Build the output format with the frame start as bytes; ValueError for invalid hexadecimal digits."""
         try:
             start = bytes.fromhex(self.frame_start)
         except ValueError:
@@ -234,36 +240,35 @@ class PrintingTable(TomlTable, frozen=True):
 
 
 class DaqTable(TomlTable, frozen=True):
-    """[daq]: the port is remembered here by hand, never written by the program."""
+    """Table [daq]; people write the port, the program never does."""
 
     port: str = ""
-    """Port of the device; empty: it is looked for."""
+    """Port of the DAQ; empty: search all ports."""
     driver: str = "taps"
     """Name of the driver."""
     sample_rate_hz: Positive | None = None
-    """Scans a second (Hz); None leaves it to the driver."""
+    """Sample rate (Hz); None: that of the driver."""
     loss_detection: bool = True
-    """Whether lost scans are to be found."""
+    """Whether to detect lost scans."""
     digital_clock: bool = False
-    """Whether a square wave on digital input 0 shows the loss of whole scans."""
+    """Whether a square wave on digital input 0 reveals lost scans."""
     accept_measured_rate: bool = False
-    """Whether to work with the measured rate of a device whose rate is not the nominal one."""
+    """Whether to use the measured sample rate if it differs from the nominal one."""
     calibration_interval_months: Positive = 12.0
-    """Time after which a sensor is due to be calibrated again (months)."""
+    """Calibration interval of the sensors (months)."""
     anti_alias: bool | None = None
-    """Whether a filter keeps out what lies above half the sample rate; None: nobody said so."""
+    """Whether the DAQ has an anti-aliasing filter; None if unknown."""
     printing: PrintingTable | None = None
-    """Format that a board prints in, with driver = "lines"."""
+    """Output format of a board with driver = "lines"."""
     channel: tuple[ChannelTable, ...] = ()
-    """Sensors of a device that does not describe them itself."""
+    """Sensors of a DAQ that does not describe them."""
 
     def __post_init__(self) -> None:
-        """Refuse a driver that is not known, and what it does not take."""
         check_settings(find_driver(self.driver), self.settings)
 
     @property
     def settings(self) -> DeviceSettings:
-        """Settings asked of the device, in SI units."""
+        """Requested device settings in SI units."""
         inputs = tuple(channel.build() for channel in self.channel)
         printing = self.printing.build() if self.printing else None
         return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock, printing)

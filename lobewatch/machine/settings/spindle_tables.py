@@ -16,7 +16,7 @@ from lobewatch.machine.settings.toml_schema import NotNegative, Positive, Positi
 
 
 class SegmentTable(TomlTable, frozen=True):
-    """A segment of the shaft, by its length and diameters."""
+    """Segment of the shaft."""
 
     length_mm: Positive
     outer_mm: Positive
@@ -27,7 +27,6 @@ class SegmentTable(TomlTable, frozen=True):
     material: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a bore that leaves no wall, and a material that is not known."""
         _check_wall(self.bore_mm, self.outer_mm, "bore_mm", "outer_mm")
         if self.end_outer_mm is not None or self.end_bore_mm is not None:
             outer = self.outer_mm if self.end_outer_mm is None else self.end_outer_mm
@@ -41,7 +40,7 @@ class SegmentTable(TomlTable, frozen=True):
             raise ValueError(f"material={self.material!r} is none of {', '.join(MATERIALS)}{hint}")
 
     def build(self) -> Segment:
-        """The segment in SI units."""
+        """Build the segment in SI units."""
         return Segment(
             self.length_mm / 1e3,
             self.outer_mm / 1e3,
@@ -54,7 +53,7 @@ class SegmentTable(TomlTable, frozen=True):
 
 
 class BearingTable(TomlTable, frozen=True):
-    """A bearing, by its place and stiffness."""
+    """Bearing of the spindle."""
 
     position_mm: NotNegative
     stiffness_n_per_um: PositiveOrInfinite | None = None
@@ -65,7 +64,7 @@ class BearingTable(TomlTable, frozen=True):
     rolling_elements: Literal["balls", "rollers"] = "balls"
 
     def build(self, stiffness_n_per_um: float) -> Bearing:
-        """The bearing in SI units; stiffness_n_per_um: where it has none of its own."""
+        """Build the bearing in SI units, with a default stiffness."""
         stiffness = stiffness_n_per_um if self.stiffness_n_per_um is None else self.stiffness_n_per_um
         return Bearing(
             self.position_mm / 1e3,
@@ -79,7 +78,7 @@ class BearingTable(TomlTable, frozen=True):
 
 
 class MassTable(TomlTable, frozen=True):
-    """A lumped mass: a pulley, a balance ring."""
+    """Lumped mass, for example a pulley or a balance ring."""
 
     position_mm: NotNegative
     mass_kg: NotNegative
@@ -87,13 +86,13 @@ class MassTable(TomlTable, frozen=True):
     polar_inertia_kg_mm2: NotNegative = 0.0
 
     def build(self) -> LumpedMass:
-        """The mass in SI units."""
+        """Build the mass in SI units."""
         inertias = self.diametral_inertia_kg_mm2 / 1e6, self.polar_inertia_kg_mm2 / 1e6
         return LumpedMass(self.position_mm / 1e3, self.mass_kg, *inertias)
 
 
 class JointTable(TomlTable, frozen=True):
-    """A joint: tool in holder, holder in spindle."""
+    """Joint: tool in holder, or holder in spindle."""
 
     position_mm: Positive
     stiffness_n_per_um: Positive
@@ -101,13 +100,13 @@ class JointTable(TomlTable, frozen=True):
     group: str = ""
 
     def build(self) -> Joint:
-        """The joint in SI units."""
+        """Build the joint in SI units."""
         stiffness = self.stiffness_n_per_um * 1e6
         return Joint(self.position_mm / 1e3, stiffness, self.rotational_stiffness_n_m_per_rad, group=self.group)
 
 
 class SpindleTable(TomlTable, frozen=True):
-    """[spindle]: the model; optional."""
+    """Table [spindle]: the spindle model."""
 
     segments: Annotated[list[SegmentTable], Meta(min_length=1)]
     bearings: Annotated[list[BearingTable], Meta(min_length=1)]
@@ -124,7 +123,6 @@ class SpindleTable(TomlTable, frozen=True):
     label: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse parts off the shaft, a tool as long as the shaft, and whatever else is no spindle."""
         length = sum(segment.length_mm for segment in self.segments)
         kinds: dict[str, Sequence[BearingTable | MassTable | JointTable]] = {
             "bearing": self.bearings,
@@ -146,7 +144,7 @@ class SpindleTable(TomlTable, frozen=True):
         _check_model(self.build)
 
     def build(self) -> Spindle:
-        """The spindle in SI units."""
+        """Build the spindle in SI units."""
         return Spindle(
             [segment.build() for segment in self.segments],
             [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings],
@@ -169,7 +167,7 @@ def _to_metres(millimetres: float | None) -> float | None:
 
 
 def _check_model(build: Callable[[], Spindle]) -> None:
-    """Refuse what is left to refuse, in the words of dsm, which are in SI units."""
+    """Refuse what dsm refuses, whose messages are in SI units."""
     try:
         build()
     except ValueError as error:
@@ -177,7 +175,7 @@ def _check_model(build: Callable[[], Spindle]) -> None:
 
 
 class ToolTable(TomlTable, frozen=True):
-    """[[tool]]: a tool; segments, from its tip to where it leaves the holder, are for one that the model predicts."""
+    """Table [[tool]]; segments from the tip to the holder are for a tool that the model predicts."""
 
     name: Annotated[str, Meta(min_length=1)]
     segments: tuple[SegmentTable, ...] = ()
@@ -193,7 +191,6 @@ class ToolTable(TomlTable, frozen=True):
     max_speed_rpm: Positive | None = None
 
     def __post_init__(self) -> None:
-        """Refuse pitches that are none, ranges that do not rise, and masses on nothing."""
         convert_pitch(self.pitch_deg, self.teeth or len(self.pitch_deg or ()))
         for key in ("cutting_speed_m_min", "feed_per_tooth_mm"):
             value = getattr(self, key)
@@ -206,7 +203,7 @@ class ToolTable(TomlTable, frozen=True):
             raise ValueError("masses without segments; give the shape of the tool too, or leave the masses out")
 
     def build(self, spindle: Spindle) -> Spindle:
-        """The tool as a free shaft in SI units, of the spindle's theory and material where it names none."""
+        """Build the tool as a free shaft in SI units, with defaults of the spindle."""
         return Spindle(
             [segment.build() for segment in self.segments],
             (),
@@ -218,5 +215,5 @@ class ToolTable(TomlTable, frozen=True):
         )
 
     def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
-        """The whole spindle with this tool in place of the one drawn."""
+        """Return the spindle with this tool instead of the drawn one."""
         return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))

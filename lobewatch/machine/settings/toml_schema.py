@@ -15,15 +15,15 @@ from acquisition import check_name
 Positive = Annotated[float, Meta(gt=0, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
 PositiveOrInfinite = Annotated[float, Meta(gt=0)]
-"""Number that may be infinite, for "rigid" or "no limit"."""
+"""Positive number; infinite for "rigid" or "no limit"."""
 
 
 class TomlTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of machine.toml: unknown keys are refused."""
+    """Table of machine.toml that refuses unknown keys."""
 
 
 def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
-    """ValueError with its place for the first text, in whatever table, with a control character in it."""
+    """Raise ValueError with its place for the first text that contains a control character."""
     for key, value in table.items():
         if isinstance(value, str):
             check_name(value, f"{place}{key}")
@@ -38,17 +38,18 @@ def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
 RANGE_ERROR_HINTS = {
     "helix_deg": "give the angle from the axis, 0 up to 90 deg; left-hand flutes cut alike, without a sign"
 }
-"""What to do about a number that lies outside of what its key may hold."""
+"""Remedy for a number outside the range of its key."""
 
 
 def explain_validation_error(message: str, tables: Mapping[str, Any], root: type[TomlTable]) -> str:
-    """Message of msgspec on tables of a kind, with its place first and what to write instead."""
+    """Rewrite a msgspec validation error with its place first and with what to write instead."""
     text, _, place = message.partition(" - at `$")
     place = place.rstrip("`")
     where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
     unknown, choice = re.search(r"unknown field `(\w+)`", text), re.search(r"Invalid enum value (.+)", text)
     if unknown:
-        text = f"unknown key {unknown[1]!r}{_suggest_spelling(unknown[1], _find_table_type(place, root).__struct_encode_fields__)}"
+        keys = _find_table_type(place, root).__struct_encode_fields__
+        text = f"unknown key {unknown[1]!r}{_suggest_spelling(unknown[1], keys)}"
     elif choice:
         allowed = _list_choices(place, root)
         text = f"{choice[1]} is none of {', '.join(map(repr, allowed))}{_suggest_spelling(choice[1], allowed)}"
@@ -59,7 +60,7 @@ def explain_validation_error(message: str, tables: Mapping[str, Any], root: type
 
 
 def suggest_decimal_point(text: str) -> str:
-    """Hint at a decimal comma, the usual cause of a text that is no TOML."""
+    """Return a hint at a decimal comma, the usual cause of invalid TOML; empty without one."""
     match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
     return f"; write {match[1]}.{match[2]} with a point" if match else ""
 
@@ -70,7 +71,7 @@ def _suggest_spelling(word: str, words: typing.Sequence[str]) -> str:
 
 
 def _find_table_type(place: str, root: type[TomlTable]) -> type[TomlTable]:
-    """Kind of the table at a place like ".program[0]"."""
+    """Return the type of the table at a place like ".program[0]"."""
     table = root
     for key in re.findall(r"\.(\w+)", place):
         table = next(
@@ -82,7 +83,7 @@ def _find_table_type(place: str, root: type[TomlTable]) -> type[TomlTable]:
 
 
 def _list_choices(place: str, root: type[TomlTable]) -> list[str]:
-    """Words that may stand at a place like ".program[0].wear"."""
+    """Return the allowed words at a place like ".program[0].wear"."""
     parent, _, key = place.rpartition(".")
     return [
         kind for kind in _iterate_types(_find_field_type(_find_table_type(parent, root), key)) if isinstance(kind, str)
@@ -95,14 +96,14 @@ def _find_field_type(table: type[TomlTable], key: str) -> object:
 
 
 def _iterate_types(kind: object) -> Iterator[object]:
-    """All that a type is made of, itself first."""
+    """Yield a type and all types that it consists of."""
     yield kind
     for part in typing.get_args(kind):
         yield from _iterate_types(part)
 
 
 def _find_value(tables: Mapping[str, Any], place: str) -> object:
-    """Value at a place like ".program[0].depth_mm"."""
+    """Return the value at a place like ".program[0].depth_mm"."""
     value: Any = tables
     for key, number in re.findall(r"\.(\w+)|\[(\d+)\]", place):
         value = value[key] if key else value[int(number)]

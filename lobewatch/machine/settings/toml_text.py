@@ -14,14 +14,16 @@ from acquisition import DataError
 from acquisition.file_io import read_regular_file
 
 MAX_TOML_BYTES = 200_000
-"""Bytes of a machine.toml; chosen, some ten times that of a busy machine."""
+"""Largest size of machine.toml (bytes); chosen, ten times that of a busy machine."""
 DOTTED_KEY_PATTERN = re.compile(r"""(?:(?:(?<![\w-])[\w-]++|"[^"\n]*"|'[^'\n]*')\s*+\.\s*+){20}""")
-"""A key of more parts than any has; reading takes their number squared."""
+"""Key with too many parts, whose parsing time grows with the square of their number."""
 
 
 def read_toml_text(path: Path) -> str:
-    """Text of a machine file, its line ends as one character; DataError where it is no UTF-8, OSError where it is no
-    file, larger than any should be, or cannot be read."""
+    """Read the text of a machine file with unified line ends.
+
+    Raises DataError for invalid UTF-8, OSError for a file that is too large or cannot be read.
+    """
     try:
         return read_regular_file(path, MAX_TOML_BYTES).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
@@ -29,7 +31,7 @@ def read_toml_text(path: Path) -> str:
 
 
 def parse_toml_tables(text: str) -> dict[str, Any]:
-    """Tables of a machine file; tomllib.TOMLDecodeError where it is none, ValueError where they are nested too deep."""
+    """Parse the tables of a machine file; tomllib.TOMLDecodeError for invalid TOML, ValueError for deep nesting."""
     dotted = DOTTED_KEY_PATTERN.search(text)
     try:
         if dotted is not None:
@@ -41,27 +43,26 @@ def parse_toml_tables(text: str) -> dict[str, Any]:
 
 
 TomlValue = str | bool | int | float | list[str] | None
-"""Value of a key; None takes the key out."""
+"""Value of a key; None removes the key."""
 TABLE_HEADER_PATTERN = re.compile(r"(# )?\[(\[?)([\w.]+)\]?\][ \t]*(#.*)?$")
-"""Line that begins a table, or would if it were no comment."""
+"""Line that begins a table, or a commented-out one."""
 TOML_VALUE_PATTERN = r"(?:\"(?:[^\"\\]|\\.)*\"|'[^']*'|\[(?:[^\]\"]|\"(?:[^\"\\]|\\.)*\")*\]|[^#]*?)"
-"""Value in one line."""
+"""Value on one line."""
 
 
 class TablePath(NamedTuple):
-    """Table of machine.toml."""
+    """Address of a table in machine.toml."""
 
     name: str
-    """Name as in its header."""
+    """Name in its header."""
     number: int | None = None
-    """Number in a list of tables, from 0; None where there is one such table alone."""
+    """Index in an array of tables; None for a single table."""
 
 
 def edit_toml(text: str, place: TablePath, values: Mapping[str, TomlValue]) -> str:
-    """Text with these values in a table; a key or table that stands there as a comment takes the place of it.
+    """Set values of a table in the text of a machine file; a commented-out key or table is used first.
 
-    A number one above those of the list adds a table to it. DataError where the text is written in a way that this
-    cannot edit.
+    An index one above the last adds a table to its array. Raises DataError for a text that this editor cannot change.
     """
     wanted = _set_values(parse_toml_tables(text), place, values)
     lines = text.split("\n")
@@ -78,7 +79,7 @@ def edit_toml(text: str, place: TablePath, values: Mapping[str, TomlValue]) -> s
 
 
 def _set_values(tables: dict[str, Any], place: TablePath, values: Mapping[str, TomlValue]) -> dict[str, Any]:
-    """Tables as they are meant to be."""
+    """Return the tables with the new values."""
     wanted = copy.deepcopy(tables)
     *parents, last = place.name.split(".")
     table: dict[str, Any] = wanted
@@ -99,7 +100,7 @@ def _set_values(tables: dict[str, Any], place: TablePath, values: Mapping[str, T
 
 
 def _locate_table(lines: list[str], place: TablePath) -> tuple[int, int]:
-    """First and last but one line of a table, which is made where there is none."""
+    """Return the line range of a table, adding the table if necessary."""
     headers = [(i, match) for i, line in enumerate(lines) if (match := TABLE_HEADER_PATTERN.match(line))]
     named = [
         (i, match) for i, match in headers if match[3] == place.name and bool(match[2]) == (place.number is not None)
@@ -118,7 +119,7 @@ def _locate_table(lines: list[str], place: TablePath) -> tuple[int, int]:
 
 
 def _append_table(lines: list[str], place: TablePath, active: list[int]) -> int:
-    """Header behind the last table of its list, or at the end of the text."""
+    """Add a header after the last table of its array or at the end of the text, and return its line."""
     headers = [i for i, line in enumerate(lines) if TABLE_HEADER_PATTERN.match(line) and active and i > active[-1]]
     at = min(headers, default=len(lines))
     while at > 0 and (not lines[at - 1].strip() or (active and lines[at - 1].startswith("#"))):
@@ -129,7 +130,7 @@ def _append_table(lines: list[str], place: TablePath, active: list[int]) -> int:
 
 
 def _edit_line(lines: list[str], start: int, end: int, key: str, value: TomlValue) -> int:
-    """Line of a key in a stretch of lines; the number of lines that are added."""
+    """Set a key within a range of lines, and return the number of added lines."""
     key_line = re.compile(rf"(# ?)?{re.escape(key)}[ \t]*=[ \t]*({TOML_VALUE_PATTERN})([ \t]*#.*)?$")
     places = [(i, match) for i in range(start, end) if (match := key_line.match(lines[i]))]
     places.sort(key=lambda entry: entry[1][1] is not None)  # a comment counts where the key stands nowhere
@@ -149,7 +150,7 @@ def _edit_line(lines: list[str], start: int, end: int, key: str, value: TomlValu
 
 
 def _find_last_key(lines: list[str], start: int, end: int) -> int:
-    """Last line of a stretch that sets a key; its header where none does."""
+    """Return the last line of a range that sets a key, or the header line."""
     return max((i for i in range(start, end) if re.match(r"[\w\"'. -]+=", lines[i])), default=start - 1)
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from lobes import (
@@ -21,22 +20,17 @@ from lobes import (
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.machine_file import USER_SOURCE, Machine
 
-PROGRAM_KEYS_BY_TOOL_FIELD: Mapping[str, str] = MappingProxyType(
-    {
-        "teeth": "teeth",
-        "diameter_mm": "tool_diameter_mm",
-        "helix_deg": "helix_deg",
-        "flute_length_mm": "flute_length_mm",
-        "pitch_deg": "pitch_deg",
-        "feed_mm": "feed_per_tooth_mm",
-    }
-)
-"""Fields that the programs of a tool know too, with the key that they have there."""
+PROGRAM_KEYS_BY_TOOL_FIELD: Mapping[str, str] = {
+    **{name: name for name in ("teeth", "helix_deg", "flute_length_mm", "pitch_deg")},
+    "diameter_mm": "tool_diameter_mm",
+    "feed_mm": "feed_per_tooth_mm",
+}
+"""Fields of a tool that its programs have too, with the key in a [[program]]."""
 
 
 @dataclass(frozen=True)
 class ToolProperties:
-    """A tool; None where neither its [[tool]] nor its programs, all alike, say it."""
+    """Tool as described by its [[tool]] or by all of its programs; None for unknown values."""
 
     name: str
     """Name of the tool."""
@@ -47,35 +41,48 @@ class ToolProperties:
     helix_deg: float | None = None
     """Helix angle (deg)."""
     flute_length_mm: float | None = None
-    """Length of its flutes (mm)."""
+    """Flute length (mm)."""
     pitch_deg: tuple[float, ...] | None = None
-    """Angles from tooth to tooth (deg); None for evenly spaced ones."""
+    """Angles from tooth to tooth (deg); None for equal pitch."""
     tool_material: ToolMaterial | None = None
-    """Material of its edges."""
+    """Material of the cutting edges."""
     cutting_speed_m_min: tuple[float, float] | None = None
-    """Least and greatest speed of the edge that machine.toml gives it (m/min)."""
+    """Lowest and highest cutting speed of machine.toml (m/min)."""
     feed_per_tooth_mm: tuple[float, float] | None = None
-    """Least and greatest feed per tooth that machine.toml gives it (mm)."""
+    """Lowest and highest feed per tooth of machine.toml (mm)."""
     max_speed_rpm: float = math.inf
-    """Fastest speed that it may turn at (rpm), as of an unbalanced holder or an insert cutter."""
+    """Speed limit (rpm), for example of an unbalanced holder."""
     feed_mm: float | None = None
-    """Feed per tooth that its programs run with (mm)."""
+    """Feed per tooth of its programs (mm)."""
 
 
 def find_tool_properties(machine: Machine, name: str) -> ToolProperties:
-    """All that machine.toml says of a tool; a tool that it does not name at all has a name alone."""
-    table = next((tool for tool in machine.tool if tool.name == name), None)
+    """Return all that machine.toml says about a tool.
+
+    Parameters
+    ----------
+    machine
+        Machine with its tools and programs.
+    name
+        Name of the tool.
+
+    Returns
+    -------
+    ToolProperties
+        Properties of the tool; only the name if machine.toml does not mention it.
+    """
+    table = machine.tool_table(name)
     programs = [program for program in machine.all_programs if program.tool == name]
-    known: dict[str, Any] = {}
+    common: dict[str, Any] = {}
     for field, key in PROGRAM_KEYS_BY_TOOL_FIELD.items():
         values = {getattr(program, key) for program in programs}
-        known[field] = next(iter(values)) if len(values) == 1 else None
+        common[field] = values.pop() if len(values) == 1 else None
     if table is None:
-        return ToolProperties(name, **known)
+        return ToolProperties(name, **common)
     own = {field: value for field in PROGRAM_KEYS_BY_TOOL_FIELD if (value := getattr(table, field, None)) is not None}
     return ToolProperties(
         name,
-        **known | own,
+        **common | own,
         tool_material=table.tool_material,
         cutting_speed_m_min=_to_range(table.cutting_speed_m_min),
         feed_per_tooth_mm=_to_range(table.feed_per_tooth_mm),
@@ -84,95 +91,109 @@ def find_tool_properties(machine: Machine, name: str) -> ToolProperties:
 
 
 def find_feed_per_tooth(machine: Machine, table: CutTable) -> float | None:
-    """Feed per tooth (mm) that power and torque follow from: the cut's own, else the greatest of its [[tool]]."""
+    """Return the feed per tooth (mm) of a cut, else the largest of its [[tool]]; None if unknown."""
     tool = machine.find_tool(table)
-    borne = None if tool is None else _to_range(tool.feed_per_tooth_mm)
-    return table.feed_per_tooth_mm or (None if borne is None else borne[1])
+    allowed = None if tool is None else _to_range(tool.feed_per_tooth_mm)
+    return table.feed_per_tooth_mm or (allowed and allowed[1])
 
 
 def _to_range(value: float | tuple[float, ...] | None) -> tuple[float, float] | None:
-    """A number alone is the greatest."""
+    """Return a range; a single number is the upper limit."""
     if value is None:
         return None
     return (value[0], value[1]) if isinstance(value, tuple) else (0.0, value)
 
 
 class MissingToolData(StrEnum):
-    """What must be known of a tool and is not: a key of [[tool]], or of the cut."""
+    """Unknown property of a tool: a key of its [[tool]] or of the cut."""
 
     TOOL_MATERIAL = "tool_material"
-    """Material of its edges."""
+    """Material of the cutting edges."""
     MATERIAL = "material"
-    """Group of ISO 513 of what is cut: Kt and Kr alone do not say it, nor does a [[material]] without iso_group."""
+    """ISO 513 group of the workpiece; Kt and Kr do not imply it."""
     CUTTING_SPEED = "cutting_speed_m_min"
-    """Its cutting speed, where none is published for what it is and cuts."""
+    """Cutting speed, if none is published."""
     FEED_PER_TOOTH = "feed_per_tooth_mm"
-    """Its feed per tooth, likewise."""
+    """Feed per tooth, if none is published."""
 
 
 class AllowedRange(NamedTuple):
-    """Range that a tool bears."""
+    """Range that a tool allows."""
 
     low: float
-    """Least value; 0 where there is none, as of what is only known not to be borne by any tool."""
+    """Lower limit; 0 without one."""
     high: float
-    """Greatest value."""
+    """Upper limit."""
     source: str
     """Publications, or machine.toml."""
 
 
 @dataclass(frozen=True)
 class ToolLimits:
-    """What a tool bears in a cut."""
+    """Limits of a tool in a cut."""
 
     tool: ToolProperties
-    """Tool, as machine.toml knows it."""
+    """Tool with its known properties."""
     cut: CutKind
-    """Slot or side."""
+    """Kind of the cut, slot or side."""
     low_rpm: float
-    """Slowest speed (rpm): of the spindle, or where the tool begins to cut well if the spindle is fast enough."""
+    """Lowest speed (rpm) of spindle and tool."""
     high_rpm: float
-    """Fastest speed (rpm) of spindle and tool; below `low_rpm` where the spindle cannot turn so slowly."""
+    """Highest speed (rpm) of spindle and tool; below `low_rpm` if no speed is allowed."""
     cutting_speed_m_min: AllowedRange | None
-    """Speeds of the edge (m/min); None where none is known."""
+    """Allowed cutting speeds (m/min); None if unknown."""
     feed_per_tooth_mm: AllowedRange | None
-    """Feeds per tooth (mm); None where none is known."""
+    """Allowed feeds per tooth (mm); None if unknown."""
     deepest_mm: float
-    """Greatest depth of cut of its flutes (mm); without a known length one diameter, or what it cuts now."""
+    """Flute length (mm); without one the diameter or the present depth."""
     missing: tuple[MissingToolData, ...] = ()
-    """Things that would have to be known to say it surely."""
+    """Properties that are unknown and would make the limits certain."""
 
     @property
     def is_empty(self) -> bool:
-        """Whether no speed of the spindle is one that the tool bears."""
+        """Whether the tool allows no speed of the spindle."""
         return self.low_rpm > self.high_rpm
 
     @property
     def is_capped(self) -> bool:
-        """Whether max_speed_rpm of its [[tool]] is what holds its fastest speed down, and not its edge."""
+        """Whether max_speed_rpm of the [[tool]] sets the highest speed."""
         return self.high_rpm == self.tool.max_speed_rpm
 
     @property
     def is_guessed(self) -> bool:
-        """Whether its speeds are no more than those of the spindle, or of the fastest tool there is."""
+        """Whether the speeds are only those of the spindle or of the fastest tool."""
         speed = self.cutting_speed_m_min
         return speed is None or (speed.low == 0 and speed.source != USER_SOURCE)
 
 
 def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
-    """What the tool of a cut bears in its material; the cut's own speed, depth and feed per tooth do not count.
+    """Return the limits of the tool of a cut in its material.
 
-    Slot or side by the radial depth on the straight. Speeds: [[tool]] cutting_speed_m_min, else what is published for
-    its material and that of the tool; where the tool's is not known, or nothing is published of it, up to the fastest
-    of all tools. Source of the published ranges: docs/tools.md.
+    Speeds come from [[tool]] cutting_speed_m_min, else from published values for both materials; without them, up to
+    the
+    fastest of all tools. Sources of the published ranges: docs/tools.md.
 
+    Parameters
+    ----------
+    machine
+        Machine with its tools and materials.
+    table
+        Cut; its speed, depth and feed per tooth are not used.
+
+    Returns
+    -------
+    ToolLimits
+        Ranges of speed and feed, largest depth, and what is unknown.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as parent:
     ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
     ...     machine = MachineFolder(toml.parent).machine
     >>> limits = find_tool_limits(machine, machine.program[0])
-    >>> limits.cut, f"{limits.low_rpm:.0f} to {limits.high_rpm:.0f} rpm", [key.value for key in limits.unknown]
+    >>> limits.cut, f"{limits.low_rpm:.0f} to {limits.high_rpm:.0f} rpm", [key.value for key in limits.missing]
     ('slot', '3000 to 24000 rpm', ['tool_material', 'material'])
     """
     tool = find_tool_properties(machine, table.tool if isinstance(table, ProgramTable) else machine.tap.tool)
@@ -195,7 +216,7 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
 
 
 def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:
-    """Speeds of the edge (m/min)."""
+    """Return the allowed cutting speeds (m/min)."""
     if tool.cutting_speed_m_min is not None:
         return AllowedRange(*tool.cutting_speed_m_min, USER_SOURCE)
     material = machine.coefficients(table)
@@ -204,22 +225,21 @@ def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, c
 
 
 def _find_feed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:
-    """Feeds per tooth (mm)."""
+    """Return the allowed feeds per tooth (mm)."""
     if tool.feed_per_tooth_mm is not None:
         return AllowedRange(*tool.feed_per_tooth_mm, USER_SOURCE)
     if tool.tool_material is None:
         return None
     diameter = table.tool_diameter_mm / 1e3
-    return _convert_published_range(
-        published_feed_per_tooth(machine.coefficients(table), tool.tool_material, cut, diameter), 1e3
-    )
+    feed = published_feed_per_tooth(machine.coefficients(table), tool.tool_material, cut, diameter)
+    return _convert_published_range(feed, 1e3)
 
 
-def _convert_published_range(known: PublishedRange | None, unit: float) -> AllowedRange | None:
-    if known is None:
+def _convert_published_range(published: PublishedRange | None, unit: float) -> AllowedRange | None:
+    if published is None:
         return None
-    names = dict.fromkeys(source.partition(": ")[0] for source in known.sources)
-    return AllowedRange(known.low * unit, known.high * unit, "; ".join(names))
+    names = dict.fromkeys(source.partition(": ")[0] for source in published.sources)
+    return AllowedRange(published.low * unit, published.high * unit, "; ".join(names))
 
 
 def _find_max_depth_mm(table: CutTable, tool: ToolProperties) -> float:
@@ -239,5 +259,7 @@ def _find_missing_data(
     if not machine.coefficients(table).iso_group:
         yield MissingToolData.MATERIAL
     elif tool.tool_material is not None:
-        yield from [MissingToolData.CUTTING_SPEED] if lacks_speed and (speed is None or speed.low == 0) else []
-        yield from [MissingToolData.FEED_PER_TOOTH] if feed is None else []
+        if lacks_speed and (speed is None or speed.low == 0):
+            yield MissingToolData.CUTTING_SPEED
+        if lacks_feed:
+            yield MissingToolData.FEED_PER_TOOTH

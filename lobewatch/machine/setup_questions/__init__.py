@@ -1,1 +1,1 @@
-"""What `lobewatch init` asks: ten questions, and what their answers make of machine.toml."""
+"""Setup questions of a new machine, and what their answers make of machine.toml."""

@@ -15,21 +15,21 @@ from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml
 
 @dataclass(frozen=True)
 class DetectedDaq:
-    """A port, and who answers there."""
+    """Port, and the DAQ that answers there."""
 
     port: str
-    """Port; empty where none is known."""
+    """Port; empty if unknown."""
     driver: str = "taps"
     """Name of the driver."""
     text: str = ""
-    """Words for the device; empty where none has answered."""
+    """Description of the device; empty if none answers."""
     channels: tuple[Channel, ...] = ()
-    """Channels that the device describes itself."""
+    """Channels that the device describes."""
     problem: str = ""
-    """Reason why nobody answers, a sentence."""
+    """Reason why no device answers, a sentence."""
 
     def sensor_text(self, quantity: str) -> str:
-        """Sensitivity of a sensor that the device describes; empty where it does not."""
+        """Return the sensitivity of a sensor that the device describes, else an empty text."""
         for channel in self.channels:
             if channel.quantity == quantity:
                 unit, factor = ("mV/N", 1e3) if quantity == "force" else ("mV/g", 1e3 * STANDARD_GRAVITY)
@@ -39,12 +39,12 @@ class DetectedDaq:
 
 
 def find_daqs() -> tuple[DetectedDaq, ...]:
-    """DAQs that answer on the USB ports of this computer."""
+    """Find the DAQs on the USB ports of this computer."""
     return _list_answering(scan_ports())
 
 
 def inspect_port(port: str) -> DetectedDaq:
-    """Who answers on a port, with a problem in place of the device where nobody does."""
+    """Return the DAQ on a port, with a problem instead of the device if none answers."""
     survey = scan_ports(port)
     answering = _list_answering(survey)
     if answering:
@@ -63,7 +63,7 @@ def _list_answering(survey: PortScan) -> tuple[DetectedDaq, ...]:
 
 
 def _read_channels(port: str, name: str) -> tuple[Channel, ...]:
-    """Channels of a device that describes its sensors."""
+    """Read the channels of a device that describes its sensors."""
     driver = find_driver(name)
     if driver.sensor_data is None:
         return ()
@@ -76,15 +76,15 @@ def _read_channels(port: str, name: str) -> tuple[Channel, ...]:
 
 @dataclass(frozen=True)
 class MachineDraft:
-    """Text of a machine.toml that is being asked for."""
+    """Text of machine.toml during setup."""
 
     text: str
-    """Text as it stands."""
+    """Present text."""
     detected_daqs: Mapping[str, DetectedDaq]
-    """DAQs that were looked at, by port."""
+    """Inspected DAQs by port."""
 
     def table(self, name: str, number: int | None = None) -> dict[str, Any]:
-        """Values of a table; none where it is not there."""
+        """Return the values of a table; empty without one."""
         table: Any = parse_toml_tables(self.text)
         for part in name.split("."):
             table = table.get(part, {})
@@ -93,24 +93,24 @@ class MachineDraft:
         return dict(table[number]) if number < len(table) else {}
 
     def set(self, name: str, number: int | None = None, /, **values: TomlValue) -> Self:
-        """With these values in a table; DataError where the text cannot be edited."""
+        """Set values of a table; DataError if the text cannot be edited."""
         return replace(self, text=edit_toml(self.text, TablePath(name, number), values))
 
     @property
     def daq(self) -> DetectedDaq:
-        """DAQ that it names, as far as it was looked at."""
+        """DAQ of the draft, as far as inspected."""
         table = self.table("daq")
         port = table.get("port", "")
         return self.detected_daqs.get(port) or DetectedDaq(port, table.get("driver", "taps"))
 
     @property
     def needs_sensors(self) -> bool:
-        """Whether the DAQ does not know its sensors."""
+        """Whether the DAQ does not describe its sensors."""
         return find_driver(self.table("daq").get("driver", "taps")).sensor_data is None
 
     @property
     def missing_sensors(self) -> list[str]:
-        """Sensors that are needed and were not told of yet, by the names of their questions."""
+        """Missing sensors, by the names of their questions."""
         wanted = {} if self.has_no_force_sensor else {"hammer": "force"}
         wanted["accelerometer"] = "acceleration"
         known = [channel.get("quantity") for channel in self.table("daq").get("channel", ())]
@@ -118,69 +118,49 @@ class MachineDraft:
 
     @property
     def has_no_force_sensor(self) -> bool:
-        """Whether no hammer measures its force."""
+        """Whether no hammer measures force."""
         return self.table("tap").get("hammer") == "none"
 
     def checked(self) -> Self:
-        """The same; DataError where it is no machine file."""
+        """Return itself; DataError if the text is no machine file."""
         if not self.missing_sensors:
             parse_machine_file(self.text)
         return self
 
 
-def _always_ask(_: MachineDraft) -> str:
-    return ""
-
-
 @dataclass(frozen=True)
 class SetupQuestion:
-    """Something that machine.toml needs and only a person knows."""
+    """Question about a setting that only a person knows."""
 
     name: str
-    """Name, as in --edit NAME, and of the option that answers it."""
+    """Name of the question."""
     text: str
-    """Words of the question."""
+    """Text of the question."""
     example: str
-    """Answer that somebody else might give."""
+    """Example of an answer."""
     read_current: Callable[[MachineDraft], str]
-    """Function that gives the answer that stands there already, "-" where it was left open, "" where there is none."""
+    """Function that returns the present answer, "-" if left open, "" without one."""
     apply_answer: Callable[[MachineDraft, str], MachineDraft]
-    """Function that takes an answer; ValueError for one that is none."""
-    skip_reason: Callable[[MachineDraft], str] = _always_ask
-    """Function that gives the reason why nothing is asked; empty where it is."""
+    """Function that applies an answer; ValueError for an invalid one."""
+    skip_reason: Callable[[MachineDraft], str] = lambda _: ""
+    """Function that returns the reason to skip the question, else an empty text."""
 
 
 OPEN_ANSWER = "-"
-"""Answer that leaves something open."""
-ANSWER_UNITS = (
-    "rpm",
-    "1/min",
-    "mm",
-    "mm/tooth",
-    "deg",
-    "°",
-    "kw",
-    "nm",
-    "n·m",
-    "mv/n",
-    "mv/g",
-    "g",
-    "v",
-    "teeth",
-    "flutes",
-    "x",
-)
-"""Words that may stand between numbers."""
+"""Answer that leaves a question open."""
+ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
+ANSWER_UNITS |= {"teeth", "flutes"}
+"""Units that may stand between numbers."""
 ANSWER_NUMBER_PATTERN = re.compile(r"\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
 
 
 def is_open_answer(answer: str) -> bool:
-    """Whether an answer leaves it open."""
+    """Tell whether an answer leaves a question open."""
     return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
 
 
 def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -> list[float]:
-    """Numbers of an answer, as many as there are names, or at least so many; ValueError that names them."""
+    """Parse the numbers of an answer, at least `least` or one per name; ValueError names them."""
     words = ANSWER_NUMBER_PATTERN.sub(" ", answer)
     strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
     if strange:
@@ -193,5 +173,5 @@ def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -
 
 
 def format_answer_number(value: float) -> str:
-    """A number as it is typed."""
+    """Format a number as it is typed."""
     return f"{value:.10g}"

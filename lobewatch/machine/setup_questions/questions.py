@@ -6,80 +6,69 @@ from typing import Any
 
 from lobes import TOOL_MATERIALS, ToolMaterial
 from lobewatch.machine.settings.toml_text import TomlValue
-from lobewatch.machine.setup_questions.draft import (
-    OPEN_ANSWER,
-    MachineDraft,
-    SetupQuestion,
-    format_answer_number,
-    is_open_answer,
-    parse_numbers,
-)
-from lobewatch.machine.setup_questions.sensor_questions import (
-    ACCELEROMETER_QUESTION,
-    DAQ_QUESTION,
-    HAMMER_QUESTION,
-    MOUNTING_QUESTION,
-)
+from lobewatch.machine.setup_questions import draft as setup
+from lobewatch.machine.setup_questions.sensor_questions import SENSOR_QUESTIONS
 
 
-def _current_name(draft: MachineDraft) -> str:
+def _current_name(draft: setup.MachineDraft) -> str:
     return str(draft.table("machine")["name"])
 
 
-def _set_name(draft: MachineDraft, answer: str) -> MachineDraft:
+def _set_name(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
     return draft.set("machine", name=answer.strip())
 
 
-def _current_speeds(draft: MachineDraft) -> str:
+def _current_speeds(draft: setup.MachineDraft) -> str:
     speed = draft.table("speed")
-    return f"{format_answer_number(speed.get('low_rpm', 1000))} {format_answer_number(speed.get('high_rpm', 24000))}"
+    limits = speed.get("low_rpm", 1000), speed.get("high_rpm", 24000)
+    return " ".join(map(setup.format_answer_number, limits))
 
 
-def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
-    low, high = parse_numbers(answer, ("lowest speed in rpm", "highest speed in rpm"))
+def _set_speeds(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+    low, high = setup.parse_numbers(answer, ("lowest speed in rpm", "highest speed in rpm"))
     return draft.set("speed", low_rpm=low, high_rpm=high)
 
 
-def _current_drive(draft: MachineDraft) -> str:
+def _current_drive(draft: setup.MachineDraft) -> str:
     drive = draft.table("drive")
-    known = [format_answer_number(drive[key]) for key in ("power_kw", "torque_nm") if key in drive]
-    return " ".join(known) if len(known) == 2 else OPEN_ANSWER
+    known = [setup.format_answer_number(drive[key]) for key in ("power_kw", "torque_nm") if key in drive]
+    return " ".join(known) if len(known) == 2 else setup.OPEN_ANSWER
 
 
-def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
-    if is_open_answer(answer):
+def _set_drive(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+    if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
-    power, torque = parse_numbers(answer, ("power in kW", "torque in N m"))
+    power, torque = setup.parse_numbers(answer, ("power in kW", "torque in N m"))
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
-NAME_QUESTION = SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name)
-SPEEDS_QUESTION = SetupQuestion(
+NAME_QUESTION = setup.SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name)
+SPEEDS_QUESTION = setup.SetupQuestion(
     "speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds
 )
-DRIVE_QUESTION = SetupQuestion(
+DRIVE_QUESTION = setup.SetupQuestion(
     "drive", "Power (kW) and torque (N m) of the spindle motor?", "15 40", _current_drive, _set_drive
 )
 
 
 DEFAULT_PROGRAM_NAME = "first cut"
-"""Name of the program, where nobody gives it one."""
+"""Name of the first program if the answer has none."""
 SETUP_COEFFICIENT_KEYS = ("tangential_n_per_mm2", "radial_n_per_mm2")
-"""Keys that stand for a material ..."""
+"""Keys of the coefficients that replace a material."""
 SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
-"""... and their values in a new machine.toml, which are nobody's."""
+"""Values of these keys in a new machine.toml."""
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
-def _current_tool(draft: MachineDraft) -> str:
+def _current_tool(draft: setup.MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    numbers = [format_answer_number(value) for value in (*values, *([stick_out] if stick_out else []))]
+    numbers = [setup.format_answer_number(value) for value in (*values, *([stick_out] if stick_out else []))]
     made_of = draft.table("tool", _tool_number(draft)).get("tool_material")
     return " ".join([*numbers, *([made_of] if made_of else [])])
 
 
-def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
+def _set_tool(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
     names = (
         "teeth",
         "diameter in mm",
@@ -87,7 +76,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
         f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)",
     )
     numbers, made_of = _split_tool_answer(answer)
-    teeth, diameter, helix, *stick_out = parse_numbers(numbers, names, 3)
+    teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} teeth; the number of teeth comes first")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
@@ -100,38 +89,38 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
-    """Numbers of a tool, and what it is made of where that stands behind them."""
+    """Split an answer into numbers and the tool material."""
     for material in sorted(TOOL_MATERIALS, key=len, reverse=True):
         if answer.strip().casefold().endswith(f" {material.casefold()}"):
             return answer.strip()[: -len(material)], material
     return answer, None
 
 
-def _tool_number(draft: MachineDraft) -> int:
-    """Number of the [[tool]] that is tapped, or of a new one."""
+def _tool_number(draft: setup.MachineDraft) -> int:
+    """Return the index of the [[tool]] of the tapped tool, or of a new one."""
     number = 0
     while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
         number += 1
     return number
 
 
-def _current_material(draft: MachineDraft) -> str:
+def _current_material(draft: setup.MachineDraft) -> str:
     cut = draft.table("reference_cut")
     if "material" in cut:
         return str(cut["material"])
     pair = tuple(cut[key] for key in SETUP_COEFFICIENT_KEYS if key in cut)
     return (
-        OPEN_ANSWER
+        setup.OPEN_ANSWER
         if pair in (SETUP_TEMPLATE_COEFFICIENTS, ())
-        else " ".join(format_answer_number(value) for value in pair)
+        else " ".join(setup.format_answer_number(value) for value in pair)
     )
 
 
-def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
-    if is_open_answer(answer):
+def _set_material(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+    if setup.is_open_answer(answer):
         return draft
     try:
-        tangential, radial = parse_numbers(answer, ("Kt", "Kr"))
+        tangential, radial = setup.parse_numbers(answer, ("Kt", "Kr"))
         material = None
     except ValueError:
         tangential, radial, material = None, None, answer.strip()
@@ -140,51 +129,50 @@ def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
     )
 
 
-def _set_in_all_cuts(draft: MachineDraft, values: dict[str, TomlValue]) -> MachineDraft:
-    """Reference cut and first program, where there is one."""
+def _set_in_all_cuts(draft: setup.MachineDraft, values: dict[str, TomlValue]) -> setup.MachineDraft:
+    """Set values of the reference cut and of the first program."""
     draft = draft.set("reference_cut", **values)
     return draft.set("program", 0, **values) if draft.table("program", 0) else draft
 
 
-def _current_program(draft: MachineDraft) -> str:
+def _current_program(draft: setup.MachineDraft) -> str:
     program = draft.table("program", 0)
     if not program:
-        return OPEN_ANSWER
+        return setup.OPEN_ANSWER
     keys = ("speed_rpm", "depth_mm", "radial_depth_mm", "feed_per_tooth_mm")
-    return f"{program['name']}: " + " ".join(format_answer_number(program[key]) for key in keys if key in program)
+    return f"{program['name']}: " + " ".join(setup.format_answer_number(program[key]) for key in keys if key in program)
 
 
-def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
-    if is_open_answer(answer):
+def _set_program(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+    if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
     names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (may be left out)")
-    speed, depth, radial, *feed = parse_numbers(numbers, names, 3)
+    speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
-    own: dict[str, TomlValue] = {
-        "name": name.strip() if colon else DEFAULT_PROGRAM_NAME,
-        "tool": draft.table("tap")["tool"],
-    }
-    setting = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
-    return draft.set("program", 0, **own, **shared, **setting, feed_per_tooth_mm=feed[0] if feed else None)
+    name = name.strip() if colon else DEFAULT_PROGRAM_NAME
+    setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
+    setting["feed_per_tooth_mm"] = feed[0] if feed else None
+    return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
-TOOL_QUESTION = SetupQuestion(
+TOOL_QUESTION = setup.SetupQuestion(
     "tool",
-    f"The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of {_TOOL_MATERIALS_TEXT}?",
+    "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of "
+    f"{_TOOL_MATERIALS_TEXT}?",
     "4 20 30 80 coated carbide",
     _current_tool,
     _set_tool,
 )
-MATERIAL_QUESTION = SetupQuestion(
+MATERIAL_QUESTION = setup.SetupQuestion(
     "material",
-    "What does it cut? A material (lobewatch materials lists them), or Kt and Kr (N/mm2)",
+    "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)",
     "42CrMo4, 1.7225, AA 6061, 700 250",
     _current_material,
     _set_material,
 )
-PROGRAM_QUESTION = SetupQuestion(
+PROGRAM_QUESTION = setup.SetupQuestion(
     "program",
     "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?",
     "slot: 8000 2 20 0.1",
@@ -193,25 +181,22 @@ PROGRAM_QUESTION = SetupQuestion(
 )
 
 
-SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
+SETUP_QUESTIONS: tuple[setup.SetupQuestion, ...] = (
     NAME_QUESTION,
     SPEEDS_QUESTION,
     DRIVE_QUESTION,
-    DAQ_QUESTION,
-    HAMMER_QUESTION,
-    ACCELEROMETER_QUESTION,
-    MOUNTING_QUESTION,
+    *SENSOR_QUESTIONS,
     TOOL_QUESTION,
     MATERIAL_QUESTION,
     PROGRAM_QUESTION,
 )
+"""All questions, in their order."""
 
 
-def find_setup_question(name: str) -> SetupQuestion:
-    """SetUpQuestion of a name; ValueError with all of them for one that there is not."""
+def find_setup_question(name: str) -> setup.SetupQuestion:
+    """Return the question of a name; ValueError that lists all names."""
     for question in SETUP_QUESTIONS:
         if question.name == name:
             return question
-    raise ValueError(
-        f"--edit {name}: no such question; there are {', '.join(question.name for question in SETUP_QUESTIONS)}"
-    )
+    names = ", ".join(question.name for question in SETUP_QUESTIONS)
+    raise ValueError(f"find_setup_question.name {name}: no such question; there are {names}")

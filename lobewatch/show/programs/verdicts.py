@@ -22,6 +22,7 @@ from lobewatch.verdicts import Stability, Verdict
 from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
 UNCERTAINTY_PAGE = "docs/lobes.md"
 """Page that explains the uncertainties."""
@@ -97,12 +98,12 @@ def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly,
         return
     missing = "y" if "x" in assembly.directions else "x"
     lacking = "usable" if missing in assembly.unusable else "tapped"
-    about = {"prediction": "by the prediction", "untapped": f"in {missing}, not {lacking}"}
-    for cause, widths in doubt.modes.items():
-        if cause == "clamping":
-            yield from _reclamping_parts(widths, assembly, given)
+    for name, widths in doubt.modes.items():
+        label = UNCERTAINTY_CAUSES[name].label.format(direction=missing, lacking=lacking)
+        if name == CLAMPING.name:
+            yield from _reclamping_parts(widths, label, assembly, given)
         elif np.any(widths > MIN_SHOWN_WIDTH):
-            yield f"{_widths_text(np.max(widths, axis=0))} {about.get(cause, 'by the tap test')}"
+            yield f"{_widths_text(np.max(widths, axis=0))} {label}"
     if doubt.axes is not None and doubt.axes.sign_count:
         yield "modes askew to either side (cross not tapped)"
     yield f"speed {_half_width_text(doubt.speed)}" + (
@@ -121,10 +122,10 @@ def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     yield f"speed {_half_width_text(speed)}"
 
 
-def _reclamping_parts(widths: Floats, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
+def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
     rows = {"x": 0, "y": len(assembly.x or ())}
     texts = {
-        name: f"{_widths_text(widths[rows[name]])} from tap to tap ({_scatter_source_text(assembly, name, given)})"
+        name: f"{_widths_text(widths[rows[name]])} {label} ({_scatter_source_text(assembly, name, given)})"
         for name in assembly.directions
     }
     if len(set(texts.values())) == 1:

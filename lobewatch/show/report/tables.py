@@ -17,6 +17,7 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.alarm import Alarm
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
 from lobewatch.show.history import cut_result_text
@@ -55,7 +56,7 @@ def _series_row(series: SeriesStatus) -> list[str | TableCell]:
         "0" if trend is None else str(len(trend.points)),
         f"{series.time:%Y-%m-%d}",
         change_since_start_text(series),
-        "-" if trend is None else rate_text(trend) or "from 8 points on",
+        "-" if trend is None else rate_text(trend) or f"from {MIN_FORECAST_POINTS} points on",
     ]
 
 
@@ -139,6 +140,8 @@ NOT_DETECTED: Sequence[str] = (
     "what has happened since the newest tap test",
 )
 """Damage that no tap test detects."""
+TOO_FEW_CLAMPINGS = f"no alarm by scatter below {MIN_MONITORED_POINTS} clampings"
+"""Confidence of the alarm of a short series."""
 ALARM_CONFIDENCE = (
     "alarm: two clampings running, each with a chance of 1 in 2000 of being scatter alone; of 100 healthy series 5 "
     "raise one in 60 clampings"
@@ -151,7 +154,7 @@ DATE_CONFIDENCE = "dates: 80 % ranges, if the machine is used as before"
 def make_provenance(data: ReportData) -> list[Section]:
     """Make the last section: what was measured with what, how sure it is, and room for a signature."""
     points = 0 if data.series.trend is None else len(data.series.trend.points)
-    alarm = ALARM_CONFIDENCE if points > MIN_FORECAST_POINTS else "no alarm by scatter below 9 clampings"
+    confidence = ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS
     tap = data.newest
     rows = [
         ("machine", data.machine.machine.name),
@@ -162,7 +165,7 @@ def make_provenance(data: ReportData) -> list[Section]:
         ("device", tap.circumstances.device or "not known: a recorded file"),
         *((SENSOR_NAMES[channel.quantity], _sensor_text(channel)) for channel in _channels(tap)),
         ("failure mode watched", FAILURE_MODE),
-        ("confidence", f"{alarm}; {DATE_CONFIDENCE}"),
+        ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
         *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
         ("name, date, signature", ""),
     ]

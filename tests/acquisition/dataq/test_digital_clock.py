@@ -1,4 +1,4 @@
-"""The loss of whole scans, which moves no word, is told by the periods of a square wave on digital input 0."""
+"""Loss of whole scans, which moves no word, is detected by the periods of a square wave on digital input 0."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ N = 4000
 
 
 def scans(period: float, jitter: float = 0.0, start: float = 0.3) -> NDArray[np.int16]:
-    """Two noisy inputs and the digital word, shape (N, 3); input 0 alternates with this period (scans)."""
+    """Return two noisy inputs and the digital word, shape (N, 3). Input 0 alternates with this period (scans)."""
     random = np.random.default_rng(1)
     phase = np.arange(N) + random.uniform(-jitter, jitter, N)
     high = (phase / period + start) % 1 < 0.5
@@ -31,7 +31,7 @@ def decoded(stream: bytes, cuts: list[int]) -> list[CodeBlock]:
 
 
 def gaps(pieces: list[CodeBlock]) -> list[tuple[int, int]]:
-    """Scans that came before each gap, and scans missing in it."""
+    """Return the scans before each gap and the scans missing in it."""
     came = np.cumsum([0] + [codes.shape[1] for codes, _ in pieces])
     return [(int(at), lost) for at, (_, lost) in zip(came[:-1], pieces, strict=True) if lost]
 
@@ -57,7 +57,7 @@ def test_an_even_wave_is_no_loss(period: float, start: float, cuts: list[int]) -
 def test_whole_scans_that_are_lost_are_told_with_their_number(
     period: float, packets: int, at: int, inside: int, cuts: list[int]
 ) -> None:
-    """Three packets of 64 bytes are 32 scans of 6 bytes; a wave that jumps up at the cut tells two parts."""
+    """Lose three packets of 64 bytes, 32 scans of 6 bytes. A jump of the wave at the cut separates two parts."""
     lost = 32 * packets // 3
     beyond = min(lost % period, -lost % period)
     stream = scans(period).tobytes()

@@ -1,4 +1,4 @@
-"""Bare byte streams of a DATAQ device: cut anywhere they decode to the same scans, and lost bytes are found."""
+"""Byte streams of a DATAQ device: they decode to the same scans wherever they are cut, and losses are detected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PULLED_UP = 0x7F00
 
 
 def noise(n: int, seed: int, digital: int | None = PULLED_UP) -> NDArray[np.int16]:
-    """Scans of two noisy inputs and, where wanted, the digital word, shape (n, 2 or 3)."""
+    """Return scans of two noisy inputs and optionally the digital word, shape (n, 2 or 3)."""
     words = np.random.default_rng(seed).normal(scale=20.0, size=(n, 2)).astype("<i2")
     return words if digital is None else np.column_stack([words, np.full(n, digital, "<i2")])
 
@@ -28,7 +28,7 @@ def decoded(stream: bytes, digital: bool = True, cuts: list[int] | None = None) 
 
 
 def placed(pieces: list[CodeBlock]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Codes (2, n) and the index of each scan."""
+    """Return codes (2, n) and the index of each scan."""
     indices, at = [], 0
     for codes, lost in pieces:
         indices.append(at + lost + np.arange(codes.shape[1]))
@@ -75,7 +75,7 @@ def test_lost_bytes_are_found_and_the_scans_after_them_stand_in_their_place(
 @example(seed=0, places=[(200, 1), (307, 5)])
 @example(seed=0, places=[(1200, 64), (1290, 128)])
 def test_no_scan_is_ever_made_up(seed: int, places: list[tuple[int, int]]) -> None:
-    """Each decoded scan is one that was sent, in order, unless whole scans' worth of bytes is lost within one scan."""
+    """Check that each decoded scan was sent, in order, unless the bytes of whole scans are lost within one scan."""
     words = noise(1600, seed)
     stream = words.tobytes()
     before = 0
@@ -90,7 +90,7 @@ def test_no_scan_is_ever_made_up(seed: int, places: list[tuple[int, int]]) -> No
 
 
 def test_three_packets_in_a_row_are_not_seen_by_the_digital_word() -> None:
-    """192 bytes are 32 scans of 6 bytes: the limit of this detector, said in docs/devices.md."""
+    """Lose 192 bytes, 32 scans of 6 bytes: the limit of this detector, see docs/devices.md."""
     stream = noise(600, 1).tobytes()
     assert not any(lost for _, lost in decoded(stream[:600] + stream[600 + 192 :]))
 

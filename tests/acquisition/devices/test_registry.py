@@ -1,4 +1,4 @@
-"""Drivers of other packages: found, refused with the name of their package, asked only where the vendor fits."""
+"""Drivers of other packages: found, rejected with the name of their package, and probed only if the vendor fits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Install = Callable[[str, str], None]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
-    """Puts a package with a driver `odd` on the path: its name, and what the entry point leads to."""
+    """Install a package with a driver `odd`: its name, and what the entry point leads to."""
 
     def put(package: str, target: str) -> None:
         folder = tmp_path / package
@@ -56,9 +56,9 @@ def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPa
     ("target", "message"),
     [
         ("no_such_module:DRIVER", "cannot be loaded (ModuleNotFoundError: No module named 'no_such_module')"),
-        ("acquisition.devices.built_in:NOTHING", "cannot be loaded (AttributeError: "),
-        ("acquisition.devices.registry:GROUP", "of the package bad is no acquisition.Driver"),
-        ("acquisition.devices.built_in:BUILT_IN.__class__", "of the package bad is no acquisition.Driver"),
+        ("acquisition.devices.drivers:NOTHING", "cannot be loaded (AttributeError: "),
+        ("acquisition.devices.registry:DRIVER_ENTRY_POINTS", "of the package bad is no acquisition.Driver"),
+        ("acquisition.devices.drivers:BUILT_IN_DRIVERS.__class__", "of the package bad is no acquisition.Driver"),
     ],
 )
 def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Install, target: str, message: str) -> None:
@@ -94,7 +94,7 @@ def test_a_name_that_nobody_brings() -> None:
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """A pseudo-terminal at which nobody answers."""
+    """Open a pseudo-terminal at which nobody answers."""
     ends = os.openpty()
     tty.setraw(ends[1])
     yield os.ttyname(ends[1])

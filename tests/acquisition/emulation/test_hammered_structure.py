@@ -1,4 +1,4 @@
-"""The exact response to a pulse against numerical integration, and its limits."""
+"""Exact response to a pulse against numerical integration, and its limits."""
 
 from __future__ import annotations
 

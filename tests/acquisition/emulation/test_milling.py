@@ -1,4 +1,4 @@
-"""Milling in time against harmonic balance, Floquet multipliers, a plain simulation, and symmetries."""
+"""Milling in the time domain against harmonic balance, Floquet multipliers, a plain simulation, and symmetries."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ DOWN = Cut(2, 0.6, "down", 6e8, 2e8)
 
 
 def middle(motion: TipMotion, seconds: float, end: float = 0.64) -> Floats:
-    """Acceleration over the last whole numbers of samples before `end` (s)."""
+    """Return the acceleration over the last whole numbers of samples before `end` (s)."""
     last, n = round(end * motion.sample_rate), round(seconds * motion.sample_rate)
     return motion.acceleration[:, last - n : last]
 
@@ -65,7 +65,7 @@ def receptance(modes: tuple[tuple[float, float, float], ...], omega: NDArray[Any
 
 
 def balanced(cut: MillingCut, points: int) -> Floats:
-    """Acceleration (2, points) over a turn of a stable cut fed along x that never loses contact, by collocation."""
+    """Return the acceleration (2, points) over a turn of a stable cut along x in permanent contact, by collocation."""
     omega = 2 * np.pi * np.fft.fftfreq(points, 60 / cut.speed_rpm / points)
     half = np.pi / points
     turn = 2 * half * (np.arange(points) + 0.5)
@@ -110,7 +110,7 @@ def test_a_stable_cut_vibrates_as_harmonic_balance_says(runout: tuple[float, flo
 
 
 def multiplier(cut: MillingCut, motion: TipMotion, passage: Passage) -> float:
-    """Growth a tooth period of what does not repeat with the teeth, late while it is small beside what does."""
+    """Return the growth per tooth period of the part that does not repeat with the teeth, while it is small."""
     steps = round(cut.tooth_period * motion.sample_rate)
     assert cut.tooth_period * motion.sample_rate == pytest.approx(steps)
     first = round((passage.before + passage.ramp) * motion.sample_rate) + steps
@@ -161,7 +161,7 @@ def test_chatter_has_the_frequency_of_the_lobes() -> None:
 def test_chatter_with_loss_of_contact_is_as_large_as_in_a_plain_simulation(
     cut: Cut, speed_rpm: float, depth: float
 ) -> None:
-    """The tooth leaves the cut and comes back to what was left several tooth periods ago."""
+    """Check a tooth that leaves the cut and meets the surface left several tooth periods ago."""
     made = cut_of(cut, speed_rpm, depth)
     case = Case(X, Y, 0.0, cut.teeth, cut.immersion, cut.direction, cut.tangential, cut.radial, 0.0, speed_rpm, depth)
     plain = np.ravel(plain_cut(case, STEPS, 120).motion[-80:]) * made.feed_per_tooth
@@ -172,7 +172,7 @@ def test_chatter_with_loss_of_contact_is_as_large_as_in_a_plain_simulation(
 
 
 def displacement(signal: Floats, step: float, already: bool = False) -> float:
-    """rms displacement (m) between 100 and 2000 Hz, from acceleration or displacement."""
+    """Return the rms displacement (m) between 100 and 2000 Hz, from acceleration or displacement."""
     spectrum = np.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size)) / signal.size
     frequency = np.fft.rfftfreq(signal.size, step)
     band = (frequency > 100) & (frequency < 2000)
@@ -212,7 +212,7 @@ def test_before_the_cut_the_tip_rests_and_after_it_rings_down() -> None:
 
 
 def test_a_cut_among_others_is_the_same_as_alone() -> None:
-    """The second has more teeth, which stand beside zeros of the first."""
+    """Check a second cut with more teeth, padded by zeros of the first."""
     cuts = [cut_of(HALF_UP, 7000.0, 1e-3), cut_of(replace(HALF_UP, teeth=4, immersion=0.9), 5250.0, 1e-3, y=None)]
     together = dict(simulate_cuts(cuts, Passage(0.0, 0.02, 0.1, 0.05)))
     for number, cut in enumerate(cuts):

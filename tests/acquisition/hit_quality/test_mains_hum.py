@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition import Hit, HitFlags, Structure, check_hit
-from acquisition.hit_quality import evaluate_hit
+from acquisition.hit_quality.evaluate_hit import evaluate_hit
 
 RATE, RECORD, WIDTH = 25600.0, 6400, 6e-4
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Hit, HitFlags, check_hit, evaluate_hit, read_hits
 from acquisition.hit_quality.double_hit import find_second_input
-from acquisition.hits import extract_free_decay
+from acquisition.hits.free_decay import extract_free_decay
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE
 from tests.modal.test_uncertainty import PRE_TRIGGER, RECORD, STRUCTURE
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from acquisition import Channel
-from acquisition.hits import TapInputs
+from acquisition.hit import TapInputs
 
 HAMMER = Channel("force", 1e-2, 5.0)
 X, Y = (Channel("acceleration", 1e-2, 5.0, direction=name) for name in ("x", "y"))

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, SimulatedSource, Trigger, capture_hits
-from acquisition.hits import select_input_channels
+from acquisition.hit import select_input_channels
 
 RATE = 12800.0
 SENSOR = Channel("acceleration", 1e-2, 5.0)

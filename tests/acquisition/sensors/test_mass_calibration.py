@@ -1,4 +1,4 @@
-"""F = m a of a hung mass whose hammer and accelerometer are off by known factors."""
+"""F = m a of a hung mass whose hammer and accelerometer are wrong by known factors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TRUE = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
 
 
 def hung_mass(mass: float, mount: float = np.inf) -> Structure:
-    """A mass on threads (pendulum of 1.2 Hz); the accelerometer on a mount with its own resonance (Hz).
+    """Return a mass on threads (pendulum of 1.2 Hz) with the accelerometer on a mount with a resonance (Hz).
 
     Behind the mount the accelerance is 1/m / (1 - (f/f_m)^2) = 1/m + the mode f_m with modal stiffness -m (2 pi f_m)^2.
     """
@@ -43,7 +43,7 @@ def hung_mass(mass: float, mount: float = np.inf) -> Structure:
 def hits_on(
     structure: Structure, count: int = 10, believed: tuple[Channel, Channel] = TRUE, **how: object
 ) -> list[Hit]:
-    """Hits as a device with the true sensitivities records them and one with the believed ones reads them."""
+    """Return hits recorded with the true sensitivities and read with the assumed ones."""
     faultless: dict[str, object] = {
         "double_hits": 0.0,
         "overloads": 0.0,
@@ -66,7 +66,7 @@ def true_hits() -> list[Hit]:
 
 
 def misread(hits: list[Hit], force: float = 1.0, acceleration: float = 1.0) -> list[Hit]:
-    """The same hits with sensitivities believed to be so many times the true ones."""
+    """Return the same hits with sensitivities wrong by these factors."""
     believed = (
         replace(TRUE[0], sensitivity=TRUE[0].sensitivity * force),
         replace(TRUE[1], sensitivity=TRUE[1].sensitivity * acceleration),

@@ -1,4 +1,4 @@
-"""The rate of a device from the arrival times of its blocks: closed forms, jitter, an emulated device, its memory."""
+"""Sample rate from arrival times of blocks: closed forms, jitter, an emulated device, stored rates."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ BOARD = DeviceIdentity("DI-2108", "5F1", "1.40")
 
 
 class Stream(SimulatedSource):
-    """A device whose blocks arrive at given times; `clock` tells the time of the block that was handed over last."""
+    """Device whose blocks arrive at given times. `clock` returns the time of the block delivered last."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class Stream(SimulatedSource):
 
 
 def even(rate: float, seconds: float = 6.0, per_block: int = 512) -> NDArray[np.float64]:
-    """When the blocks of an ideal device are complete (s)."""
+    """Return the times at which the blocks of an ideal device are complete (s)."""
     return np.arange(1, int(seconds * rate / per_block) + 1) * per_block / rate
 
 
@@ -96,7 +96,7 @@ def test_the_time_and_the_scans_are_those_listened_to() -> None:
 
 
 def jitters(kind: str, arrival: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Late arrivals: waiting times, a slowly swelling delay, a host that looks every 9.3 ms, bursts of four blocks."""
+    """Return late arrivals: waiting times, a growing delay, a host that polls every 9.3 ms, bursts of four blocks."""
     if kind == "waiting":
         return arrival + random.exponential(3e-3, arrival.size)
     if kind == "swell":
@@ -288,7 +288,7 @@ def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[...
 
 
 def busy(rate: float) -> NDArray[np.float64]:
-    """Arrivals at a computer that is so busy that the rate is known to about 0.1 %."""
+    """Return arrivals at a computer so busy that the rate is known to about 0.1 %."""
     arrival = even(rate)
     return np.sort(arrival + np.random.default_rng(1).exponential(0.03, arrival.size))
 

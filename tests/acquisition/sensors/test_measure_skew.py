@@ -1,4 +1,4 @@
-"""Skew of two channels fed with one signal, and its sign in the FRF, against closed forms."""
+"""Skew of two channels with the same signal, and its sign in the FRF, against closed forms."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 
 def both(skew: float, noise: float = 1e-3, seed: int = 1, seconds: float = 0.8) -> tuple[Array, Array]:
-    """One signal on two channels, the second sampled so many samples later; noise as a share of the signal's rms.
+    """Return one signal on two channels, the second sampled later by this many samples. noise: share of the signal rms.
 
-    A piece of a periodic signal, white below 0.4 of the sample rate, so that it is known at every time.
+    The signal is a piece of a periodic one, white below 0.4 of the sample rate, so that it is known at every time.
     """
     random = np.random.default_rng(seed)
     length = int(seconds * RATE)
@@ -94,7 +94,7 @@ def test_records_that_are_none_are_refused() -> None:
 
 @dataclass
 class ScannedHits:
-    """A structure hit four times a second on a DAQ whose second channel is sampled later by a skew (s)."""
+    """Structure hit four times a second, on a DAQ whose second channel is sampled later by a skew (s)."""
 
     structure: Structure
     skew: float
@@ -110,7 +110,7 @@ class ScannedHits:
 def test_the_skew_of_a_scanned_daq_does_not_turn_the_phase_of_the_frf(
     channels: tuple[Channel, Channel], true_receptance: Callable[[Array], NDArray[np.complex128]], structure: Structure
 ) -> None:
-    """Channel.skew > 0: the response's samples are taken later, so its spectrum leads and must be turned back."""
+    """Check Channel.skew > 0: the response is sampled later, so its spectrum leads and is turned back."""
     skew = 10e-6
     known = (replace(channels[0], adc_bits=24), replace(channels[1], adc_bits=24, skew=skew))
     signal = ScannedHits(structure, skew)

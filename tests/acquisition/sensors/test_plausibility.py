@@ -1,4 +1,4 @@
-"""Sensitivities, dates and stiffnesses that cannot be right."""
+"""Implausible sensitivities, dates and stiffnesses."""
 
 from __future__ import annotations
 

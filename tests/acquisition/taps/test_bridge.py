@@ -39,7 +39,7 @@ Pair = tuple[Channel, Channel]
 
 @contextmanager
 def bridged(open_device: Callable[[], Device], **options: Any) -> Iterator[TapsBridge]:
-    """A bridge that runs; `heard` on it is what it has told."""
+    """Run a bridge. Its `heard` holds the sentences it has reported."""
     bridge = TapsBridge(open_device, print, **options)
     thread = threading.Thread(target=bridge.run)
     thread.start()
@@ -135,7 +135,7 @@ def test_a_device_that_is_pulled_is_waited_for(
 
 
 class Fast(SimulatedSource):
-    """A device that waits for nobody; each scan is its own number, and halfway some are lost."""
+    """Device without a clock. Each scan holds its own number, and some are lost halfway."""
 
     follows_clock = True
     fault = ""
@@ -200,7 +200,7 @@ def test_a_device_is_stopped_when_its_host_has_gone() -> None:
 
 
 def test_a_dataq_with_its_sensors_goes_through(structure: Structure, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The loss of a packet that it has no word for is found at this end, and told at the other."""
+    """Check that a lost packet, for which the device has no message, is detected here and reported there."""
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.05)
     sensors = (
         SensorInput(0, Channel("force", 2.25e-3, 2.0, serial_number="H-1", calibration_date="2026-01-15")),

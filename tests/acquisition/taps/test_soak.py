@@ -22,7 +22,7 @@ FAULTS = TapsFaults(
 
 
 def counted(first: int, n: int) -> NDArray[np.float64]:
-    """A 24-bit counter and its complement: each scan tells which one it is."""
+    """Return a 24-bit counter and its complement, which tell each scan's index."""
     index = np.arange(first, first + n) % 2**23
     return np.stack([index, -1 - index]).astype(np.float64)
 

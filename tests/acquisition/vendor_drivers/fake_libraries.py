@@ -1,4 +1,4 @@
-"""Libraries of makers made of software, with the names, shapes and errors that their documentation gives.
+"""Emulated vendor libraries, with the names, shapes and errors of their documentation.
 
 sounddevice 0.5.6, nidaqmx 1.7.0, daqhats 1.4.1.0, uldaq 1.2.3, labjack-ljm 1.23.0. Each reads a `Wiring`.
 """
@@ -21,7 +21,7 @@ Volts = NDArray[np.float64]
 
 @dataclass
 class Wiring:
-    """What is plugged into the inputs, and what goes wrong."""
+    """Signals at the inputs, and faults."""
 
     volts_at: Callable[[float], Callable[[int, int], Volts]]
     """Voltages (V), for a rate (Hz): (first scan, number of scans) -> (2, n)."""
@@ -33,7 +33,7 @@ class Wiring:
     """What was set, in order."""
 
     def stream(self, rate: float, n_inputs: int) -> Callable[[int], Volts]:
-        """What the device reads next: number of scans -> (n_inputs, n), inputs with nothing on them at 0 V."""
+        """Return the function that reads next scans: number -> (n_inputs, n), open inputs at 0 V."""
         volts, position = self.volts_at(rate), 0
 
         def read(n_scans: int) -> Volts:
@@ -55,7 +55,7 @@ def module(name: str, **members: Any) -> ModuleType:
 def fake_sounddevice(
     wiring: Wiring, names: Sequence[str], full_scale: float, actual_rate: float | None = None
 ) -> ModuleType:
-    """Devices with these names, of two inputs but for HDMI (none) and Mono (one); the rates are 44.1 and 48 kHz."""
+    """Make devices with these names and two inputs, except HDMI (none) and Mono (one). Rates are 44.1 and 48 kHz."""
 
     class PortAudioError(Exception):
         def __str__(self) -> str:
@@ -121,7 +121,7 @@ def fake_sounddevice(
 
 
 def fake_nidaqmx(wiring: Wiring, rates: Sequence[float]) -> dict[str, ModuleType]:
-    """A cDAQ with one NI 9234, "cDAQ1Mod1": 4 inputs, +-5 V, 2 mA; a rate is rounded up to one of `rates` (Hz)."""
+    """Make a cDAQ with one NI 9234, "cDAQ1Mod1": 4 inputs, +-5 V, 2 mA. A rate is rounded up to one of `rates` (Hz)."""
 
     class Error(Exception):
         pass
@@ -209,7 +209,7 @@ def fake_nidaqmx(wiring: Wiring, rates: Sequence[float]) -> dict[str, ModuleType
 
 
 def fake_daqhats(wiring: Wiring) -> ModuleType:
-    """A Raspberry Pi with one MCC 172 at address 0; rates are 51.2 kHz / n."""
+    """Make a Raspberry Pi with one MCC 172 at address 0. Rates are 51.2 kHz / n."""
 
     class HatError(Exception):
         def __init__(self, address: int, value: str) -> None:
@@ -279,7 +279,7 @@ def fake_daqhats(wiring: Wiring) -> ModuleType:
 
 
 def fake_uldaq(wiring: Wiring) -> ModuleType:
-    """A USB-1608FS-Plus: 8 inputs, 16 bits, ranges 10, 5, 2 and 1 V; its ring is filled at each look at its status."""
+    """Make a USB-1608FS-Plus: 8 inputs, 16 bits, ranges 10, 5, 2 and 1 V. Each status query fills its ring."""
 
     class ULException(Exception):  # noqa: N818  (its name)
         pass
@@ -361,7 +361,7 @@ def fake_uldaq(wiring: Wiring) -> ModuleType:
 
 
 def fake_ljm(wiring: Wiring) -> dict[str, ModuleType]:
-    """A LabJack T7 with the serial number 470012345; its rates are 80 MHz / n."""
+    """Make a LabJack T7 with the serial number 470012345. Its rates are 80 MHz / n."""
 
     class LJMError(Exception):
         pass

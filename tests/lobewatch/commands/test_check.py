@@ -12,7 +12,7 @@ import pytest
 from lobes import Program, program_limit
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.verdicts import Advice, Setting
-from lobewatch.verdicts.program_samples import cutting_conditions_of
+from lobewatch.verdicts.program_case import cutting_conditions_of
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any

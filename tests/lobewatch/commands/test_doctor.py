@@ -29,7 +29,7 @@ def healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     answer = DeviceAnswer("taps", DeviceIdentity("BOARD-1", "7"))
     survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 0x2E8A), answer),))
-    monkeypatch.setattr(EXAMINE, "survey_ports", lambda: survey)
+    monkeypatch.setattr(EXAMINE, "scan_ports", lambda: survey)
     monkeypatch.setattr(EXAMINE, "LATENCY_TIMERS", tmp_path)
     monkeypatch.setattr("webbrowser.get", lambda: SimpleNamespace())
     monkeypatch.setattr("os.getloadavg", lambda: (0.1, 0.1, 0.1))
@@ -54,7 +54,7 @@ def break_rights(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
         "port /dev/ttyACM0 cannot be opened (Permission denied); you may not use it: sudo usermod -aG dialout $USER"
     )
     survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 1), text="cannot be opened", problem=problem),))
-    monkeypatch.setattr(EXAMINE, "survey_ports", lambda: survey)
+    monkeypatch.setattr(EXAMINE, "scan_ports", lambda: survey)
 
 
 def slow_latency(_monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:

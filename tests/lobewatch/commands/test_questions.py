@@ -74,7 +74,7 @@ def newest(logbook: Logbook) -> str:
 
 
 def words(shop: Shop) -> set[Stability]:
-    return {found.word for found in shop.logbook.verdicts()}
+    return {found.stability for found in shop.logbook.verdicts()}
 
 
 def test_a_beam_is_stored_and_never_the_baseline_of_a_mill(shop: Shop, beam: Path) -> None:
@@ -206,7 +206,7 @@ def test_the_outcome_and_the_report_name_the_command_that_answers(shop: Shop) ->
     assert "in question" in outcome.texts[0]
     assert command in render_report(logbook, "reference", "x")
     (doubtful,) = logbook.verdicts()
-    assert (doubtful.word, doubtful.decided_by) == (Stability.DOUBTFUL, "question")
+    assert (doubtful.stability, doubtful.decisive_cause) == (Stability.DOUBTFUL, "question")
     _, *words_of_it = shlex.split(command)
     assert run(*words_of_it).exit_code == 0
     assert "frequency-jump" not in codes(standing(shop, 31))

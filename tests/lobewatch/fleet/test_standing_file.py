@@ -174,7 +174,7 @@ def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
     assert "program-" in dated.remarks[0].code
     found = Logbook.open(tapped.path).status(now(tapped))
     assert (dated.status, dated.remarks) == (found.status, found.remarks)
-    assert summary.programs == {name: one.word for name, one in (tapped.logbook.history.rows[-1].rulings or {}).items()}
+    assert summary.programs == {name: one.stability for name, one in (tapped.logbook.history.rows[-1].rulings or {}).items()}
 
 
 def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:

@@ -30,7 +30,7 @@ def test_rows_are_read_back_as_they_were_worked_out(tmp_path: Path) -> None:
         for name, value in vars(expected).items():
             if name in ("tap_id", "time", "tool", "direction", "remarks", "x", "y", "questions"):
                 assert getattr(row, name) == value
-            elif name != "rulings":
+            elif name != "verdicts":
                 np.testing.assert_array_equal(getattr(row, name), value, err_msg=name)
         assert row.verdicts is not None
         assert expected.verdicts is not None

@@ -70,7 +70,7 @@ def test_all_is_worked_out_anew(tapped: Shop) -> None:
     history = tapped.logbook.history
     assert frequencies(history) == [1713, 1712, 1711]
     assert (history.kept, tapped.logbook.remarks) == ((), [])
-    assert OLDER.encode() not in tapped.folder.history.read_bytes()
+    assert OLDER.encode() not in tapped.folder.history_path.read_bytes()
 
 
 def test_what_the_analysis_refuses_keeps_its_row_and_counts(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,7 +87,7 @@ def test_what_the_analysis_refuses_keeps_its_row_and_counts(tapped: Shop, monkey
 
 
 def test_without_an_older_row_the_refusal_is_an_error(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
-    tapped.folder.history.unlink()
+    tapped.folder.history_path.unlink()
     refuse(monkeypatch, tapped.folder.taps()[1].id)
     with pytest.raises(ArithmeticError, match="no convergence"):
         _ = tapped.logbook.history

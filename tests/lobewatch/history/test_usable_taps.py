@@ -68,7 +68,7 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     older = file_of(tapped, -2)
     content = older.read_bytes()
     flip(older)
-    assert [one.word for one in tapped.logbook.verdicts()] == [Stability.DOUBTFUL]
+    assert [one.stability for one in tapped.logbook.verdicts()] == [Stability.DOUBTFUL]
     older.write_bytes(content)
     bad = file_of(tapped, -1)
     assert run("check", tapped.path).exit_code == 0
@@ -78,22 +78,22 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     assert said.exit_code == 1
     assert "tap again" in said.stdout
     logbook = tapped.logbook
-    assert [one.word for one in logbook.verdicts()] == [Stability.DOUBTFUL]
-    assert [one.word for one in logbook.rulings(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
+    assert [one.stability for one in logbook.verdicts()] == [Stability.DOUBTFUL]
+    assert [one.stability for one in logbook.stored_verdicts(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
     bad.write_bytes(content)
-    assert [one.word for one in tapped.logbook.verdicts()] == [Stability.STABLE]
+    assert [one.stability for one in tapped.logbook.verdicts()] == [Stability.STABLE]
     flip(bad)
     tapped.tap(60, 1690.0, "y")
     assert run("check", tapped.path).exit_code == 0
 
 
 def test_one_that_is_found_damaged_late_is_left_out_too(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
-    tapped.logbook.standing()
+    tapped.logbook.status()
     monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_BYTES", 0)
     bad = file_of(tapped, -1)
     flip(bad)
     logbook = tapped.logbook
-    assert [one.word for one in logbook.verdicts()] == [Stability.DOUBTFUL]
+    assert [one.stability for one in logbook.verdicts()] == [Stability.DOUBTFUL]
     assert [remark.about for remark in logbook.remarks if remark.code == "tap-damaged"] == [f"taps/{bad.name}"]
 
 
@@ -102,7 +102,7 @@ def test_where_none_is_left_that_is_said(tapped: Shop) -> None:
         path.unlink()
     said = CliRunner().invoke(app, ["check", str(tapped.path)])
     assert "no tap test that can be used: taps/" in str(said.exception)
-    assert tapped.logbook.standing().light == "unknown"
+    assert tapped.logbook.status().status == "unknown"
 
 
 def test_a_damaged_journal_does_not_stop_reading(tapped: Shop) -> None:

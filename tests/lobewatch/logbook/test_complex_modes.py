@@ -20,7 +20,8 @@ from lobewatch.tool import Assembly
 from lobewatch.tool.prediction import predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, compute_scatter
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, N_BAND_SAMPLES, compute_limit_band
-from lobewatch.verdicts.program_samples import build_median_row, build_program
+from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode

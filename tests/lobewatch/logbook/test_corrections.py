@@ -157,7 +157,7 @@ def test_after_a_new_baseline_nothing_is_known_until_the_next_tap(shop: Shop) ->
     add_event(shop.folder, "spindle replaced", day(shop, 10), new_baseline=True)
     standing = shop.logbook.standing(day(shop, 11))
     assert (standing.light, [one.code for one in standing.remarks]) == ("unknown", ["never-tapped"])
-    assert [one.word.value for one in shop.logbook.verdicts()] == ["unknown"]
+    assert [one.stability.value for one in shop.logbook.verdicts()] == ["unknown"]
     for command in ("check", "report", "lobes"):
         with pytest.raises(DataError, match=r"no tap test.* since the new baseline of 2026-01-25"):
             run(command, shop.path)

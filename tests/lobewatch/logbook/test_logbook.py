@@ -39,7 +39,7 @@ from lobewatch.show.report.report import render_report
 from lobewatch.tap.session import build_outcome
 from lobewatch.tool.lobe_chart import DynamicsSource, LobeMethod
 from lobewatch.verdicts import Advice, Stability, Verdict
-from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.program_case import build_program
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode, synthesize_frf
 
@@ -221,7 +221,7 @@ def test_an_old_tap_of_the_other_direction_counts(shop: Shop) -> None:
     assert [round(modes[0].frequency) for modes in (assembly.x, assembly.y)] == [1560, 1700]
     for found in logbook.verdicts():
         program = build_program(found.program, logbook.machine)
-        limit = program_limit(program, assembly.x, assembly.y, found.draws.cuts).limit
+        limit = program_limit(program, assembly.x, assembly.y, found.samples.cuts).limit
         assert found.limit == pytest.approx(limit)
         assert found.remarks[0].code == "older-direction"
         assert "direction x is that of 2026-02-14, 370 days older" in found.remarks[0].text
@@ -289,8 +289,8 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
         shop.tap_both(days, share)
     logbook = shop.logbook
     first, last = logbook.taps[1].id, logbook.taps[-1].id
-    assert [ruling.word for ruling in logbook.rulings(first).values()] == [Stability.STABLE] * 3
-    assert [ruling.word for ruling in logbook.rulings(last).values()].count(Stability.NOT_STABLE) == 2
+    assert [ruling.stability for ruling in logbook.rulings(first).values()] == [Stability.STABLE] * 3
+    assert [ruling.stability for ruling in logbook.rulings(last).values()].count(Stability.NOT_STABLE) == 2
     kept = [row.rulings is not None for row in shop.logbook.history.rows]
     assert kept == [False, True, False, False, False, True]
 
@@ -305,10 +305,10 @@ def test_a_program_is_judged_once_in_an_opened_logbook(shop: Shop, monkeypatch: 
     monkeypatch.setattr("lobewatch.cuts.learning.verdict_at_speed.evaluate_program", counting)
     shop.tap_both()
     logbook = shop.logbook
-    words = [found.word for found in logbook.verdicts()]
+    words = [found.stability for found in logbook.verdicts()]
     logbook.standing(START)
     (one,) = logbook.verdicts(names=["B"])
-    assert (asked, one.word, one.program.name) == (["A", "B", "C"], words[1], "B")
+    assert (asked, one.stability, one.program.name) == (["A", "B", "C"], words[1], "B")
     again = logbook.folder.read(logbook.newest())
     logbook.commit(replace(again, id=f"{again.id}-2", circumstances=replace(again.circumstances, operator="Kim")))
     logbook.verdicts()

@@ -51,7 +51,7 @@ def worn(shop: Shop) -> Shop:
 def words_after(shop: Shop, fall: float) -> dict[str, Stability]:
     """The words with both directions fallen by so much of what they are now."""
     shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
-    return {one.program.name: one.word for one in shop.logbook.verdicts()}
+    return {one.program.name: one.stability for one in shop.logbook.verdicts()}
 
 
 def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> None:
@@ -59,7 +59,7 @@ def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> N
     assert 0.0 <= critical.doubtful < critical.not_stable < 0.1
     assert words_after(worn, critical.not_stable - 0.002)["A"] is Stability.DOUBTFUL
     worn.tap_both(170.0, (1 - 0.03 + 0.0003) * (1 - critical.not_stable - 0.002))
-    assert {one.program.name: one.word for one in worn.logbook.verdicts()}["A"] is Stability.NOT_STABLE
+    assert {one.program.name: one.stability for one in worn.logbook.verdicts()}["A"] is Stability.NOT_STABLE
 
 
 def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
@@ -307,7 +307,7 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
     shop.run(("A", 12900, 1.5))
     shop.tap_both()
     (found,) = shop.logbook.verdicts()
-    drawn, (stiffness_at, _) = found.draws, model_softening(found.assembly)
+    drawn, (stiffness_at, _) = found.samples, model_softening(found.assembly)
     middle, falls = drawn.rows[np.array([0])], []
     for i in range(1, 13):
         one = drawn.rows[np.array([i])]

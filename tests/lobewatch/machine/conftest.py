@@ -20,7 +20,7 @@ MakeTap = Callable[..., TapTest]
 
 @pytest.fixture
 def make_tap() -> MakeTap:
-    """Makes a tap test, so many days after the start."""
+    """Make a tap test a number of days after the start."""
 
     def make(days: float = 0.0, source: SourceFile | None = None, toml: str = "") -> TapTest:
         about = Circumstances("m", START + timedelta(days=days), "reference", machine_toml=toml)

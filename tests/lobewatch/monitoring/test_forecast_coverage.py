@@ -80,7 +80,7 @@ def fall_of(course: str, r: Random, span: float, end: float) -> Callable[[Floats
 
 
 def wandering_history(course: str, r: Random, dates: Floats, scatter: float) -> History:
-    """A process of independent increments of variance 1.5 drift^2 a month, or crashes at 0.4 a month."""
+    """Simulate independent increments of variance 1.5 drift^2 a month, or crashes at 0.4 a month."""
     span, count = float(dates[-1]), 4000
     at = np.linspace(0, 2 * span, count + 1)
     step = float(at[1])
@@ -149,7 +149,7 @@ def test_no_range_is_announced_for_what_does_not_fall(course: str) -> None:
 
 
 def of_today(found: Forecast) -> Forecast:
-    """The mixture without the shapes that make it wider."""
+    """Return the mixture without the shapes that widen it."""
     kept = np.array([shape.kind in TODAY for shape in found.shapes])
     weight = found.weight[kept] / found.weight[kept].sum()
     shapes = tuple(shape for shape, is_kept in zip(found.shapes, kept, strict=True) if is_kept)

@@ -1,4 +1,4 @@
-"""What several tests of the live tap test share."""
+"""Fixtures of the live tap test."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 @pytest.fixture
 def open_folder(folder: MachineFolder) -> MachineFolder:
-    """A machine file that leaves trigger level and record length to trial hits."""
+    """Return a machine folder that leaves trigger level and record length to trial hits."""
     text = folder.toml.read_text("utf-8")
     folder.toml.write_text(re.sub(r"^(record_s|trigger_n) .*\n", "", text, flags=re.MULTILINE), "utf-8")
     return MachineFolder(folder.path)
 
 
 class Simulated(SimulatedSource):
-    """A device without a cable; before every block it is asked whether it has been unplugged or its samples end."""
+    """Device without a cable. Before each block it checks whether it is unplugged or its samples end."""
 
     def __init__(
         self,
@@ -67,13 +67,13 @@ class Simulated(SimulatedSource):
 
 @pytest.fixture
 def simulated() -> type[Simulated]:
-    """Makes a device without a cable."""
+    """Return a function that makes a device without a cable."""
     return Simulated
 
 
 @pytest.fixture
 def session_of() -> Callable[..., TapSession]:
-    """Makes a session whose every new state is handed to `monitor_drops`, through the clock that it asks after each."""
+    """Return a function that makes a session which passes each new state to a callback, through its clock."""
 
     def make(
         folder: MachineFolder,

@@ -1,4 +1,4 @@
-"""The button of a device takes the last good hit back: through the bytes of a real port."""
+"""Button of a device takes the last good hit back, through the bytes of a real port."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PRESS, RELEASE = Event(EventKind.BUTTON), Event(EventKind.BUTTON, begins=False)
 
 
 class Played:
-    """A signal; when it has come to certain scans, something happens at the device."""
+    """Signal with events at the device after certain scans."""
 
     def __init__(self, signal: HammeredStructure, events: dict[float, Event]) -> None:
         self._signal = signal

@@ -1,4 +1,4 @@
-"""An emulated cut as it comes out of the port: air, cut and chatter, and the truth behind it."""
+"""Emulated cut as received from the port: air, cut and chatter, and its hidden truth."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def emulated(folder: MachineFolder, depth_mm: float, speed_rpm: float | None = N
 
 
 def heard(cut: EmulatedCut, seconds: float) -> NDArray[np.float64]:
-    """Acceleration (m/s^2) as it comes out of the port."""
+    """Return the acceleration (m/s^2) received from the port."""
     codes: list[NDArray[np.int32]] = []
     with cut.device as device, TapsSource(device.port) as source:
         source.start()
@@ -55,7 +55,7 @@ def heard(cut: EmulatedCut, seconds: float) -> NDArray[np.float64]:
 
 
 def share_off_comb(sound: NDArray[np.float64], speed_rpm: float) -> float:
-    """Share of the energy of the cut, above 300 Hz, that does not turn with the spindle."""
+    """Return the share of the cut's energy above 300 Hz that is off the harmonics of the spindle."""
     piece = sound[round(0.3 * RATE) : round(0.7 * RATE)]
     power = np.abs(np.fft.rfft(piece * np.hanning(piece.size))) ** 2
     frequency = np.fft.rfftfreq(piece.size, 1 / RATE)

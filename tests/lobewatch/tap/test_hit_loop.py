@@ -1,4 +1,4 @@
-"""Hits of a live tap test: undo, looking back, verdicts before the disk, a slow disk."""
+"""Hits of a live tap test: undo, recheck, verdicts before storage, a slow disk."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
 
 
 def failing_at(calls: set[int], function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that fails at some of its calls, counted from 1."""
+    """Make a function that fails at some of its calls, counted from 1."""
     count = iter(range(1, 1000))
 
     def called(*arguments: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What stands at the end of a tap test, and the curves of its screen."""
+"""Result at the end of a tap test, and the curves of its screen."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Pair = tuple[Channel, Channel]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
-    """Without a model, which would be asked about at these stiffnesses."""
+    """Make a machine without a model, which would raise questions at these stiffnesses."""
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     found = MachineFolder(tmp_path / "m")
     text = found.toml.read_text("utf-8")
@@ -79,7 +79,7 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
 
 
 def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFolder) -> None:
-    """0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
+    """Check 0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
     tapped(folder, 0, 1720.0)
     tapped(folder, 30, 0.96 * 1720)
     first, last = Logbook(folder).history.rows

@@ -47,7 +47,7 @@ def test_a_refused_trial_hit_says_what_is_wrong_with_it(
     assert (refused.shown_word, refused.reason) == ("DOUBLE HIT, TRIAL HIT", HitFlags.DOUBLE_HIT.cure)
 
 
-@pytest.mark.parametrize("failing", ["check_hit", "ring_down"])
+@pytest.mark.parametrize("failing", ["check_hit", "estimate_decay_time"])
 def test_a_trial_hit_on_which_the_judging_fails_is_asked_for_again(
     failing: str,
     open_folder: MachineFolder,
@@ -57,7 +57,7 @@ def test_a_trial_hit_on_which_the_judging_fails_is_asked_for_again(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    function = {"check_hit": check_hit, "ring_down": estimate_decay_time}[failing]
+    function = {"check_hit": check_hit, "estimate_decay_time": estimate_decay_time}[failing]
     failures = iter([ZeroDivisionError("no lines")])
 
     def once(hit: Hit) -> object:
@@ -65,7 +65,7 @@ def test_a_trial_hit_on_which_the_judging_fails_is_asked_for_again(
             raise failure
         return function(hit)
 
-    monkeypatch.setattr(f"lobewatch.tap.trial.{failing}", once)
+    monkeypatch.setattr(f"lobewatch.tap.trial_hits.{failing}", once)
     states: list[TapState] = []
     session = session_of(open_folder, lambda: simulated(tapper(), channels), states.append)
     assert len(session.run().hits) == 10

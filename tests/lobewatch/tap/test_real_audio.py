@@ -1,4 +1,4 @@
-"""A tap test through a real sound server: PortAudio, ALSA and PulseAudio, with a null sink for a cable."""
+"""Tap test through a real sound server: PortAudio, ALSA and PulseAudio, with a null sink as cable."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture
 def cable(tmp_path: Path) -> Iterator[dict[str, str]]:
-    """The environment of programs that see one sound device, "wire", that hears what is played to it."""
+    """Return the environment of programs that see one sound device, "wire", which records what is played to it."""
     (tmp_path / ".asoundrc").write_text('pcm.wire { type pulse device "wire.monitor" }\n', "utf-8")
     (tmp_path / "run").mkdir()
     environment = os.environ | {"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path / "run")}
@@ -53,7 +53,7 @@ def cable(tmp_path: Path) -> Iterator[dict[str, str]]:
 
 
 def record_hits(path: Path, structure: Structure, seconds: float) -> None:
-    """A sound file of somebody who taps, 32 bits."""
+    """Write a 32-bit sound file of impacts."""
     signal = HammeredStructure(structure, RATE, np.random.default_rng(1), Hammering())
     volts = signal(0, round(seconds * RATE)) * SENSITIVITIES
     codes = np.clip(np.rint(volts / FULL_SCALE * 2**31), -(2**31), 2**31 - 1).astype("<i4")

@@ -1,4 +1,4 @@
-"""The self-check before the first hit: what it passes and what it finds, with figures."""
+"""Self-check before the first hit: passed and failed checks, with numbers."""
 
 from __future__ import annotations
 

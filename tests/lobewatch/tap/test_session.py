@@ -1,4 +1,4 @@
-"""The live tap test as a whole: words, result, failures, stopping and going on."""
+"""Live tap test as a whole: steps, result, failures, stopping and resuming."""
 
 from __future__ import annotations
 

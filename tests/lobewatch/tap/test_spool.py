@@ -1,4 +1,4 @@
-"""Damaged files of an interrupted test: set aside, said once, and the test goes on with the others."""
+"""Damaged files of an interrupted test: set aside, reported once, and the test goes on with the others."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 def interrupted(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> Path:
-    """The spool of a test that was stopped after four good hits."""
+    """Return the stored hits of a test that was stopped after four good hits."""
 
     def stop(state: TapState) -> None:
         if state.good == 4:
@@ -69,7 +69,7 @@ def interrupted(
 def go_on(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> Callable[[], TapSession]:
-    """Makes a session that goes on with that test."""
+    """Return a function that makes a session which resumes that test."""
     return lambda: session_of(open_folder, lambda: simulated(tapper(2), channels))
 
 
@@ -246,7 +246,7 @@ def test_hits_of_a_committed_test_are_removed(
 
 
 def resumed(spool: Path, folder: MachineFolder, seed: int) -> bool:
-    """Whether a test with one bit flipped or one end cut off somewhere goes on with all that is sound."""
+    """Return whether a test with one flipped bit or a truncated file resumes with all that is intact."""
     chance = random.Random(seed)
     sound = {path: path.read_bytes() for path in spool.iterdir()}
     path = chance.choice(sorted(sound))

@@ -1,4 +1,4 @@
-"""A hammer and a sensor with two axes: the same hits are a tap in x and a tap across, through the bytes of a device."""
+"""Hammer and a sensor with two axes: the same hits give a tap in x and a cross tap, through the bytes of a device."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def shown(hit: int, seen: int) -> Structure:
 
 
 def felt(hit: int, seed: int = 1, hammering: Hammering = CAREFUL) -> SignalFunction:
-    """Force and what each of SENSORS feels of hits along an axis."""
+    """Return force and the signals of SENSORS for hits along an axis."""
     return HammeredStructure(
         shown(hit, Y), RATE, np.random.default_rng(seed), hammering, cross_structures=(shown(hit, X),)
     )
@@ -65,14 +65,14 @@ def changed(
 
 @pytest.fixture
 def short(shop: Shop) -> Shop:
-    """Five hits and no program."""
+    """Ask for five hits and no program."""
     shop.edit("hits = 10 ", "hits = 5 ")
     shop.run()
     return shop
 
 
 class Bench(SimulatedSource):
-    """The sensors on a device without a cable."""
+    """Sensors on a device without a cable."""
 
     def __init__(self, signal: SignalFunction, sensors: tuple[Channel, ...] = SENSORS) -> None:
         super().__init__(signal, sensors, RATE, round(60 * RATE))
@@ -197,7 +197,7 @@ def test_an_interrupted_test_goes_on_with_what_both_sensors_felt(short: Shop) ->
 
 
 def test_swapped_axes_are_no_driving_point(short: Shop) -> None:
-    """The cable of y in the input of x: what is taken for the driving point has a mode of negative stiffness."""
+    """Connect y to the input of x: the assumed driving point then has a mode of negative stiffness."""
     swapped = (HAMMER, ALONG_X, ALONG_Y)
     session = tap(short, lambda: Bench(felt(X), swapped))
     assert "no-lobes-driving-point" in {remark.code for remark in session.measurement.remarks}

@@ -1,4 +1,4 @@
-"""A visit: x, then y, then what a person chooses."""
+"""Visit to a machine: x, then y, then the operator's choice."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lobewatch.tap.visit import TapVisit, choose_first_direction
 
 
 class Visit:
-    """A visit to a machine that taps itself, in a thread of its own, as a person sees it."""
+    """Visit to a machine that taps itself, in a thread of its own, as an operator sees it."""
 
     def __init__(
         self, folder: MachineFolder, simulated: Any, tapper: Any, channels: Any, *, leads: bool = True

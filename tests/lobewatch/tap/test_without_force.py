@@ -47,7 +47,7 @@ def without_force(folder: MachineFolder) -> MachineFolder:
 
 @pytest.fixture
 def tapped(without_force: MachineFolder, simulated: Simulate, session_of: OpenSession) -> TapSession:
-    """A finished test of an accelerometer that feels gravity, its hits at times too hard or double."""
+    """Finish a test of an accelerometer that feels gravity, with some hits too hard or double."""
     spindle, channel = truth(without_force), EMULATED_CHANNELS[1]
     states: list[TapState] = []
     session = session_of(

@@ -9,7 +9,8 @@ import pytest
 
 from lobes import Cut, MillingRows, Program
 from lobewatch.verdicts.program_samples import build_median_row
-from lobewatch.verdicts.uncertainty import TEST_CUT_CAUSE, LearnedSamples, uncertainty_of
+from lobewatch.verdicts.uncertainty import LearnedSamples, uncertainty_of
+from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from modal import Mode
 from tests.lobewatch.conftest import Shop
 
@@ -44,7 +45,7 @@ def test_each_draw_is_the_middle_times_its_own_factors(middle: MillingRows) -> N
 
 def test_what_is_taken_as_known_stays_in_the_middle(middle: MillingRows) -> None:
     without_cuts, without_coefficients = (
-        DRAWS.build_rows(middle, 2, TEST_CUT_CAUSE),
+        DRAWS.build_rows(middle, 2, TEST_CUTS.name),
         DRAWS.build_rows(middle, 2, "coefficients"),
     )
     assert without_cuts.frequency == pytest.approx(np.tile(middle.frequency, (2, 1)))

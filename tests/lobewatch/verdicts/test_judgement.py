@@ -10,7 +10,7 @@ from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import run_monte_carlo
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.program_case import ProgramCase
 from modal import Mode
 
 DEPTH = 3.6
@@ -18,7 +18,7 @@ DEPTH = 3.6
 
 
 def mode(frequency: float, stiffness: float, error: float) -> Mode:
-    """A mode whose stiffness is known with a relative standard error."""
+    """Build a mode with a relative standard error of its stiffness."""
     errors = np.array([1e-4 * frequency, 3e-5, error * stiffness])
     return Mode(frequency, 0.03, stiffness, covariance=np.diag(errors**2))
 
@@ -39,7 +39,7 @@ def test_draws_that_chatter_in_a_direction_of_much_to_spare_alone_are_seen() -> 
         speed_rpm=5720,
         depth_mm=DEPTH,
     )
-    judgement = run_monte_carlo(program, tool, machine, NO_TEST_CUTS)
+    judgement = run_monte_carlo(ProgramCase(program, tool, machine))
     draws, depth = judgement.samples, DEPTH / 1e3
     assert judgement.median.stable
     assert judgement.low > 1.05 * depth

@@ -11,11 +11,10 @@ from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import run_monte_carlo
-from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.program_case import ProgramCase, build_program
 from lobewatch.verdicts.safe_depth_estimates import select_critical_samples
-from lobewatch.verdicts.setting_robustness import Setting, sweep_neighborhood
-from lobewatch.verdicts.setting_search import MIN_DEPTH_MARGIN, SettingSearch
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
+from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, Setting, sweep_neighborhood
+from lobewatch.verdicts.setting_search import SettingSearch
 from modal import Mode
 
 MACHINE: Machine = parse_machine_file('[machine]\nname = "m"\n[speed]\nlow_rpm = 5000\nhigh_rpm = 15000\n')
@@ -44,7 +43,7 @@ def cut(immersion: float = 1.0, depth: float = 1.0, speed: float = 9000.0) -> Pr
 
 @pytest.mark.parametrize(("immersion", "depth"), [(1.0, 0.9), (0.2, 4.5)])
 def test_draws_that_are_passed_over_in_other_cuts_are_stable_there(immersion: float, depth: float) -> None:
-    judgement = run_monte_carlo(cut(immersion, depth), tool(1.3), MACHINE, NO_TEST_CUTS)
+    judgement = run_monte_carlo(ProgramCase(cut(immersion, depth), tool(1.3), MACHINE))
     draws = sweep_neighborhood(judgement.samples, 0.02, lambda fall: 1 - fall)
     every, counted = draws.growth(depth / 1e3)[:, 0], draws.critical_growth(depth / 1e3)
     assert np.array_equal(counted >= 0, every >= 0)
@@ -53,7 +52,7 @@ def test_draws_that_are_passed_over_in_other_cuts_are_stable_there(immersion: fl
 
 
 def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
-    search = SettingSearch(cut(), tool(), MACHINE)
+    search = SettingSearch(ProgramCase(cut(), tool(), MACHINE))
     best = search.best
     assert best is not None
     top, likely = search.likely_depths.removal_peaks(1)[0]
@@ -61,16 +60,14 @@ def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
     chips = beside.speed_rpm * beside.depth_mm if isinstance(beside, Setting) else 0.0
     assert best.speed_rpm > 1.005 * top
     assert best.speed_rpm * best.depth_mm > 1.05 * chips > 0
-    again = SettingSearch(cut(), tool(), MACHINE).verify(best.speed_rpm, best.depth_mm)
+    again = SettingSearch(ProgramCase(cut(), tool(), MACHINE)).verify(best.speed_rpm, best.depth_mm)
     assert again == best
 
 
 def test_few_draws_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
-    search = SettingSearch(cut(), tool(), MACHINE)
-    judgement = run_monte_carlo(cut(depth=0.5), tool(), MACHINE, NO_TEST_CUTS)
+    search = SettingSearch(ProgramCase(cut(), tool(), MACHINE))
+    judgement = run_monte_carlo(ProgramCase(cut(depth=0.5), tool(), MACHINE))
     program = build_program(cut(depth=0.5), MACHINE)
-    few = select_critical_samples(
-        program, search.cuts, search.spindle, search.uncertainty, 0.02, search.stiffness_at, MIN_DEPTH_MARGIN
-    )
+    few = select_critical_samples(search.case, program, 0.02, search.stiffness_at)
     assert 0 < few.deepest_stable(20e-3) <= 1.01 * judgement.median.limit / (1 + MIN_DEPTH_MARGIN)
     assert few.deepest_stable(1e-4) == pytest.approx(1e-4)

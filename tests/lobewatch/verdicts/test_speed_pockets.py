@@ -26,7 +26,7 @@ PROGRAM = ("A", 12800.0, 2.0)
 
 
 def commit(shop: Shop, direction: TapDirection, seed: int, *, force: bool, days: float = 0.0) -> None:
-    """A tap test of five hits of the demo's spindle."""
+    """Commit a tap test of five hits on the demo spindle."""
     hits = tap(seed, hits=5)
     about = Circumstances("m", shop.start + timedelta(days=days), "reference", direction)
     kept = hits if force else [Hit(np.empty(0), hit.acceleration, hit.sample_rate, hit.pre_trigger) for hit in hits]

@@ -26,7 +26,7 @@ FASTEST = 180 / (math.pi * 0.018)
 
 
 def steel(speed: float, depth: float = 0.5, radial: float = 18, more: str = "", tool: str = CARBIDE) -> str:
-    """A program in 42CrMo4 with a tool of 18 mm."""
+    """Build a program in 42CrMo4 with a tool of 18 mm."""
     return f"""
 [[program]]
 name = "steel"
@@ -47,14 +47,14 @@ depth_mm = {depth:g}
 
 @pytest.fixture
 def mill(shop: Shop) -> Shop:
-    """A spindle that turns slowly enough for steel."""
+    """Build a spindle that turns slowly enough for steel."""
     shop.edit("low_rpm = 3000", "low_rpm = 1000")
     return shop
 
 
 @pytest.fixture
 def tapped(shop: Shop) -> Shop:
-    """A spindle of 3000 rpm and more: steel leaves it few speeds."""
+    """Build a spindle of 3000 rpm and more: steel leaves it few speeds."""
     shop.tap_both()
     return shop
 
@@ -67,7 +67,7 @@ def test_an_18_mm_carbide_tool_is_nowhere_sent_to_21500_rpm_in_steel(tapped: Sho
     advice = logbook.advice(verdict)
     pockets = find_stable_pockets(verdict.program, verdict.assembly, logbook.machine)
     assert "tool-not-described" not in [remark.code for remark in advice.remarks]
-    settings = [setting for setting in (advice.best, advice.here, *pockets) if setting is not None]
+    settings = [setting for setting in (advice.best, advice.deepest_here, *pockets) if setting is not None]
     assert settings
     for setting in settings:
         assert 3000 <= setting.window_rpm[0] <= setting.speed_rpm <= setting.window_rpm[1] <= FASTEST
@@ -135,7 +135,7 @@ def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop)
     logbook = tapped.logbook
     (verdict,) = logbook.verdicts()
     advice = logbook.advice(verdict)
-    assert (advice.best, advice.here) == (None, None)
+    assert (advice.best, advice.deepest_here) == (None, None)
     assert find_stable_pockets(verdict.program, verdict.assembly, logbook.machine) == []
     following = find_next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5)
     assert following.suggestion is None

@@ -12,7 +12,7 @@ from dsm import calibrate
 from lobes import Program, program_limit
 from lobewatch.verdicts import Stability
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
-from lobewatch.verdicts.program_samples import build_program
+from lobewatch.verdicts.program_case import build_program
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -47,10 +47,10 @@ def test_a_twin_that_was_never_tapped_has_the_limit_of_the_tool_tapped(
     shop.edit("# A tool that is not tapped", f"{TWIN}\n# A tool that is not tapped")
     tap_the_model(shop, 1713.0, 1650.0)
     tapped, twin = shop.logbook.verdicts()
-    assert (tapped.measured, twin.measured) == (True, False)
+    assert (tapped.is_measured, twin.is_measured) == (True, False)
     assert twin.limit == pytest.approx(tapped.limit, rel=0.01)
     assert twin.limit_low < tapped.limit_low < tapped.limit_high < twin.limit_high
-    assert "prediction" in twin.draws.doubt.modes
+    assert "prediction" in twin.samples.uncertainty.modes
     assert "predicted" in [remark.code for remark in twin.remarks]
 
 
@@ -62,7 +62,7 @@ def test_a_direction_that_was_not_tapped_is_like_the_other_one_and_widens_the_do
     )
     for single, double in zip(alone, shop.logbook.verdicts(), strict=True):
         assert single.limit == pytest.approx(double.limit, rel=1e-4)
-        assert (single.word, double.word) == (Stability.DOUBTFUL, Stability.STABLE)
+        assert (single.stability, double.stability) == (Stability.DOUBTFUL, Stability.STABLE)
         assert single.limit_low < 0.9 * double.limit_low
         assert [remark.code for remark in single.remarks] == ["one-direction", "doubt-decides"]
 
@@ -88,7 +88,7 @@ def test_decay_left_ends_where_the_limit_crosses_the_depth(shop: Shop) -> None:
     for verdict in shop.logbook.verdicts():
         stiffness_at, remark = model_softening(verdict.assembly)
         assert remark.code == "decay-assumption"
-        fall = find_tolerable_drop(verdict.draws, verdict.program.depth_mm / 1e3, stiffness_at)
+        fall = find_tolerable_drop(verdict.samples, verdict.program.depth_mm / 1e3, stiffness_at)
         program = build_program(verdict.program, shop.folder.machine)
         if np.isinf(fall):
             assert limit_after(verdict, program, 0.2, stiffness_at(0.2)) > program.depth
@@ -103,7 +103,7 @@ def limit_after(verdict: Any, program: Program, fall: float, stiffness: float) -
     """Limit in the middle with all frequencies fallen."""
     tool = verdict.assembly
     x, y = ([mode.scaled(1 - fall, stiffness, "aged") for mode in modes] for modes in (tool.x, tool.y))
-    return program_limit(program, x, y, verdict.draws.cuts).limit
+    return program_limit(program, x, y, verdict.samples.cuts).limit
 
 
 def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: Shop) -> None:
@@ -124,4 +124,4 @@ def test_a_chattering_program_has_no_decay_left(shop: Shop) -> None:
     shop.run(("A", 12900, 6))
     shop.tap_both()
     (verdict,) = shop.logbook.verdicts()
-    assert find_tolerable_drop(verdict.draws, 6e-3, model_softening(verdict.assembly)[0]) == 0.0
+    assert find_tolerable_drop(verdict.samples, 6e-3, model_softening(verdict.assembly)[0]) == 0.0

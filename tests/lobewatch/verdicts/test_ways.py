@@ -9,7 +9,7 @@ import pytest
 
 from lobes import program_limit
 from lobewatch.verdicts import Stability
-from lobewatch.verdicts.program_samples import build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import build_program, cutting_conditions_of
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets
 from lobewatch.verdicts.verdict import evaluate_program
 
@@ -43,10 +43,10 @@ def test_a_range_is_judged_at_its_worst_inside(judged: Any, shop: Shop) -> None:
     machine, tool = shop.folder.machine, verdict.assembly
     alone = [judged(0.3, radial=f"{depth:g}").limit for depth in (2, 5, 9, 12)]
     assert verdict.limit <= min(alone) * 1.0001
-    cut = verdict.draws.cuts[0]
+    cut = verdict.samples.cuts[0]
     limit = program_limit(build_program(verdict.program, machine), tool.x, tool.y, [cut]).limit
     assert limit == pytest.approx(verdict.limit, rel=1e-12)
-    assert len({cut.immersion for cut in verdict.draws.cuts}) >= 4
+    assert len({cut.immersion for cut in verdict.samples.cuts}) >= 4
 
 
 def test_a_corner_takes_most_of_the_limit_whatever_the_feed(judged: Any, shop: Shop) -> None:
@@ -85,7 +85,7 @@ def test_wear_lowers_the_low_end_and_nothing_else(judged: Any) -> None:
     assert new.limit == used.limit == worn.limit
     assert used.limit_low / new.limit_low == pytest.approx(1 / 1.3, abs=0.03)
     assert worn.limit_low / new.limit_low == pytest.approx(1 / 1.6, abs=0.03)
-    force = worn.draws.rows.tangential[1:] / new.draws.rows.tangential[1:]
+    force = worn.samples.rows.tangential[1:] / new.samples.rows.tangential[1:]
     assert (np.min(force), np.max(force)) == pytest.approx((1.0, 1.6), abs=1e-6)
     assert judged(1.0, radial="20").limit_low == new.limit_low
 
@@ -100,12 +100,12 @@ def test_wear_of_the_doubt_holds_for_all_programs(judged: Any, shop: Shop) -> No
 def test_what_wear_decides_is_said(judged: Any) -> None:
     new = judged(0.5, radial="20")
     worn = judged(round(0.93e3 * new.limit_low, 2), 'wear = "worn"', radial="20")
-    assert (worn.word, worn.decided_by) == (Stability.DOUBTFUL, "wear")
+    assert (worn.stability, worn.decisive_cause) == (Stability.DOUBTFUL, "wear")
 
 
 def test_a_thin_wall_is_never_called_stable(judged: Any, shop: Shop) -> None:
-    assert judged(0.2, radial="20").word is Stability.STABLE
+    assert judged(0.2, radial="20").stability is Stability.STABLE
     verdict = judged(0.2, "thin = true", radial="20")
-    assert (verdict.word, verdict.decided_by) == (Stability.DOUBTFUL, "workpiece")
+    assert (verdict.stability, verdict.decisive_cause) == (Stability.DOUBTFUL, "workpiece")
     assert advise(verdict, shop.folder.machine).best is None
     assert find_stable_pockets(verdict.program, verdict.assembly, shop.folder.machine) == []

@@ -61,7 +61,7 @@ def test_the_error_of_a_chatter_frequency_falls_with_its_clearness_down_to_3_hun
 
 
 def named(share: float, *pairs: tuple[float, float]) -> float:
-    """What names chatter among 1450 Hz, 1310 Hz with a share of its displacement energy, and other lines (Hz)."""
+    """Return the chatter frequency found among 1450 Hz, 1310 Hz with a share of its energy, and other peaks (Hz)."""
     amplitude = 10.0 * np.sqrt(share) * (1310.0 / 1450.0) ** 2
     return chatter((1450.0, 10.0), (1310.0, amplitude), *pairs)[0]
 

@@ -73,7 +73,7 @@ def test_the_speed_of_a_lattice_is_exact_whatever_it_was_taken_for(off: float) -
 
 
 def test_the_error_of_a_speed_from_multiples_follows_in_closed_form() -> None:
-    """sigma / sqrt(sum k^2) of f = sum k f_k / sum k^2."""
+    """Sigma / sqrt(sum k^2) of f = sum k f_k / sum k^2."""
     speed = refine_speed(TURN, lines(comb()), BIN)
     assert speed.error == pytest.approx(ERROR / np.sqrt(sum(k**2 for k in MULTIPLES)), rel=1e-9)
 

@@ -265,7 +265,7 @@ def test_what_stands_on_the_slope_of_tooth_passing_is_no_chatter() -> None:
 
 
 def slow(orders: Any, rate: float = 1650.0) -> CutEvaluation:
-    """A cut of three teeth at 12 077 rpm as a slow sensor without a filter hears it."""
+    """Simulate a cut of three teeth at 12 077 rpm, as a slow sensor without a filter records it."""
     random, size = np.random.default_rng(4), round(5.0 * rate)
     time = np.arange(size) / rate
     signal = random.normal(scale=0.02, size=size)

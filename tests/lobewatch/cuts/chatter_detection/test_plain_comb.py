@@ -69,7 +69,7 @@ def test_the_slope_of_a_loud_line_is_no_line() -> None:
 
 
 def swelling(random: np.random.Generator, rate: float, turn: float) -> Floats:
-    """A cut as a slow sensor hears it: tooth passing of four teeth and its double, which swell and fade, hardly more.
+    """Simulate a cut on a slow sensor: tooth passing of four teeth and its double, swelling and fading.
 
     2 s; turn in Hz.
     """

@@ -16,7 +16,7 @@ TURNING = SpindleSpeed(TURN, 1e-4, 1.0, 9, 0.0)
 
 
 def quiet(power: float = 1e-6) -> Spectrum:
-    """A part without a line, of one second."""
+    """Return one second without a peak."""
     frequency: Floats = np.linspace(0.0, RATE / 2, round(RATE) + 1)
     noise = np.full(frequency.size, power)
     return Spectrum(frequency, noise.copy(), noise, BIN, RATE)
@@ -71,7 +71,7 @@ def test_a_line_is_foreign_with_less_than_nine_times_its_power_in_air(times: flo
 
 
 def folded(order: int, turn: float) -> float:
-    """A multiple above half the sample rate, where it is found."""
+    """Fold a harmonic above half the sample rate."""
     return abs(order * turn - RATE * round(order * turn / RATE))
 
 

@@ -23,7 +23,7 @@ LEAST, MOST = 1e-4, 2e-3
 def wavers(
     change: Callable[[Floats], Floats], beside: Mapping[float, float], orders: Mapping[int, float] = ORDERS
 ) -> float:
-    """What is heard of a spindle whose speed changes, relative, as a function of time (s); beside: other lines."""
+    """Estimate the unsteadiness of a speed that changes as a function of time (s); beside: other peaks."""
     time = np.arange(round(RATE * SECONDS)) / RATE
     turned = 2 * np.pi * TURN * np.cumsum(1 + change(time)) / RATE
     signal = np.random.default_rng(7).normal(scale=0.01, size=time.size)
@@ -34,7 +34,7 @@ def wavers(
 
 
 def step(change: float, quarter: int) -> Callable[[Floats], Floats]:
-    """A change in one quarter of the cut alone."""
+    """Change the speed in one quarter of the cut."""
     return lambda time: np.where(np.floor(4 * time / SECONDS) == quarter, change, 0.0)
 
 

@@ -22,7 +22,7 @@ def lines(frequencies: Sequence[float], clearness: float = 1e4) -> SpectralPeaks
 
 
 def speed_of(frequencies: Sequence[float], commanded: float) -> float:
-    """Turns a second of a cutter with four teeth that are found (Hz); NaN where none are."""
+    """Find the frequency of a cutter with four teeth (Hz), or NaN."""
     cut = lines(frequencies)
     speed = find_speed_by_votes(cut, cut, SPECTRUM, 4, commanded)
     return np.nan if speed is None else speed.frequency

@@ -54,7 +54,7 @@ class Mill:
 
     @property
     def turning(self) -> tuple[Mode, Mode]:
-        """x and y at speed."""
+        """X and y at speed."""
         x, y = (mode.scaled(by, 1.0, "") for mode, by in zip((self.x, self.y), self.frequency, strict=True))
         return x, y
 
@@ -70,7 +70,7 @@ class Mill:
         return complex(largest_multipliers(rows, np.array([[depth]]), count_pieces(rows, depth))[0, 0])
 
     def hear(self, speed: float, depth: float) -> CutEvidence:
-        """What the cut sounds like; the frequency is the one that the multiplier leaves next above a natural one."""
+        """Simulate the sound of a cut; the frequency is the one that the multiplier leaves next above a natural one."""
         multiplier = self.multiplier(speed, depth)
         if abs(multiplier) < 1:
             return CutEvidence(self.cut, speed, depth, "stable")

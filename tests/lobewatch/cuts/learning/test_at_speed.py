@@ -33,21 +33,21 @@ def judged(shop: Shop, name: str = "A") -> Any:
 def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop: Shop) -> None:
     shop.tap_both()
     at_rest = judged(shop)
-    assert at_rest.cuts == 0
+    assert at_rest.n_cuts == 0
     hear(shop, 12900, 3.0, "stable")
     first = judged(shop)
     for speed, depth in ((8700, 2.2), (12900, 3.4)):
         hear(shop, speed, depth, "stable")
     hear(shop, 8700, 3.0, "chatter", 1710.0)
     four = judged(shop)
-    assert (first.cuts, four.cuts) == (1, 4)
-    assert (at_rest.draws.doubt.learnt is None, four.draws.doubt.learnt is None) == (True, False)
+    assert (first.n_cuts, four.n_cuts) == (1, 4)
+    assert (at_rest.samples.uncertainty.learned is None, four.samples.uncertainty.learned is None) == (True, False)
     assert four.limit_high / four.limit_low < first.limit_high / first.limit_low
     assert four.limit_low > first.limit_low
-    assert four.word is Stability.STABLE
-    assert four.chance_turning < at_rest.chance_turning
+    assert four.stability is Stability.STABLE
+    assert four.chatter_risk < at_rest.chatter_risk
     assert four.program.tangential_n_per_mm2 < at_rest.program.tangential_n_per_mm2
-    assert [draws.rows.tangential[0] for draws in (at_rest.draws, four.draws)] == pytest.approx(
+    assert [draws.rows.tangential[0] for draws in (at_rest.samples, four.samples)] == pytest.approx(
         [1.4e9, four.program.tangential_n_per_mm2 * 1e6]
     )
 
@@ -67,17 +67,17 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
 def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
     shop.tap_both()
     before = shop.logbook.verdicts()
-    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in before}
+    assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in before}
     cut = hear(shop, 12900, 1.5, "chatter")
     after = shop.logbook.verdicts()
-    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in after}
-    assert judged(shop).word is not Stability.STABLE
+    assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in after}
+    assert judged(shop).stability is not Stability.STABLE
     exclude_entry(shop.folder, cut.id, "a chip was stuck")
     again = shop.logbook.verdicts()
-    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in before}
+    assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in before}
     for earlier, now in zip(before, again, strict=True):
         assert (now.limit, now.limit_low, now.limit_high) == (earlier.limit, earlier.limit_low, earlier.limit_high)
-        assert np.array_equal(now.draws.rows.frequency, earlier.draws.rows.frequency)
+        assert np.array_equal(now.samples.rows.frequency, earlier.samples.rows.frequency)
 
 
 def words(logbook: Logbook) -> dict[str, Stability]:
@@ -91,10 +91,10 @@ def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Sho
     for depth, word in ((3.0, "stable"), (3.1, "stable"), (0.3, "chatter")):
         hear(shop, 12900, depth, word)
     verdict = judged(shop)
-    assert verdict.cuts == 2
+    assert verdict.n_cuts == 2
     assert [remark.about for remark in verdict.remarks if remark.code == "cut-unexplained"] == ["c3"]
     shop.edit('tool = "reference"', 'tool = "long"')
-    assert judged(shop).cuts == 0
+    assert judged(shop).n_cuts == 0
 
 
 def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
@@ -103,4 +103,4 @@ def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     hear(shop, 12900, 1.0, "stable")
     verdict = judged(shop)
-    assert (verdict.word, verdict.decided_by) == (Stability.DOUBTFUL, "untapped")
+    assert (verdict.stability, verdict.decisive_cause) == (Stability.DOUBTFUL, "untapped")

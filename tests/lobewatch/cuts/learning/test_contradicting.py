@@ -26,7 +26,7 @@ CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0, id="c8")
 
 
 def evidence(cut: CutEvidence, share: float, base: float = 150.0) -> NewEvidence:
-    """A cut of which a share of the weight says chatter at a folded frequency (Hz), the others that it is stable."""
+    """Build a cut that a share of the weight predicts to chatter at a folded frequency (Hz)."""
     before = replace(Mill().prior, log_weight=np.log([share, 1 - share]))
     before = replace(before, samples=before.samples[:2])
     frequencies = np.array([base, 390.0])

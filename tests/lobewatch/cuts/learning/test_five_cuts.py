@@ -111,12 +111,12 @@ class Hidden:
         return float(np.max(self.grid.speeds * depths))
 
     def suggested(self, left: int) -> tuple[float, float] | None:
-        """What is to be cut next."""
+        """Suggest the next cut."""
         found = suggest_cut(self.learnt, self.grid, self.cuts, left)
         return None if found is None else (found.speed_rpm, found.depth)
 
     def milling(self, speed: float, depth: float) -> MillingCut:
-        """The cut as the judge takes it."""
+        """Build the milling system of the cut."""
         x, y = (
             Structure(np.array([m.frequency]), np.array([m.damping_ratio]), np.array([m.stiffness])) for m in self.modes
         )

@@ -20,7 +20,7 @@ READINGS = [PowerEvidence(1.25, 0.14, 0.05), PowerEvidence(1.1, 0.2, 0.13), Powe
 
 
 def cut(power: PowerEvidence | None, material: int = 0) -> CutEvidence:
-    """A stable cut so shallow that its word says nothing."""
+    """Build a stable cut so shallow that its verdict says nothing."""
     return CutEvidence(SLOT, 12000, 1e-5, "stable", material=material, power=power)
 
 

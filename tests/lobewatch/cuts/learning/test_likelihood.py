@@ -30,7 +30,7 @@ CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0)
 
 
 def predicted(base: float, at_limit: float, excess: float = 5.0, flip: bool = False) -> CutPrediction:
-    """What one spindle would do."""
+    """Predict one spindle."""
     return CutPrediction(np.array([excess]), np.array([base]), np.array([at_limit]), np.array([flip]))
 
 

@@ -186,7 +186,7 @@ def test_what_contradicts_is_named_and_teaches_nothing(mill: Mill) -> None:
 
 
 def weighted(*log_weight: float, cuts: tuple[CutEvidence, ...] = ()) -> Posterior:
-    """The first draws of a prior with weights."""
+    """Weight the first samples of a prior."""
     learnt = Mill().prior
     return replace(learnt, samples=learnt.samples[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
 

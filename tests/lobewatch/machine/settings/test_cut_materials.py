@@ -61,7 +61,7 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
         ('material = "ours"', "", "give material, or both"),
         ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give material, or both"),
         ('material = "ours"', "tangential_n_per_mm2 = 1", "give material, or both"),
-        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobewatch materials lists those"),
+        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobes.materials_by_name lists those"),
         ('material = "ours"', 'material = "4140"', "is 'AISI 4140' meant"),
         ("tangential_n_per_mm2 = 800\n", "", "give either tangential_n_per_mm2 and radial_n_per_mm2"),
         ("radial_n_per_mm2 = 200", "radial_n_per_mm2 = 200\nforce_angle_deg = 60", "give either tangential"),

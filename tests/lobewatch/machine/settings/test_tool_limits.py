@@ -191,7 +191,7 @@ def test_a_program_that_contradicts_its_tool_is_asked_about(key: str, value: flo
     flutes = "flute_length_mm = 40\n"
     read = machine(program(feed=flutes), tool(f"{key} = {value}"))
     (asked,) = find_all_questions(read)
-    assert asked.code == "settings-contradict"
+    assert asked.fault == "settings-contradict"
     assert f"{key} of [[tool]] 'reference' is {value}" in asked.reason
     assert find_all_questions(machine(program(feed=flutes), tool("teeth = 4\ndiameter_mm = 18\n" + flutes))) == []
 

@@ -1,0 +1,196 @@
+"""Faults of a hit: flags, words, remedies, limits and sentences in one place."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+_REPORTED = "The device reports an overload"
+_RINGS = "The last tenth of the record still rings with {share:.1%} of the loudest"
+
+
+class HitFlags(enum.Flag):
+    """Faults of a hit; falsy for a good hit. `str()` gives words and remedies.
+
+    Examples
+    --------
+    >>> flags = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
+    >>> flags.words
+    'double hit, overload (force)'
+    >>> HitFlags.from_words("double hit") in flags, bool(HitFlags.OK)
+    (True, False)
+    """
+
+    OK = 0
+    """No fault."""
+    DOUBLE_HIT = enum.auto()
+    """The hammer touched twice."""
+    OVERLOAD_FORCE = enum.auto()
+    """The force is clipped."""
+    OVERLOAD_RESPONSE = enum.auto()
+    """The response is clipped."""
+    TOO_SOFT = enum.auto()
+    """The peak of the force is near the noise, or small against its range."""
+    NOT_DECAYED = enum.auto()
+    """The response still rings when the record ends."""
+    LOST_SCANS = enum.auto()
+    """Scans are missing inside the record."""
+    NO_HIT = enum.auto()
+    """No pulse stands out of the noise."""
+    SWAPPED_CHANNELS = enum.auto()
+    """The pulse is on the channel of the response."""
+    TOO_HARD = enum.auto()
+    """The peak of the force is near the end of its range, not clipped."""
+    NARROW_BAND = enum.auto()
+    """The force does not reach to the end of the required frequency band."""
+    INCONSISTENT = enum.auto()
+    """The FRF of this hit differs from the mean of the good hits."""
+    UNDONE = enum.auto()
+    """The operator took the hit back."""
+    NOT_EVALUATED = enum.auto()
+    """The evaluation failed."""
+
+    @property
+    def words(self) -> str:
+        """Faults in words, e.g. "double hit, overload (force)"; "good" without one."""
+        return ", ".join(HIT_FAULTS[flag].words for flag in self) or "good"
+
+    @property
+    def cure(self) -> str:
+        """Remedies, a sentence per fault; empty for a good hit."""
+        return " ".join(HIT_FAULTS[flag].remedy for flag in self)
+
+    @classmethod
+    def from_words(cls, words: str) -> HitFlags:
+        """Return the flags that a file states in words.
+
+        Parameters
+        ----------
+        words
+            `HitFlags.words` of the flags.
+
+        Returns
+        -------
+        HitFlags
+            All flags that the words name.
+
+        Raises
+        ------
+        ValueError
+            Where a word names no flag.
+        """
+        by_words = {fault.words: flag for flag, fault in HIT_FAULTS.items()}
+        flags = cls.OK
+        for word in filter(None, words.removeprefix("good").split(", ")):
+            if word not in by_words:
+                raise ValueError(f"{word!r} is no hit verdict; known are {', '.join(by_words)}")
+            flags |= by_words[word]
+        return flags
+
+    def __str__(self) -> str:
+        """Return each fault with its remedy."""
+        return " ".join(f"{fault.words}: {fault.remedy}" for fault in map(HIT_FAULTS.__getitem__, self)) or "good"
+
+
+@dataclass(frozen=True)
+class HitFault:
+    """One fault of a hit: its words in files, its remedy, and the limits and sentences of its findings."""
+
+    words: str
+    """Words that tap files store and tables show."""
+    remedy: str
+    """Advice to the operator, one sentence."""
+    sentences: Mapping[str, str] = field(default_factory=dict)
+    """Format string of each finding without the full stop, by its case; "" is the only or usual case."""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """Limits that decide whether a hit has the fault, by the name that the sentences use."""
+
+    def state(self, case: str = "", **figures: object) -> str:
+        """Return the sentence of a finding with its limits and figures."""
+        return self.sentences[case].format(**self.limits, **figures)
+
+
+HIT_FAULTS: Mapping[HitFlags, HitFault] = {
+    HitFlags.DOUBLE_HIT: HitFault(
+        "double hit",
+        "Let the hammer bounce back after the first touch.",
+        {
+            "pulse": "Second peak {delay:.2g} ms {side} the main one ({percent:.2g} %)",
+            "decay": "The decay is disturbed {delay:.2g} ms after the hit, as by a second touch",
+        },
+    ),
+    HitFlags.OVERLOAD_FORCE: HitFault(
+        "overload (force)",
+        "Hit softer or choose a larger force range.",
+        {"": "Force cut off at {level:.4g} N for {samples} samples{note}", "reported": _REPORTED},
+    ),
+    HitFlags.OVERLOAD_RESPONSE: HitFault(
+        "overload (response)",
+        "Hit softer or choose a larger acceleration range.",
+        {"": "Response cut off at {level:.4g} m/s^2 for {samples} samples{note}", "reported": _REPORTED},
+    ),
+    HitFlags.TOO_SOFT: HitFault(
+        "too soft",
+        "Hit harder.",
+        {
+            "range": "Peak of {peak:.4g} N is below {range_share:.0%} of the range of {full:.0f} N",
+            "noise": "Peak of {peak:.4g} N is below {noise_ratio:.0f} times the noise of {noise:.3g} N",
+            "response": "Response of {peak:.3g} m/s^2 is below {noise_ratio:.0f} times the noise of {noise:.2g} m/s^2",
+            "spectrum": "The force at {start:.3g} Hz is 20 dB below its largest value: no line can be used",
+        },
+        {"range_share": 0.02, "noise_ratio": 20.0},
+    ),
+    HitFlags.NOT_DECAYED: HitFault(
+        "not decayed",
+        "Use a longer record; wait until the tool is still before the next hit.",
+        {
+            "": _RINGS,
+            "hum": f"{_RINGS}; it sounds like mains hum, which 20 ms before the hit would prove",
+        },
+        {"residual_share": 0.02, "noise_ratio": 2.0},
+    ),
+    HitFlags.LOST_SCANS: HitFault(
+        "lost scans",
+        "Hit again; if it stays, lower the sample rate or use another cable.",
+        {"": "{count} scans are missing in this record"},
+    ),
+    HitFlags.NO_HIT: HitFault(
+        "no hit",
+        "Check the hammer cable and the trigger level.",
+        {"": "No hammer pulse stands out of the noise of the force"},
+    ),
+    HitFlags.SWAPPED_CHANNELS: HitFault(
+        "swapped channels", "Swap the two cables.", {"": "The force rings and the response does not"}
+    ),
+    HitFlags.TOO_HARD: HitFault(
+        "too hard",
+        "Hit softer or choose a larger force range.",
+        {"": "Peak of {peak:.4g} N is {share:.0%} of the range of {full:.0f} N"},
+        {"range_share": 0.9},
+    ),
+    HitFlags.NARROW_BAND: HitFault(
+        "narrow band",
+        "Use a harder hammer tip.",
+        {"": "The force reaches to {reach:.0f} Hz (-20 dB) of the {end:g} Hz wanted"},
+    ),
+    HitFlags.INCONSISTENT: HitFault(
+        "inconsistent",
+        "Hit the same spot in the same direction as before.",
+        {"": "FRF {distance:.0%} away from the mean of {count} hits (limit {limit:.0%})"},
+        {"mean_distance": 0.3, "noise_ratio": 4.0},
+    ),
+    HitFlags.UNDONE: HitFault("undone", "Taken back by the operator."),
+    HitFlags.NOT_EVALUATED: HitFault(
+        "not judged",
+        "Hit again; if it stays, check both sensors and their cables.",
+        {"": "Judging it failed ({reason})"},
+    ),
+}
+"""Fault of each flag.
+
+The limits are chosen. A peak below 2 % of the force range shows the steps of the converter. Above 90 % the sensor may
+saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
+noise. A hit 30 % away from the mean would move a mean of ten hits by 3 %. Its distance must also be 4 times what the
+scatter of the hits would give.
+"""

@@ -1,0 +1,115 @@
+"""A program to evaluate: its table, the tool and spindle it runs on, and the cuts on its path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import msgspec
+import numpy as np
+
+from lobes import Cut, Direction, Program
+from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
+from lobewatch.verdicts.uncertainty import Uncertainty, uncertainty_of
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramCase:
+    """A program with all that its evaluation depends on."""
+
+    table: ProgramTable
+    """Program, with the cutting coefficients learned from test cuts."""
+    assembly: Assembly
+    """Tool as tapped, or predicted."""
+    machine: Machine
+    """Machine: materials, drive, speeds, uncertainties."""
+    at_speed: SpindleAtSpeed = NO_TEST_CUTS
+    """Spindle at speed, as learned from test cuts."""
+    any_direction: bool = False
+    """Whether the milling direction is open: both are evaluated, the worse counts."""
+
+    @property
+    def depth(self) -> float:
+        """Axial depth of cut (m)."""
+        return self.table.depth_mm / 1e3
+
+    @cached_property
+    def program(self) -> Program:
+        """The program in SI units."""
+        return build_program(self.table, self.machine)
+
+    @cached_property
+    def spindle(self) -> Assembly:
+        """The tool with the median modes learned from test cuts."""
+        return self.at_speed.scale_modes(self.assembly)
+
+    @cached_property
+    def cuts(self) -> tuple[Cut, ...]:
+        """All cuts that the program makes on its path."""
+        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """Uncertainty by cause."""
+        return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
+
+    def at(self, speed_rpm: float, depth_mm: float) -> ProgramCase:
+        """Return the same program at another speed (rpm) and depth (mm)."""
+        return self.with_changes(speed_rpm=speed_rpm, depth_mm=depth_mm)
+
+    def with_changes(self, **fields: object) -> ProgramCase:
+        """Return the case of the program with other fields of its table."""
+        return replace(self, table=msgspec.structs.replace(self.table, **fields))
+
+
+def build_program(table: ProgramTable, machine: Machine) -> Program:
+    """Convert a program to SI units."""
+    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+
+
+MAX_OBLIQUE_FEED_IMMERSION = 0.5
+"""Radial depth over diameter below which a cut in both directions is worst at angles between x and y, always ..."""
+EQUAL_DIRECTION_TOLERANCES = (0.02, 0.1, 0.1)
+"""... and from which on it is only where f_n, zeta or K in x and y differ by more than this, relatively, or modes lie
+with rotated principal directions. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
+MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
+"""Directions that a cut may be milled in; a slot is both at once."""
+FEED_ANGLE_STEP = math.pi / 12
+"""Step of the angles between x and y (rad)."""
+
+
+def cutting_conditions_of(
+    table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
+) -> tuple[Cut, ...]:
+    """List the cuts that a program makes on its path, in no order.
+
+    In a corner the feed turns, whatever axis it follows on the straight.
+    """
+    differ = not are_directions_equal(spindle.x, spindle.y) or spindle.principal_directions.sign_patterns[0] is not None
+    return tuple(
+        replace(cut, feed_angle=angle, direction=direction)
+        for cut in machine.engaged_cuts(table)
+        for direction in (MILLING_DIRECTIONS if either and cut.immersion < 1 else (cut.direction,))
+        for angle in _feed_angles_of(table, cut.immersion, differ)
+    )
+
+
+def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:
+    """Return the feed directions as angles from x (rad); half a turn apart they are equivalent."""
+    if table.feed != "both" and table.corner_radius_mm is None:
+        return (FEED_ANGLES[table.feed],)
+    if immersion < MAX_OBLIQUE_FEED_IMMERSION or differ:
+        return tuple(i * FEED_ANGLE_STEP for i in range(round(math.pi / FEED_ANGLE_STEP)))
+    return tuple(FEED_ANGLES.values())
+
+
+def are_directions_equal(x: TipModes, y: TipModes) -> bool:
+    """Return whether the modes of both directions are equal, as those of a round spindle."""
+    if x is None or y is None or len(x) != len(y):
+        return False
+    numbers = np.array([[(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in side] for side in (x, y)])
+    return bool(np.all(np.abs(numbers[1] / numbers[0] - 1) <= EQUAL_DIRECTION_TOLERANCES))

@@ -1,0 +1,159 @@
+"""Drivers of other packages that fail or hang: their package is named, and all others go on."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition import (
+    DataError,
+    DeviceError,
+    DeviceIdentity,
+    DeviceSettings,
+    Driver,
+    Remark,
+    check_settings,
+    probe_port,
+)
+from acquisition.devices import convert_driver_errors, scan_ports
+from acquisition.devices.drivers import BUILT_IN_DRIVERS
+from acquisition.ports import SerialLink
+
+WHO = DeviceIdentity("X", "1", "2")
+FAILS = "fails when asked who is on PORT "
+TEXTS = " when asked who is on PORT, not a DeviceIdentity of texts"
+METADATA = "Metadata-Version: 2.1\nName: bad-daq\nVersion: 1.0\n"
+
+
+class UnprintableError(Exception):
+    """Error whose text cannot be read."""
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+class Stranger(BaseException):
+    """Exception that is no Exception."""
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    """Open a pseudo-terminal at which nobody answers."""
+    ends = os.openpty()
+    tty.setraw(ends[1])
+    yield os.ttyname(ends[1])
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture
+def bad_daq(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Install a package bad-daq that brings the driver "bad"."""
+    folder = tmp_path / "bad_daq-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text(METADATA, "utf-8")
+    (folder / "entry_points.txt").write_text("[lobewatch.drivers]\nbad = bad_daq:DRIVER\n", "utf-8")
+    (tmp_path / "bad_daq.py").write_text("raise SystemExit('not today')\n", "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def driver(name: str, probe: Callable[[SerialLink], Any], **more: Any) -> Driver:
+    return replace(BUILT_IN_DRIVERS[0], name=name, probe=probe, **more)
+
+
+def raising(error: BaseException) -> Callable[..., Any]:
+    def fail(*_: object) -> None:
+        raise error
+
+    return fail
+
+
+def closing(link: SerialLink) -> None:
+    link.close()
+    raise KeyError("link")
+
+
+def answering(link: SerialLink) -> DeviceIdentity:
+    link.write(b"?")
+    return WHO
+
+
+@pytest.mark.parametrize(
+    ("probe", "reason"),
+    [
+        (raising(KeyError("model")), FAILS + "(KeyError: 'model')"),
+        (raising(ValueError("two\nlines")), FAILS + "(ValueError: two lines)"),
+        (raising(SystemExit("enough")), FAILS + "(SystemExit: enough)"),
+        (raising(KeyboardInterrupt()), FAILS + "(KeyboardInterrupt)"),
+        (raising(Stranger()), FAILS + "(test_bad_drivers.Stranger)"),
+        (raising(UnprintableError()), FAILS + "(test_bad_drivers.UnprintableError: <exception str() failed>)"),
+        (closing, FAILS + "(KeyError: 'link')"),
+        (lambda _: "X 1 2", "answers str" + TEXTS),
+        (lambda _: ("X", "1", "2"), "answers tuple" + TEXTS),
+        (lambda _: DeviceIdentity, "answers type" + TEXTS),
+        (lambda _: DeviceIdentity(None), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
+        (lambda _: DeviceIdentity("X", 17), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
+        (lambda _: DeviceIdentity("X", b"1"), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
+    ],
+)  # fmt: skip
+def test_a_probe_that_fails_or_talks_rubbish_is_named_and_the_next_is_asked(
+    port: str, bad_daq: None, probe: Callable[[SerialLink], Any], reason: str
+) -> None:
+    remarks = list[Remark]()
+    found = probe_port(port, [driver("bad", probe), driver("good", answering)], None, remarks)
+    assert found is not None
+    assert (found.driver, found.identity) == ("good", WHO)
+    reason = f"the package bad-daq {reason}; update or remove that package".replace("PORT", port)
+    assert [(remark.code, str(remark).replace("tests.acquisition.devices.", "")) for remark in remarks] == [
+        ("package-not-loaded", f"driver 'bad': {reason}")
+    ]
+
+
+def test_a_probe_that_hangs_is_left_behind(port: str, bad_daq: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["acquisition.devices.registry"], "DRIVER_ANSWER_TIMEOUT", 0.2)
+    end, remarks = threading.Event(), list[Remark]()
+    found = probe_port(port, [driver("bad", lambda _: end.wait()), driver("good", lambda _: WHO)], None, remarks)
+    end.set()
+    assert found is not None
+    assert found.driver == "good"
+    assert [remark.text for remark in remarks] == [
+        f"the package bad-daq has not answered within 0.2 s who is on {port}"
+    ]
+
+
+def test_a_probe_that_says_the_device_is_gone_ends_nothing(port: str) -> None:
+    gone, good = driver("bad", raising(DeviceError("gone"))), driver("good", lambda _: WHO)
+    remarks = list[Remark]()
+    found = probe_port(port, [gone, good], None, remarks)
+    assert (found is not None, remarks) == (True, [])
+
+
+def test_ports_goes_on_without_a_package_that_ends_the_program_when_loaded(port: str, bad_daq: None) -> None:
+    survey = scan_ports(port)
+    assert [seen.text for seen in survey.ports] == ["no answer"]
+    assert [remark.text for remark in survey.remarks] == [
+        "the package bad-daq cannot be loaded (SystemExit: not today)"
+    ]
+
+
+@pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
+def test_settings_that_make_a_driver_fail_are_refused_with_its_package(bad_daq: None, error: BaseException) -> None:
+    with pytest.raises(DataError, match=r"driver 'bad': the package bad-daq fails when checking \[daq\] \(.*update or"):
+        check_settings(driver("bad", lambda _: None, check=raising(error)), DeviceSettings())
+
+
+@pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
+def test_a_driver_that_fails_when_opened_is_a_device_that_is_not_there(bad_daq: None, error: BaseException) -> None:
+    with (
+        pytest.raises(DeviceError, match="the package bad-daq fails when opening COM1"),
+        convert_driver_errors("bad", "opening COM1"),
+    ):
+        raise error

@@ -1,0 +1,122 @@
+"""Recording of a cut from a stream: awaited, taken with the air around it, and sensor faults reported."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource
+from acquisition.devices import find_driver
+from acquisition.emulation import Passage
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.cut_comparison import compare_cuts
+from lobewatch.machine import MachineFolder, make_machine_folder
+from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tap.cut_recording import record_cut
+from lobewatch.tap.emulated_cut import emulate_cut
+
+RATE = 12800.0
+CHANNELS = (Channel("force", 2e-3, 5.0), Channel("acceleration", 1e-2, 5.0))
+Floats = NDArray[np.float64]
+
+
+class Stream:
+    """Blocks of a signal as fast as they are read, with the interface of a device that matters here."""
+
+    identity, follows_clock, loss_detection, fault = DeviceIdentity("stream"), False, "", ""
+
+    def __init__(self, signal: Floats, lost_at: int = -1, channels: Any = CHANNELS) -> None:
+        self.signal, self.lost_at, self.channels, self.sample_rate = signal, lost_at, channels, RATE
+        self.events: deque[Any] = deque()
+
+    def blocks(self) -> Iterator[Block]:
+        codes = self.channels[-1].encode(self.signal)
+        for number, first in enumerate(range(0, codes.size, 256)):
+            part = codes[first : first + 256]
+            lost = 50 if number == self.lost_at else 0
+            yield Block(first, np.stack([np.zeros_like(part)] * (len(self.channels) - 1) + [part]), lost_before=lost)
+
+
+def sound(*parts: tuple[float, bool]) -> Floats:
+    """Return seconds of air or cut."""
+    random, found = np.random.default_rng(0), []
+    for seconds, is_cut in parts:
+        time = np.arange(round(seconds * RATE)) / RATE
+        lines = sum(5.0 * np.sin(2 * np.pi * 800.0 * k * time) for k in range(1, 7)) if is_cut else 0.0
+        found.append(random.normal(scale=0.05, size=time.size) + lines)
+    return np.concatenate(found)
+
+
+def record(stream: Stream, patience: float = 60.0) -> Any:
+    told: list[str] = []
+    return record_cut(stream, 0.005, patience, told.append), told  # type: ignore[arg-type]
+
+
+def test_one_cut_is_taken_with_the_air_around_it() -> None:
+    signal = sound((3.0, False), (2.0, True), (4.0, False))
+    found, told = record(Stream(signal))
+    assert found.seconds == pytest.approx(1.0 + 2.0 + 0.3, abs=0.1)
+    assert found.codes is not None
+    first = round(2.0 * RATE)
+    at = int(
+        np.argmin(
+            [
+                np.abs(found.codes[:200] - CHANNELS[1].encode(signal[i : i + 200])).sum()
+                for i in range(first - 900, first + 900)
+            ]
+        )
+    )
+    assert abs(at - 900) < 0.05 * RATE
+    assert told == ["hearing the spindle turn in air; begin the cut"]
+
+
+def test_a_cut_that_is_too_short_is_passed_over() -> None:
+    found, told = record(Stream(sound((1.0, False), (0.3, True), (2.0, False), (1.5, True), (1.0, False))))
+    assert found.seconds == pytest.approx(1.0 + 1.5 + 0.3, abs=0.1)
+    assert len(told) == 2
+
+
+def test_a_cut_that_does_not_end_is_taken_after_eight_seconds() -> None:
+    found, _ = record(Stream(sound((1.0, False), (20.0, True))))
+    assert 8.0 < found.seconds < 11.0
+
+
+def test_scans_lost_in_the_part_that_is_kept_are_counted() -> None:
+    signal = sound((1.0, False), (1.5, True), (1.0, False))
+    assert record(Stream(signal, lost_at=round(2.0 * RATE / 256)))[0].lost_scans == 50
+
+
+def test_no_cut_in_time_is_said() -> None:
+    with pytest.raises(DataError, match="no cut was heard in 3 s"):
+        record(Stream(sound((5.0, False))), 3.0)
+
+
+def test_a_dead_sensor_and_a_missing_one_are_said() -> None:
+    with pytest.raises(DeviceError, match="hears nothing"):
+        record(Stream(np.zeros(round(3 * RATE))))
+    with pytest.raises(DeviceError, match="end of its range"):
+        record(Stream(np.full(round(3 * RATE), 1e6)))
+    with pytest.raises(DataError, match="no acceleration channel"):
+        record(Stream(sound((1.0, False)), channels=CHANNELS[:1]))
+
+
+def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path: Path) -> None:
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    folder = MachineFolder(tmp_path / "m")
+    setting = find_cut_setting(folder.machine, "A: slot at 12 600 rpm", 12600.0, 2.0)
+    passage = Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
+    emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage)
+    with emulated.device as device, TapsSource(device.port) as source:
+        source.start()
+        signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
+        source.stop()
+    (found,) = compare_cuts(Logbook.open(folder.path), setting, signal)
+    assert found.detected.verdict == "stable"
+    assert found.speed_rpm == pytest.approx(emulated.speed_rpm, rel=5e-5)
+    assert found.speed_rpm != pytest.approx(setting.speed_rpm, rel=5e-4)

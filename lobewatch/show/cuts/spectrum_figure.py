@@ -12,23 +12,15 @@ from matplotlib.figure import Figure
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
-from lobewatch.show.figures.drawing import (
-    ALARM_ORANGE,
-    EVENT_GREY,
-    FIRST_GREY,
-    GOOD_GREEN,
-    NEWEST_BLUE,
-    new_axes,
-    save_figure,
-)
+from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
 from lobewatch.tool.assembly import Assembly
 
 LINE_KIND_MARKS = {
-    "turns": ("turns of the spindle", FIRST_GREY, "|"),
-    "tooth": ("tooth passing", NEWEST_BLUE, "o"),
-    "air": ("there in air", EVENT_GREY, "x"),
-    "chatter": ("chatter", ALARM_ORANGE, "D"),
+    "turns": ("turns of the spindle", Paint.FIRST, "|"),
+    "tooth": ("tooth passing", Paint.NEWEST, "o"),
+    "air": ("there in air", Paint.EVENT, "x"),
+    "chatter": ("chatter", Paint.ALARM, "D"),
 }
 """Label, grey-safe mark and paint of each kind of spectral line."""
 MIN_SHOWN_AMPLITUDE = 1e-4
@@ -74,4 +66,4 @@ def _draw_modes(axis: Axes, assembly: Assembly) -> None:
     for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
         for number, mode in enumerate(modes or ()):
             label = f"modes in {name}, at rest" if number == 0 else None
-            axis.axvline(mode.frequency, color=GOOD_GREEN, ls=dashes, lw=1, label=label)
+            axis.axvline(mode.frequency, color=Paint.GOOD, ls=dashes, lw=1, label=label)

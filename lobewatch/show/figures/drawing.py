@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -15,12 +16,18 @@ from matplotlib.ticker import LogFormatter
 
 from lobewatch.show.terminal.output import make_printable
 
-NEWEST_BLUE = "#0072B2"
-FIRST_GREY = "#777777"
-ALARM_ORANGE = "#D55E00"
-GOOD_GREEN = "#009E73"
-UNKNOWN_GREY = "#767676"
-EVENT_GREY = "#555555"
+
+class Paint(StrEnum):
+    """Paint of a thing in every figure, distinct in grey too by dashes and marks."""
+
+    NEWEST = "#0072B2"
+    FIRST = "#777777"
+    ALARM = "#D55E00"
+    GOOD = "#009E73"
+    UNKNOWN = "#767676"
+    EVENT = "#555555"
+
+
 FIGURE_STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.grid": True,

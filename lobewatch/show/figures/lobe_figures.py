@@ -25,17 +25,7 @@ from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
-from lobewatch.show.figures.drawing import (
-    ALARM_ORANGE,
-    FIRST_GREY,
-    GOOD_GREEN,
-    NEWEST_BLUE,
-    PHONE_FONT_SIZE,
-    UNKNOWN_GREY,
-    LabelPlacer,
-    new_axes,
-    save_figure,
-)
+from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, LabelPlacer, Paint, new_axes, save_figure
 from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
 from lobewatch.verdicts import Setting, Stability, Verdict
@@ -47,10 +37,10 @@ BAND_LABEL = "what is not known of spindle and cut moves the limit within this b
 WINDOW_LABEL = "safe speeds and depths"
 DOUBTFUL_YELLOW = "#B58900"
 VERDICT_MARKS = {
-    Stability.STABLE: (GOOD_GREEN, "o"),
+    Stability.STABLE: (Paint.GOOD, "o"),
     Stability.DOUBTFUL: (DOUBTFUL_YELLOW, "^"),
-    Stability.NOT_STABLE: (ALARM_ORANGE, "X"),
-    Stability.UNKNOWN: (UNKNOWN_GREY, "D"),
+    Stability.NOT_STABLE: (Paint.ALARM, "X"),
+    Stability.UNKNOWN: (Paint.UNKNOWN, "D"),
 }
 """Paint and mark of a program for each verdict."""
 POCKET_GREEN = "#00664A"
@@ -62,7 +52,7 @@ MAP_LEVELS = 12
 DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"
 MAX_DAYS_WITH_TIME = 10.0
 """Longest range that is labelled with times, not only with dates (days)."""
-TEST_CUT_MARKS = {False: ("heard stable", GOOD_GREEN, "o"), True: ("heard to chatter", ALARM_ORANGE, "x")}
+TEST_CUT_MARKS = {False: ("heard stable", Paint.GOOD, "o"), True: ("heard to chatter", Paint.ALARM, "x")}
 """Label, paint and mark of stable cuts and of cuts with chatter, wide and hollow."""
 TEST_CUT_MARK_SIZE, PROGRAM_MARK_SIZE = 11.0, 9.0
 """Size of the marks of test cuts and of programs (points)."""
@@ -95,12 +85,12 @@ def plot_lobes(
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
     low, high = (now[1], now[1]) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
-    axes.fill_between(speed_rpm, high, 2 * top, color=NEWEST_BLUE, alpha=0.10, lw=0)
+    axes.fill_between(speed_rpm, high, 2 * top, color=Paint.NEWEST, alpha=0.10, lw=0)
     if band is not None:
-        axes.fill_between(speed_rpm, low, high, color=NEWEST_BLUE, alpha=0.35, lw=0, label=BAND_LABEL)
-    axes.plot(speed_rpm, now[1] * 1e3, color=NEWEST_BLUE, lw=1.6, label=now[0])
+        axes.fill_between(speed_rpm, low, high, color=Paint.NEWEST, alpha=0.35, lw=0, label=BAND_LABEL)
+    axes.plot(speed_rpm, now[1] * 1e3, color=Paint.NEWEST, lw=1.6, label=now[0])
     for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=FIRST_GREY, ls="--", lw=1.2, label=f"{label}, first tap tests")
+        axes.plot(speed_rpm, depth * 1e3, color=Paint.FIRST, ls="--", lw=1.2, label=f"{label}, first tap tests")
     if learnt is not None:
         _draw_learned(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
@@ -143,7 +133,7 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
     colours = colormaps[DEPTH_COLORMAP](np.linspace(1, 0, levels.size + 1))
     mesh = axes.contourf(lobes.speed_rpm, radial, softness, levels=levels, colors=colours, extend="both")
     axes.contour(lobes.speed_rpm, radial, softness, levels=levels, colors="black", linewidths=0.3)
-    axes.axhline(present * diameter * 1e3, color=ALARM_ORANGE, ls="--", lw=2, clip_on=False)
+    axes.axhline(present * diameter * 1e3, color=Paint.ALARM, ls="--", lw=2, clip_on=False)
     bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=DEPTH_SCALE_LABEL)
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
@@ -236,7 +226,7 @@ def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) ->
         labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
     for cut in cuts:
         if cut.chatter_frequency_hz is not None:
-            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM_ORANGE)
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
 
 
 RADIAL_IMMERSIONS = np.linspace(0.05, 1.0, 39)

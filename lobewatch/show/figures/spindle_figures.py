@@ -16,7 +16,7 @@ from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook.chart_data import ModelFigureData
-from lobewatch.show.figures.drawing import ALARM_ORANGE, FIGURE_STYLE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE
+from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 
 CIRCLES_PER_ROW = 4
@@ -63,16 +63,16 @@ def _circle_rank(mode: Mode) -> tuple[int, float]:
 
 def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     f = state.frf.frequency
-    axes.semilogy(f, np.abs(state.frf.accelerance), color=FIRST_GREY, lw=0.8, label="measured")
+    axes.semilogy(f, np.abs(state.frf.accelerance), color=Paint.FIRST, lw=0.8, label="measured")
     for i, band in enumerate(state.bands):
         part = f[band.lines]
         size = (2 * np.pi * part) ** 2
         left = state.residual(band)[0]
         fitted = state.frf.receptance[band.lines] - left
         axes.semilogy(
-            part, np.abs(fitted) * size, color=NEWEST_BLUE, ls="--", label="fit in its bands" if i == 0 else None
+            part, np.abs(fitted) * size, color=Paint.NEWEST, ls="--", label="fit in its bands" if i == 0 else None
         )
-        axes.semilogy(part, np.abs(left) * size, color=ALARM_ORANGE, lw=0.6, label="measured - fit" if i == 0 else None)
+        axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label="measured - fit" if i == 0 else None)
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
     for mode, place in zip(modes, places, strict=True):
         axes.annotate(
@@ -112,15 +112,15 @@ def _spread_labels(places: Sequence[float], least: float) -> list[float]:
 
 def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     for band in state.bands:
-        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=FIRST_GREY, alpha=0.10, lw=0)
+        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=Paint.FIRST, alpha=0.10, lw=0)
         chart = band.data.chart
-        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=FIRST_GREY, ms=3)
+        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=Paint.FIRST, ms=3)
     for chart in stabilisation_charts(state):
-        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=NEWEST_BLUE, ms=3)
-    axes.plot([], [], "x", color=FIRST_GREY, ms=3, label="pole (in the bands)")
-    axes.plot([], [], "o", color=NEWEST_BLUE, ms=3, label="stable pole")
+        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=Paint.NEWEST, ms=3)
+    axes.plot([], [], "x", color=Paint.FIRST, ms=3, label="pole (in the bands)")
+    axes.plot([], [], "o", color=Paint.NEWEST, ms=3, label="stable pole")
     for mode in modes:
-        axes.axvline(mode.frequency, color=NEWEST_BLUE, lw=0.6)
+        axes.axvline(mode.frequency, color=Paint.NEWEST, lw=0.6)
     others = candidate_frequencies(state)
     for frequency, place in zip(
         others, _spread_labels(others.tolist(), MIN_LABEL_SPACING * np.ptp(axes.get_xlim())), strict=True
@@ -132,7 +132,7 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
             ha="center",
             va="bottom",
             fontsize=7,
-            color=NEWEST_BLUE,
+            color=Paint.NEWEST,
         )
     axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
     axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
@@ -160,10 +160,10 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     points = _mobility(f, mode.receptance(f) + state.residual(band)[0])[near]
     curve = _mobility(fine, mode.receptance(fine))
     top = complex(np.exp(1j * np.angle(mode.constant)) * np.max(np.abs(curve)))
-    axes.axhline(0.0, color=FIRST_GREY, lw=0.5)
-    axes.plot(points.real, points.imag, ".", color=FIRST_GREY, ms=4, label="measured")
-    axes.plot(curve.real, curve.imag, color=NEWEST_BLUE, lw=1, label="fit")
-    axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM_ORANGE, lw=1, label="phase")
+    axes.axhline(0.0, color=Paint.FIRST, lw=0.5)
+    axes.plot(points.real, points.imag, ".", color=Paint.FIRST, ms=4, label="measured")
+    axes.plot(curve.real, curve.imag, color=Paint.NEWEST, lw=1, label="fit")
+    axes.plot([0.0, top.real], [0.0, top.imag], color=Paint.ALARM, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(
         f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\n"
@@ -188,7 +188,7 @@ def _phase_text(mode: Mode) -> str:
 
 
 STEEL_GREY = "#c9d3dc"
-MODE_LINES = ((NEWEST_BLUE, "-"), (ALARM_ORANGE, "--"), (GOOD_GREEN, "-."), (FIRST_GREY, ":"))
+MODE_LINES = ((Paint.NEWEST, "-"), (Paint.ALARM, "--"), (Paint.GOOD, "-."), (Paint.FIRST, ":"))
 """Paint and dashes of the modes, in order."""
 
 
@@ -221,12 +221,12 @@ def draw_shaft(axes: Axes, spindle: Spindle) -> None:
         for side in (-1, 1):
             marker = "^" if side < 0 else "v"
             axes.plot(
-                bearing.position * 1e3, side * (radius + 5), marker, color=NEWEST_BLUE, ms=7, mec="white", mew=0.5
+                bearing.position * 1e3, side * (radius + 5), marker, color=Paint.NEWEST, ms=7, mec="white", mew=0.5
             )
     for mass in spindle.masses:
-        axes.plot(mass.position * 1e3, 0, "o", color=ALARM_ORANGE, ms=9, mec="white")
+        axes.plot(mass.position * 1e3, 0, "o", color=Paint.ALARM, ms=9, mec="white")
     for joint in spindle.joints:
-        axes.axvline(joint.position * 1e3, color=ALARM_ORANGE, ls="--", lw=1)
+        axes.axvline(joint.position * 1e3, color=Paint.ALARM, ls="--", lw=1)
     axes.axhline(0, color="black", lw=0.6, ls=(0, (12, 3, 2, 3)))
     axes.set(xlabel="distance from the tool tip (mm)", ylabel="radius (mm)", title="shaft, to scale")
     axes.set_xlim(-0.02 * start * 1e3, 1.02 * start * 1e3)
@@ -270,10 +270,10 @@ def draw_shapes(axes: Axes, modes: Modes) -> None:
 
 def draw_stiffness_curve(axes: Axes, curve: tuple[Floats, Floats], points: tuple[Floats, Floats]) -> None:
     """Draw frequency over bearing stiffness, with the tap tests."""
-    axes.semilogx(curve[0] / 1e6, curve[1], color=NEWEST_BLUE, lw=1.6, label="model")
+    axes.semilogx(curve[0] / 1e6, curve[1], color=Paint.NEWEST, lw=1.6, label="model")
     if points[0].size:
-        axes.plot(points[0] / 1e6, points[1], "o", color=FIRST_GREY, ms=4, label="tap tests")
-        axes.plot(points[0][-1] / 1e6, points[1][-1], "o", color=ALARM_ORANGE, ms=7, mec="white", label="newest")
+        axes.plot(points[0] / 1e6, points[1], "o", color=Paint.FIRST, ms=4, label="tap tests")
+        axes.plot(points[0][-1] / 1e6, points[1][-1], "o", color=Paint.ALARM, ms=7, mec="white", label="newest")
     axes.set(xlabel="bearing stiffness (N/µm)", ylabel="frequency (Hz)", title="followed mode over bearing stiffness")
     axes.legend(loc="lower right")
 
@@ -294,7 +294,7 @@ def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
             axes.plot(speed, values, color=colour, ls=dashes, label=label if first and label else None, **style)
     top = float(np.max(whirl.forward)) * 1.1
     axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once a revolution")
-    axes.axvspan(0, highest_speed / 1e3, color=GOOD_GREEN, alpha=0.10, lw=0, label="speed range of the machine")
+    axes.axvspan(0, highest_speed / 1e3, color=Paint.GOOD, alpha=0.10, lw=0, label="speed range of the machine")
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="frequency (Hz)", title="whirl speeds")
     axes.set(xlim=(0, speed[-1]), ylim=(0, top))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
@@ -305,9 +305,9 @@ def draw_model_frf(axes: Axes, model: Frf, measured: Frf | None) -> None:
     if measured is not None:
         shown = measured.in_band((float(model.frequency[0]), float(model.frequency[-1])))
         axes.semilogy(
-            shown.frequency, np.abs(shown.receptance) * 1e9, color=FIRST_GREY, lw=1.0, label="measured, newest"
+            shown.frequency, np.abs(shown.receptance) * 1e9, color=Paint.FIRST, lw=1.0, label="measured, newest"
         )
-    axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=NEWEST_BLUE, lw=1.6, ls="--", label="model")
+    axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=Paint.NEWEST, lw=1.6, ls="--", label="model")
     axes.set(xlabel="frequency (Hz)", ylabel="|receptance| (nm/N)")
     axes.set_xlim(model.frequency[0], model.frequency[-1])
     axes.legend(loc="upper right")

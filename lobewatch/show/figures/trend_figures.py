@@ -16,7 +16,7 @@ from acquisition import Frf
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.setup_tables import LimitsTable
 from lobewatch.monitoring.trend import Trend, point_days
-from lobewatch.show.figures.drawing import ALARM_ORANGE, EVENT_GREY, FIRST_GREY, NEWEST_BLUE, new_axes
+from lobewatch.show.figures.drawing import Paint, new_axes
 
 TREND_FIGURE_SIZE = (8.0, 2.8)
 """Size of a figure of one value (inches)."""
@@ -74,7 +74,10 @@ def plot_frf(
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [(now, "now", NEWEST_BLUE, "-"), *([(earliest, "first", FIRST_GREY, "--")] if earliest is not None else [])]
+    tests = [
+        (now, "now", Paint.NEWEST, "-"),
+        *([(earliest, "first", Paint.FIRST, "--")] if earliest is not None else []),
+    ]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -108,11 +111,11 @@ def plot_trend(
     """
     figure, (axes,) = new_axes(1, size)
     days = date2num(times)
-    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NEWEST_BLUE, capsize=2)
+    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=Paint.NEWEST, capsize=2)
     if limits is not None:
         for percent, colour, dashes in (
-            (limits.frequency_warn_percent, FIRST_GREY, "--"),
-            (limits.frequency_alarm_percent, ALARM_ORANGE, "-"),
+            (limits.frequency_warn_percent, Paint.FIRST, "--"),
+            (limits.frequency_alarm_percent, Paint.ALARM, "-"),
         ):
             level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
@@ -122,8 +125,8 @@ def plot_trend(
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
     if course is not None:
-        axes.plot(course.days, course.line, color=NEWEST_BLUE, lw=1)
-        axes.fill_between(course.days_ahead, course.low, course.high, color=NEWEST_BLUE, alpha=0.2, lw=0)
+        axes.plot(course.days, course.line, color=Paint.NEWEST, lw=1)
+        axes.fill_between(course.days_ahead, course.low, course.high, color=Paint.NEWEST, alpha=0.2, lw=0)
     _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
@@ -136,10 +139,10 @@ def plot_trend(
 def _add_marks(axes: Axes, marks: TrendMarks) -> None:
     if marks.excluded:
         days = date2num([time for time, _ in marks.excluded])
-        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=NEWEST_BLUE)
+        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=Paint.NEWEST)
     for time, text in marks.events:
         day = date2num(time)
-        axes.axvline(day, color=EVENT_GREY, ls=":", lw=1)
+        axes.axvline(day, color=Paint.EVENT, ls=":", lw=1)
         place: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points", "rotation": 90, "fontsize": 8}
         axes.annotate(
             shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place

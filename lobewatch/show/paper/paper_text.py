@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lobewatch.paper import Claim, Comparison, PaperStudy
+from lobewatch.show.terminal.json_fields import json_fields
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
@@ -17,26 +18,16 @@ PAPER_DIGITS = 7
 """Largest number of digits of a number of the paper."""
 
 
+NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference reason")
+CLAIM_FIELDS = json_fields("claim=text verdict evidence")
+
+
 def paper_json(study: PaperStudy, page: Path | None) -> dict[str, Any]:
     """Return every number and every claim of the paper, and the page that was written."""
+    rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {
-        "numbers": [
-            {
-                "section": section.title,
-                "quantity": row.quantity,
-                "where": row.where,
-                "unit": row.unit,
-                "paper": row.printed,
-                "ours": row.ours,
-                "difference": row.difference,
-                "reason": row.reason,
-            }
-            for section in study.sections
-            for row in section.comparisons
-        ],
-        "claims": [
-            {"claim": claim.text, "verdict": claim.verdict, "evidence": claim.evidence} for claim in study.claims
-        ],
+        "numbers": [{"section": title, **NUMBER_FIELDS(row)} for title, row in rows],
+        "claims": list(map(CLAIM_FIELDS, study.claims)),
         "page": page and str(page),
     }
 

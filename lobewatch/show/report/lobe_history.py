@@ -54,17 +54,8 @@ class LobeDiagram(NamedTuple):
 
     def figure(self, *, is_small: bool = False) -> Figure:
         """Plot the diagram; is_small: smaller, to accompany text."""
-        return plot_lobes(
-            self.now.speed_rpm,
-            self.depths,
-            self.verdicts,
-            "",
-            self.band,
-            self.advice,
-            self.heard,
-            self.learned,
-            is_small=is_small,
-        )
+        drawn = self.depths, self.verdicts, "", self.band, self.advice, self.heard, self.learned
+        return plot_lobes(self.now.speed_rpm, *drawn, is_small=is_small)
 
     @property
     def edges(self) -> dict[str, Floats]:

@@ -20,6 +20,7 @@ from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
 from lobewatch.show.report.summary import make_summary
+from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.status_labels import status_css_class
 from lobewatch.verdicts.verdict import Stability
 
@@ -53,31 +54,29 @@ def render_report(
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
 
 
+REPORT_FIELDS = json_fields("""
+    name=machine.machine.name tool=last.tool direction=last.direction last=last.time label=machine.spindle.label
+    tap_id=newest.id software=analysis.history.software
+""")
+
+
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
 ) -> dict[str, Any]:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
-    groups = [make(data) for make in sections]
-    machine, last, tap = data.machine, data.last, data.newest
-    return {
+    groups, tap = [make(data) for make in sections], data.newest
+    return REPORT_FIELDS(data) | {
         "groups": groups,
         "has_plots": any(section.has_plot for group in groups for section in group),
         "numbering": count(1),
-        "name": machine.machine.name,
-        "tool": last.tool,
-        "direction": last.direction,
         "first": data.rows[0].time,
-        "last": last.time,
         "n_taps": len(data.rows),
         "as_of": data.outlook.status.time.astimezone(),
-        "label": machine.spindle.label if machine.spindle else "",
         "first_screen": make_summary(data),
-        "tap_id": tap.id,
-        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(last.conditions)],
+        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(data.last.conditions)],
         "good": len(tap.accepted),
         "hits": len(tap.hits),
-        "software": analysis.history.software,
     }
 
 

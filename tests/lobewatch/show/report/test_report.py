@@ -20,6 +20,7 @@ from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.report.page import GAUGE_WIDTH, make_gauge, render_page
 from lobewatch.show.report.report import render_fleet, render_report, spark_points
 from lobewatch.show.report.report_data import collect_report_data
+from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -65,7 +66,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
         "Tap next by 2026-07-14",
     ):
         assert words in first, words
-    assert standing.next_step in unescape(first)
+    assert with_option_names(standing.next_step) in unescape(first)
     assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
     assert first.count("<figure>") == 2
     heads, lines = numbers(html, "natural-frequency")

@@ -10,6 +10,8 @@ import pytest
 from lobewatch.monitoring.forecast import Rate
 from lobewatch.show.trend import rate_text
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize(
     ("rate", "text"),

@@ -14,6 +14,8 @@ from lobewatch.show.figures.lobe_figures import plot_lobes
 from lobewatch.verdicts import Setting, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import LimitBand
 
+pytestmark = pytest.mark.quick
+
 
 def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
     speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 2e-3)

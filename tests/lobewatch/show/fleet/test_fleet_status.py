@@ -11,6 +11,8 @@ from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.fleet.fleet_status import fleet_rows, fleet_text
 from lobewatch.show.report.report import render_fleet
 
+pytestmark = pytest.mark.quick
+
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
 

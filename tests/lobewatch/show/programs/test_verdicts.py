@@ -24,6 +24,8 @@ from lobewatch.show.programs.verdicts import (
 from lobewatch.show.terminal.output import SafeConsole, emit
 from lobewatch.verdicts import Stability, Verdict
 
+pytestmark = pytest.mark.quick
+
 
 def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> ProgramTable:
     return ProgramTable(

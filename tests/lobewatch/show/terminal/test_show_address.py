@@ -8,6 +8,8 @@ import pytest
 
 from lobewatch.show.terminal.output import show_address
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("is_terminal", [True, False])
 @pytest.mark.parametrize("display", [":0", ""])

@@ -41,7 +41,7 @@ def observe(
     from lobewatch.machine.folder_updates import find_contradicting_cuts, make_observed_cut, store_cut
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.notify.publish_status import publish_on_change
-    from lobewatch.show.history import contradiction_remark, test_cut_json, test_cut_text, untapped_remarks
+    from lobewatch.show.history import contradiction_remark, cut_json, cut_text, untapped_remarks
 
     if stable == chatter:
         raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
@@ -54,6 +54,6 @@ def observe(
     ]
     with publish_on_change(logbook):
         stored = store_cut(logbook.folder, heard)
-        payload = {"cut": test_cut_json(stored), "remarks": [remark.code for remark in remarks]}
-        emit(payload, as_json, f"saved {test_cut_text(stored)}")
+        payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}
+        emit(payload, as_json, f"saved {cut_text(stored)}")
     print_remarks(remarks)

@@ -39,7 +39,7 @@ def suggest(
         tried_depths_json,
         tried_depths_lines,
     )
-    from lobewatch.show.terminal.output import remark_json, remark_lines
+    from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine)
     table = find_program(logbook.machine, program)
@@ -47,7 +47,7 @@ def suggest(
     if assembly.without_stiffness and not assembly.directions:
         depths, first = find_pocket_depths(table, assembly, logbook.machine, logbook.cuts), choose_first_depth(table)
         remarks = [*logbook.remarks, *assembly.remarks]
-        payload = tried_depths_json(table, depths, first) | {"remarks": [remark_json(remark) for remark in remarks]}
+        payload = tried_depths_json(table, depths, first) | {"remarks": list(remarks)}
         lines = tried_depths_lines(table, depths, first, logbook.folder.path)
         emit(payload, as_json, speed_pocket_table([heard.pocket for heard in depths]), *lines, *remark_lines(remarks))
         return
@@ -55,7 +55,7 @@ def suggest(
     suggestion = find_next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *learned_remarks(suggestion.learning)]
     emit(
-        suggestion_json(suggestion) | {"remarks": [remark_json(remark) for remark in remarks]},
+        suggestion_json(suggestion) | {"remarks": list(remarks)},
         as_json,
         *suggestion_lines(suggestion, logbook.folder.path),
         *learned_texts(suggestion.learning),

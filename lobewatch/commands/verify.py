@@ -27,13 +27,12 @@ def verify(
     """
     from lobewatch.machine.verify_files import DAMAGE_CODES
     from lobewatch.machine.verify_files import verify as verify_folder
-    from lobewatch.show.terminal.output import remark_json
 
     verification = verify_folder(machine)
     notes = [remark for remark in verification.remarks if remark.code not in DAMAGE_CODES]
     payload = {
-        "damage": [remark_json(remark) for remark in verification.damage],
-        "remarks": [remark_json(remark) for remark in notes],
+        "damage": list(verification.damage),
+        "remarks": list(notes),
         "adopted": verification.entered,
         "sound_taps": verification.n_taps,
     }

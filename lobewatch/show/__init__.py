@@ -1,1 +1,1 @@
-"""Results for people: texts, tables, figures, report, terminal."""
+"""Show results to people and programs: texts, tables, figures, reports, and JSON."""

@@ -16,15 +16,15 @@ from lobewatch.show.trend import reach_text
 from lobewatch.tap.demo import DemoTap, LevelForecast, SpindleState
 
 STATE_KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
-"""Names of the figures of a SpindleState in JSON."""
+"""JSON keys of the values of a SpindleState."""
 STATE_NAMES = ("f_1", "zeta", "K", "bearing stiffness")
-"""Names of these figures for people."""
+"""Names of the values of a SpindleState for people."""
 DEMO_COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
-"""Heading, size of the unit and decimals."""
+"""Heading, size of the unit and decimals of each value."""
 
 
 def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
-    """All tap tests, and the forecast beside the truth."""
+    """Return all tap tests of the demo, and the forecast with the true dates."""
     levels = {
         forecast.level: {**forecast.reached.to_row(), "truth": _date_text(forecast.truth)} for forecast in forecasts
     }
@@ -47,22 +47,19 @@ def _state_json(state: SpindleState) -> dict[str, float]:
 def demo_texts(
     taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path
 ) -> list[str | Table]:
-    """Tap tests, worst errors, and the forecast beside the truth, for people; scatter: of f_1, as a share of it."""
+    """Return the true and the measured values, their errors, and the forecast with the truth."""
     in_x = [tap for tap in taps if tap.plan.direction == "x"]
     first, last = in_x[0], in_x[-1]
     measured = last.result.relative_to(first.result).stiffness
     true = last.plan.truth.relative_to(first.plan.truth).stiffness
+    heading = "Foretold after the last test, and what the emulated spindle does if it goes on so:"
     return [
         "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
         f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
-        _demo_table(taps),
+        new_table("<test", *DEMO_HEADINGS, rows=map(_demo_cells, taps)),
         "worst error: " + ", ".join(_worst_errors(taps)),
         f"K over the whole demo, in x: {100 * measured:+z.2f} % found, {100 * true:+z.2f} % true",
-        *(
-            []
-            if not forecasts
-            else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]
-        ),
+        *([heading] if forecasts else []),
         *(_forecast_text(forecast, taps[-1].plan.date) for forecast in forecasts),
         f"report: {report}",
     ]
@@ -73,17 +70,13 @@ def _forecast_text(forecast: LevelForecast, last: datetime) -> str:
     return f"{forecast.level}: {reach_text(forecast.reached, last)}; true {true}"
 
 
-def _demo_table(taps: Sequence[DemoTap]) -> Table:
-    rows = new_table("<test", *(word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")))
-    for tap in taps:
-        pairs = zip(astuple(tap.plan.truth), astuple(tap.result), strict=True)
-        cells = [
-            f"{value / scale:.{digits}f}"
-            for pair, (_, scale, digits) in zip(pairs, DEMO_COLUMNS, strict=True)
-            for value in pair
-        ]
-        rows.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
-    return rows
+DEMO_HEADINGS = [word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")]
+
+
+def _demo_cells(tap: DemoTap) -> list[str]:
+    pairs = zip(astuple(tap.plan.truth), astuple(tap.result), DEMO_COLUMNS, strict=True)
+    values = (f"{value / scale:.{digits}f}" for *pair, (_, scale, digits) in pairs for value in pair)
+    return [f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *values]
 
 
 def _worst_errors(taps: Sequence[DemoTap]) -> list[str]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any
-
-from rich.cells import cell_len, set_cell_size
 
 from acquisition import Conditions, Remark
 from dsm import format_rounded
@@ -19,24 +17,25 @@ from lobewatch.machine import TapEntry
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import Acknowledgement, MaintenanceEvent
-from lobewatch.show.programs.materials import power_json, power_text
-from lobewatch.show.terminal.output import format_csv
+from lobewatch.show.programs.materials import power_text
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import align_columns, blank_nonfinite, format_csv
 
 
-def test_cut_text(cut: CutEntry) -> str:
-    """A test cut in one line."""
+def cut_text(cut: CutEntry) -> str:
+    """Return a test cut with its name and time, in one line."""
     return f"{cut.id}: {cut.at.astimezone():%Y-%m-%d %H:%M} {cut_summary_text(cut)}"
 
 
 def cut_summary_text(cut: CutEntry) -> str:
-    """Name, speed and depth of a test cut, what it sounded like, and its power."""
+    """Return name, speed and depth of a test cut, its result, and its power."""
     named = cut.program or "reference cut"
     words = f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {cut_result_text(cut)}, by {cut.by}"
     return words if cut.power is None else f"{words}; {power_text(cut.power, cut.cut)}"
 
 
 def cut_result_text(cut: CutEntry) -> str:
-    """Sound of a test cut, in words."""
+    """Return the result of a test cut in words."""
     heard: str = cut.word
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
@@ -44,36 +43,26 @@ def cut_result_text(cut: CutEntry) -> str:
     return heard + (f" ({cut.reason})" if cut.reason else "")
 
 
-def test_cut_json(cut: CutEntry) -> dict[str, Any]:
-    """One test cut."""
-    return {
-        "id": cut.id,
-        "time": cut.at.astimezone(UTC).isoformat(timespec="microseconds"),
-        "program": cut.program,
-        "tool": cut.tool,
-        "feed": cut.feed,
-        "speed_rpm": cut.speed_rpm,
-        "commanded_rpm": cut.commanded_rpm,
-        "depth_mm": 1e3 * cut.depth,
-        "word": cut.word,
-        "chatter_frequency_hz": cut.chatter_frequency_hz,
-        "chatter_frequency_hz_std": cut.chatter_frequency_std_hz,
-        "by": cut.by,
-        **power_json(cut.power),
-        "reason": cut.reason,
-        "recording": None if cut.recording is None else cut.recording.file,
-        "excluded": cut.excluded,
-    }
+CUT_FIELDS = json_fields("""
+    id time=at program tool feed speed_rpm commanded_rpm depth_mm=depth*1e3 word chatter_frequency_hz
+    chatter_frequency_hz_std=chatter_frequency_std_hz by power_kw=power.watts/1e3
+    tangential_by_power_n_per_mm2=power.tangential/1e6 reason recording=recording.file excluded
+""")
+
+
+def cut_json(cut: CutEntry) -> dict[str, Any]:
+    """Return one test cut as a JSON object."""
+    return CUT_FIELDS(cut) | {"time": _utc_text(cut.at)}
 
 
 def saved_cut_remarks(logbook: Logbook, cut: CutEntry, earlier: Sequence[CutEntry]) -> list[Remark]:
-    """What is to be said of a cut that was heard and kept; earlier: those kept before."""
+    """Return the remarks on a cut that was saved; earlier: cuts saved before."""
     contrary = find_contradicting_cuts(cut, earlier) if cut.is_usable else ()
     return [*untapped_remarks(logbook, cut), *map(contradiction_remark, contrary)]
 
 
 def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
-    """A remark that the tool was never tapped; none where it was."""
+    """Return a remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
     text = "was never tapped: the cut is kept, and counts when it is"
@@ -81,22 +70,22 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
 
 
 def contradiction_remark(cut: CutEntry) -> Remark:
-    """A remark that a cut was heard otherwise before."""
+    """Return a remark that an earlier cut at the same point had another result."""
     text = f"heard otherwise at the same point ({cut_summary_text(cut)}); both are kept"
     cure = f"lobewatch exclude MACHINE {cut.id} --reason TEXT takes out the one that is wrong"
     return Remark("cuts-contradict", cut.id, text, cure)
 
 
 ROW_FIELDS = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
-"""Field of a row by its name in CSV and JSON."""
+"""Field of a row for each JSON key and CSV column."""
 HISTORY_HEADINGS = (
     ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
 )
 NUMBER_COLUMNS = 4, 5, 6
-"""Columns of numbers."""
+"""Columns that are aligned to the right."""
 MIN_SHORT_NAME = 6
-"""Characters of the shortest name of a tap test, an end of its identity: "x_ecbf"."""
+"""Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
 CONDITION_NAMES = tuple(field.name for field in fields(Conditions))
 HISTORY_COLUMNS = ("time", "kind", "id", "tool", "direction")
 CONDITION_FORMATS = {
@@ -108,35 +97,38 @@ CONDITION_FORMATS = {
     "reclamped": "clamped anew",
     "note": "note: {}",
 }
-"""Words for a condition of a tap test, by its name."""
+"""Words for each condition of a tap test."""
 
 
 def event_text(event: MaintenanceEvent) -> str:
-    """For people."""
+    """Return an event in one line."""
     baseline = " (new baseline)" if event.new_baseline else ""
     return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
 
 
+EVENT_FIELDS = json_fields("id time text new_baseline")
+ACKNOWLEDGEMENT_FIELDS = json_fields("id=alarm_id time operator until note")
+TAP_FIELDS = json_fields("""
+    id=tap_id time tool direction frequency_hz=frequency.value frequency_hz_std=frequency.std
+    damping_ratio=damping_ratio.value damping_ratio_std=damping_ratio.std stiffness_n_per_m=stiffness.value
+    stiffness_n_per_m_std=stiffness.std baseline series conditions=conditions.specified software
+""")
+EXCLUDED_FIELDS = json_fields("id time tool direction conditions=conditions.specified reason=excluded")
+
+
 def event_json(event: MaintenanceEvent) -> dict[str, Any]:
-    """One event."""
-    named = {"id": event.id, "time": _utc_text(event.time), "text": event.text}
-    return {**named, "new_baseline": event.new_baseline}
+    """Return one event as a JSON object."""
+    return EVENT_FIELDS(event) | {"time": _utc_text(event.time)}
 
 
-def acknowledgement_json(word: Acknowledgement) -> dict[str, Any]:
-    """One acknowledgement."""
-    until = word.until and _utc_text(word.until)
-    return {
-        "id": word.alarm_id,
-        "time": _utc_text(word.time),
-        "operator": word.operator,
-        "until": until,
-        "note": word.note,
-    }
+def acknowledgement_json(acknowledgement: Acknowledgement) -> dict[str, Any]:
+    """Return one acknowledged alarm as a JSON object."""
+    until = acknowledgement.until and _utc_text(acknowledgement.until)
+    return ACKNOWLEDGEMENT_FIELDS(acknowledgement) | {"time": _utc_text(acknowledgement.time), "until": until}
 
 
 def history_json(logbook: Logbook) -> dict[str, Any]:
-    """The whole history; an excluded tap test has no values, those of one that is kept count for nothing."""
+    """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
@@ -144,44 +136,39 @@ def history_json(logbook: Logbook) -> dict[str, Any]:
         "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
         "events": [event_json(event) for event in logbook.files.events],
         "acknowledged": [acknowledgement_json(word) for word in logbook.files.acknowledgements],
-        "cuts": [test_cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.cuts],
+        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.cuts],
     }
 
 
 def history_csv(logbook: Logbook) -> str:
-    """A line for each tap test, cut, event and acknowledgement, excluded or not, oldest first; headings on top."""
-    names = [program.name for program in logbook.machine.program]
+    """Return a CSV line for each tap test, cut, event and acknowledgement, oldest first, below the headings."""
     values = [heading for name in ROW_FIELDS for heading in (name, f"{name}_std")]
-    verdicts = {name: f"verdict: {name}" for name in names}
-    heads = [*HISTORY_COLUMNS, *values, *CONDITION_NAMES, "questions", *verdicts.values(), "reason", "text"]
-    rows: list[list[Any]] = [heads]
-    for line in _history_entries(logbook):
-        cells = {key: value for key, value in line.items() if key in heads} | line.get("conditions", {})
-        cells |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
-        cells["questions"] = " ".join(line.get("questions", ()))
-        rows.append([_csv_value(cells.get(head)) for head in heads])
+    verdicts = {program.name: f"verdict: {program.name}" for program in logbook.machine.program}
+    headings = [*HISTORY_COLUMNS, *values, *CONDITION_NAMES, "questions", *verdicts.values(), "reason", "text"]
+    rows: list[list[Any]] = [headings]
+    for entry in _history_entries(logbook):
+        cells = {key: value for key, value in entry.items() if key in headings} | entry.get("conditions", {})
+        cells |= {verdicts[name]: word for name, word in entry.get("verdicts", {}).items()}
+        cells["questions"] = " ".join(entry.get("questions", ()))
+        rows.append([blank_nonfinite(cells.get(heading)) for heading in headings])
     return format_csv(rows)
 
 
 def history_lines(logbook: Logbook) -> list[str]:
-    """For people, in local time: a line for each tap test and event below the headings, what is said of it below it."""
-    lines = _history_entries(logbook)
-    taps = [line["id"] for line in lines if "direction" in line]
+    """Return the history in local time: a line for each entry below the headings, its notes in a line below it."""
+    entries = _history_entries(logbook)
+    taps = [entry["id"] for entry in entries if "direction" in entry]
     names = dict(zip(taps, shorten_ids(taps), strict=True))
-    rows = [
-        *HISTORY_HEADINGS,
-        *((*_history_cells(line), names.get(line["id"], line.get("name", ""))) for line in lines),
-    ]
-    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
-    shown = ["  ".join(_align_cells(row, widths)).rstrip() for row in rows]
-    texts = ["", "", *map(_note_text, lines)]
-    return [part for row, text in zip(shown, texts, strict=True) for part in (row, f"  {text}") if part.strip()]
+    cells = ((*_history_cells(entry), names.get(entry["id"], entry.get("name", ""))) for entry in entries)
+    lines = align_columns([*HISTORY_HEADINGS, *cells], NUMBER_COLUMNS)
+    texts = ["", "", *map(_note_text, entries)]
+    return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
 
 
 def shorten_ids(ids: Sequence[str]) -> list[str]:
-    """The shortest end of each identity that no other contains, of six characters at least.
+    """Return the shortest end of each identity that no other identity contains, of six characters at least.
 
-    Commands take it in place of the identity.
+    Commands accept it instead of the identity.
     """
     names, size = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
     left = [name for name in names if len(name) > size]
@@ -196,12 +183,6 @@ def shorten_ids(ids: Sequence[str]) -> list[str]:
     return [names[name] for name in ids]
 
 
-def _align_cells(row: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
-    """Cells as wide as their columns, numbers to the right."""
-    for place, (cell, width) in enumerate(zip(row, widths, strict=True)):
-        yield " " * (width - cell_len(cell)) + cell if place in NUMBER_COLUMNS else set_cell_size(cell, width)
-
-
 def _history_cells(line: Mapping[str, Any]) -> list[str]:
     when = f"{datetime.fromisoformat(line['time']).astimezone():%Y-%m-%d %H:%M}"
     numbers = [_value_text(line, name, scale) for name, scale in zip(ROW_FIELDS, (1.0, 0.01, 1e6), strict=True)]
@@ -209,60 +190,45 @@ def _history_cells(line: Mapping[str, Any]) -> list[str]:
 
 
 def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
-    """Tap tests, excluded ones, events, acknowledgements and test cuts, oldest first."""
+    """Return tap tests, excluded ones, events, acknowledgements and test cuts as JSON objects, oldest first."""
     history = history_json(logbook)
-    events = [
-        event | {"kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]}
+    entries = [{**tap, "kind": kind} for kind in ("taps", "kept", "excluded") for tap in history[kind]]
+    for entry in entries:
+        entry["kind"] = entry["kind"].removesuffix("s")
+    entries += [
+        {**event, "kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]}
         for event in history["events"]
     ]
-    excluded = [tap | {"kind": "excluded"} for tap in history["excluded"]]
-    taps = [tap | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for tap in history[name]]
-    cuts = [_cut_entry(cut) for cut in history["cuts"]]
-    words = [
-        {"kind": "ack", "id": word.alarm_id, "time": _utc_text(word.time), "text": f"{word.alarm_id}: {word}"}
-        for word in logbook.files.acknowledgements
-    ]
-    return sorted([*events, *excluded, *taps, *cuts, *words], key=lambda line: line["time"])
-
-
-def _cut_entry(cut: Mapping[str, Any]) -> dict[str, Any]:
-    """A test cut as the table shows it."""
-    kind = "excluded" if cut["excluded"] else "cut"
-    shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
-    return {**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}}
+    for cut in history["cuts"]:
+        shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
+        kind = "excluded" if cut["excluded"] else "cut"
+        entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
+    for acknowledgement in logbook.files.acknowledgements:
+        text = f"{acknowledgement.alarm_id}: {acknowledgement}"
+        time = _utc_text(acknowledgement.time)
+        entries.append({"kind": "ack", "id": acknowledgement.alarm_id, "time": time, "text": text})
+    return sorted(entries, key=lambda entry: entry["time"])
 
 
 def _tap_json(row: HistoryRow, logbook: Logbook) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "id": row.tap_id,
+    verdicts = row.verdicts or {}
+    names = [program.name for program in logbook.machine.program if program.name in verdicts]
+    return TAP_FIELDS(row) | {
         "time": _utc_text(row.time),
-        "tool": row.tool,
-        "direction": row.direction,
+        "baseline": row.baseline and _utc_text(row.baseline),
+        "software": row.software or logbook.history.software,
+        "questions": [question.code for question in row.questions],
+        "verdicts": {name: verdicts[name].stability.value for name in names},
     }
-    for name, field in ROW_FIELDS.items():
-        entry[name], entry[f"{name}_std"] = getattr(row, field)
-    entry["baseline"] = None if row.baseline is None else _utc_text(row.baseline)
-    entry["series"], entry["conditions"] = row.series, row.conditions.specified
-    entry["software"] = row.software or logbook.history.software
-    entry["questions"] = [question.code for question in row.questions]
-    words = row.verdicts or {}
-    entry["verdicts"] = {p.name: words[p.name].stability.value for p in logbook.machine.program if p.name in words}
-    return entry
 
 
 def _excluded_json(tap: TapEntry) -> dict[str, Any]:
-    time = _utc_text(datetime.fromisoformat(tap.time))
-    named = {"id": tap.id, "time": time, "tool": tap.tool, "direction": tap.direction}
-    return {**named, "conditions": tap.conditions.specified, "reason": tap.excluded}
+    return EXCLUDED_FIELDS(tap) | {"time": _utc_text(datetime.fromisoformat(tap.time))}
 
 
 def _utc_text(time: datetime) -> str:
-    """A time as text, all alike, so that they sort."""
+    """Return a time as text of one form, which sorts by time."""
     return time.astimezone(UTC).isoformat(timespec="microseconds")
-
-
-def _csv_value(value: Any) -> Any:
-    return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _value_text(line: Mapping[str, Any], name: str, scale: float) -> str:
@@ -271,7 +237,7 @@ def _value_text(line: Mapping[str, Any], name: str, scale: float) -> str:
 
 
 def _note_text(line: Mapping[str, Any]) -> str:
-    """Its text or reason, conditions, what is asked, and the verdicts of then."""
+    """Return text or reason of an entry, or conditions, questions and verdicts of a tap test."""
     if "text" in line:
         return f"{line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
     under = condition_texts(Conditions.from_mapping(line["conditions"]))
@@ -282,9 +248,6 @@ def _note_text(line: Mapping[str, Any]) -> str:
 
 
 def condition_texts(conditions: Conditions) -> list[str]:
-    """Conditions of a tap test that are known, a few words each."""
-    return [
-        words.format(conditions.specified[name])
-        for name, words in CONDITION_FORMATS.items()
-        if name in conditions.specified
-    ]
+    """Return a few words for each condition of a tap test that is specified."""
+    given = conditions.specified
+    return [words.format(given[name]) for name, words in CONDITION_FORMATS.items() if name in given]

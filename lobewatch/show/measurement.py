@@ -15,36 +15,37 @@ from lobewatch.measurement import Measurement, check_modes_together
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS, find_accepted_codes, format_not_asked
 from lobewatch.monitoring.series_history import build_series_history, estimate_preload
 from lobewatch.show.history import condition_texts
-from lobewatch.show.models import calibration_json
+from lobewatch.show.models import CALIBRATION_FIELDS
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
 from lobewatch.show.programs.lobes import lobes_json
-from lobewatch.show.programs.verdicts import program_texts, programs_json, verdict_table
-from lobewatch.show.terminal.output import emit, notes, remark_json, remark_lines
+from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
+from lobewatch.show.terminal.output import emit, notes, remark_lines
 from lobewatch.show.terminal.status_labels import status_label
 from lobewatch.tap.session import TapSession
 from lobewatch.tool import compute_lobes
 
 
-def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
-    """A measurement, the diagrams of its tool as it was known then, and the programs as they stand now."""
-    assembly = logbook.assembly(until=m.tap_id)
+def measurement_json(measurement: Measurement, logbook: Logbook) -> dict[str, Any]:
+    """Return a measurement, the diagrams of its tool as it was known then, and the remarks on it."""
+    assembly, calibration = logbook.assembly(until=measurement.tap_id), measurement.calibration
+    lobes = compute_lobes(assembly, logbook.machine)
     return {
-        "tap_id": m.tap_id,
-        "time": m.time.isoformat(),
-        "tool": m.tool,
-        "direction": m.direction,
-        "conditions": _tap_conditions(m, logbook).specified,
-        "modes": [mode_json(mode) for mode in m.modes],
-        "followed": mode_json(m.followed) if m.followed else None,
-        "calibration": calibration_json(m.calibration) if m.calibration else None,
-        "preload_left": _remaining_preload(m, logbook),
-        "lobes": [lobes_json(name, lobes) for name, lobes in compute_lobes(assembly, logbook.machine).items()],
-        "remarks": [remark_json(remark) for remark in assembly.remarks],
+        "tap_id": measurement.tap_id,
+        "time": measurement.time.isoformat(),
+        "tool": measurement.tool,
+        "direction": measurement.direction,
+        "conditions": _tap_conditions(measurement, logbook).specified,
+        "modes": [mode_json(mode) for mode in measurement.modes],
+        "followed": measurement.followed and mode_json(measurement.followed),
+        "calibration": calibration and CALIBRATION_FIELDS(calibration),
+        "preload_left": _remaining_preload(measurement, logbook),
+        "lobes": [lobes_json(name, diagram) for name, diagram in lobes.items()],
+        "remarks": assembly.remarks,
     }
 
 
 def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
-    """A measurement for people."""
+    """Return a measurement in words."""
     named = [f"tool {m.tool}", f"direction {m.direction}", *condition_texts(_tap_conditions(m, logbook))]
     texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
     if m.modes:
@@ -64,12 +65,13 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     return [*texts, *remark_lines(further), *map(_question_text, asked)]
 
 
-def _remaining_preload(m: Measurement, logbook: Logbook) -> RemainingPreload | None:
-    """Against the start of its series, as it was known then."""
-    rows = [row for row in logbook.history.series(m.tool, m.direction) if row.time <= m.time]
-    return (
-        estimate_preload(build_series_history(rows), logbook.machine) if rows and rows[-1].tap_id == m.tap_id else None
-    )
+def _remaining_preload(measurement: Measurement, logbook: Logbook) -> RemainingPreload | None:
+    """Compare the preload with that at the start of the series, as it was known at that time."""
+    series = logbook.history.series(measurement.tool, measurement.direction)
+    rows = [row for row in series if row.time <= measurement.time]
+    if not rows or rows[-1].tap_id != measurement.tap_id:
+        return None
+    return estimate_preload(build_series_history(rows), logbook.machine)
 
 
 def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
@@ -77,7 +79,6 @@ def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
 
 
 def _question_text(question: Remark) -> str:
-    """A question with its code."""
     return f"question ({question.code}): {question.text}"
 
 
@@ -90,7 +91,9 @@ def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: 
         if session.unasked:
             notes.print(format_not_asked(session.unasked, session.saved, logbook.questions), markup=False)
     last = finished[-1]
-    payload = measurement_json(last.measurement, logbook) | {"programs": programs_json(logbook.verdicts())}
+    payload = measurement_json(last.measurement, logbook) | {
+        "programs": [verdict_json(verdict) for verdict in logbook.verdicts()]
+    }
     if last.across is not None:
         payload["across"] = {"tap_id": last.across.tap_id}
     emit(payload, as_json, *_result_texts(logbook, finished, details))

@@ -3,141 +3,102 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from dsm import Calibration, DampingCalibration, Joint, StiffnessFit, format_rounded, format_with_error
+from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
+from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 
 NODE_STIFFNESS_RATIO = 1e4
-"""Times the static stiffness at the tip: where that of a mode is higher, the tip is a node of it."""
+"""Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
 
 
-def calibration_json(calibration: Calibration) -> dict[str, Any]:
-    """The recalibrated model."""
-    return {
-        "frequency_hz": calibration.frequency,
-        "mode": calibration.mode,
-        "theory": calibration.spindle.theory,
-        "bearing_stiffness_n_per_m": calibration.bearing_stiffness,
-        "bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std,
-        "bearing_stiffness_n_per_m_interval": calibration.bearing_stiffness_interval,
-        "residual_hz": calibration.residual,
-        "factor": calibration.factor,
-        "sensitivity": calibration.sensitivity,
-        "remarks": [asdict(remark) for remark in calibration.remarks],
-        "energy_share": calibration.energy_share,
-        "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
-        "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,
-        "modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after,
-        "modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before,
-    }
+CALIBRATION_FIELDS = json_fields("""
+    frequency_hz=frequency mode theory=spindle.theory bearing_stiffness_n_per_m=bearing_stiffness
+    bearing_stiffness_n_per_m_std=bearing_stiffness_std bearing_stiffness_n_per_m_interval=bearing_stiffness_interval
+    residual_hz=residual factor sensitivity remarks energy_share static_tip_stiffness_n_per_m=static_stiffness_after
+    static_tip_stiffness_before_n_per_m=static_stiffness_before modal_tip_stiffness_n_per_m=modal_stiffness_after
+    modal_tip_stiffness_before_n_per_m=modal_stiffness_before
+""")
+STIFFNESS_FIT_FIELDS = json_fields("""
+    groups factor factor_std stiffness_n_per_m=stiffness stiffness_n_per_m_std=stiffness_std correlation mode
+    frequency_hz=frequency residual_hz=residual energy_share condition remarks
+""")
+DAMPING_FIELDS = json_fields("""
+    damping_ratio bearing_damping_n_s_per_m=bearing_damping bearing_damping_sensitivity=sensitivity
+""")
+MODEL_FIELDS = json_fields("""
+    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
+    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
+    first_frequency_with_rigid_bearings_hz=rigid_frequency
+""")
+MODEL_MODE_FIELDS = json_fields("""
+    frequency_hz=frequency modal_tip_stiffness_n_per_m=tip_stiffness bearing_energy_share=bearing_share
+    segment_energy_share=segment_share joint_energy_share=joint_share
+""")
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
-    """Several stiffnesses from several modes; null for one that is open. Of tilting it is N m/rad."""
-    is_fitted = [group not in fit.open_groups for group in fit.groups]
-    return {
-        "groups": list(fit.groups),
-        "factor": fit.factor,
-        "factor_std": fit.factor_std,
+    """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for those that the modes leave open."""
+    is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
+    return STIFFNESS_FIT_FIELDS(fit) | {
         "stiffness_n_per_m": np.where(is_fitted, fit.stiffness, np.nan),
-        "stiffness_n_per_m_std": None if fit.stiffness_std is None else np.where(is_fitted, fit.stiffness_std, np.nan),
-        "correlation": fit.correlation,
-        "mode": fit.mode,
-        "frequency_hz": fit.frequency,
-        "residual_hz": fit.residual,
-        "energy_share": fit.energy_share,
-        "condition": fit.condition,
-        "remarks": [asdict(remark) for remark in fit.remarks],
-    }
-
-
-def damping_json(calibration: DampingCalibration) -> dict[str, Any]:
-    """The bearings' dampers."""
-    return {
-        "damping_ratio": calibration.damping_ratio,
-        "bearing_damping_n_s_per_m": calibration.bearing_damping,
-        "bearing_damping_sensitivity": calibration.sensitivity,
+        "stiffness_n_per_m_std": None if std is None else np.where(is_fitted, std, np.nan),
     }
 
 
 def model_calibration_json(calibration: ModelCalibration) -> dict[str, Any]:
-    """What makes a model fit."""
-    dampers = {} if calibration.dampers is None else damping_json(calibration.dampers)
-    return _stiffness_json(calibration.stiffness) | dampers
-
-
-def _stiffness_json(stiffness: Calibration | StiffnessFit) -> dict[str, Any]:
+    """Return the stiffnesses and dampers that make a model fit."""
+    stiffness, dampers = calibration.stiffness, calibration.dampers
     if isinstance(stiffness, Calibration):
-        return calibration_json(stiffness) | {"preload_left": stiffness.remaining_preload}
-    return stiffness_fit_json(stiffness)
+        fitted = CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload}
+    else:
+        fitted = stiffness_fit_json(stiffness)
+    return fitted | ({} if dampers is None else DAMPING_FIELDS(dampers))
 
 
 def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
-    """What makes a model fit, for people."""
-    label = [f"model: {calibration.label}"] if calibration.label else []
-    preload = calibration.stiffness.remaining_preload if isinstance(calibration.stiffness, Calibration) else None
-    return [*label, *(str(part) for part in (calibration.stiffness, preload, calibration.dampers) if part is not None)]
+    """Return what makes a model fit in words."""
+    stiffness = calibration.stiffness
+    preload = stiffness.remaining_preload if isinstance(stiffness, Calibration) else None
+    parts = (stiffness, preload, calibration.dampers)
+    return [*_label_lines(calibration.label), *(str(part) for part in parts if part is not None)]
+
+
+def _label_lines(label: str) -> list[str]:
+    return [f"model: {label}"] if label else []
 
 
 def model_json(model: ModelSummary) -> dict[str, Any]:
-    """A model."""
-    spindle = model.state.spindle
-    return {
-        "tool": model.state.tool,
-        "bearings_from": model.state.origin,
-        "theory": spindle.theory,
-        "length_mm": spindle.length * 1e3,
-        "mass_kg": spindle.mass,
-        "modes": [
-            {
-                "frequency_hz": mode.frequency,
-                "modal_tip_stiffness_n_per_m": mode.tip_stiffness,
-                "bearing_energy_share": mode.bearing_share,
-                "segment_energy_share": mode.segment_share,
-                "joint_energy_share": mode.joint_share,
-            }
-            for mode in model.modes
-        ],
-        "static_tip_stiffness_n_per_m": model.static_stiffness,
-        "critical_speed_rpm": model.critical_speed,
-        "first_frequency_with_rigid_bearings_hz": model.rigid_frequency,
-    }
-
-
-def _tip_stiffness_text(stiffness: float, model: ModelSummary) -> str:
-    return (
-        "at rest"
-        if stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
-        else format_rounded(stiffness, scale=1e6, digits=4)
-    )
+    """Return a spindle model with its modes."""
+    return MODEL_FIELDS(model) | {"modes": [MODEL_MODE_FIELDS(mode) for mode in model.modes]}
 
 
 def model_texts(model: ModelSummary) -> list[str | Table]:
-    """A model for people."""
+    """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
-    mode_table = new_table(
-        "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
-    )
-    for number, mode in enumerate(model.modes, 1):
-        shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
-        mode_table.add_row(
-            str(number), f"{mode.frequency:.2f}", _tip_stiffness_text(mode.tip_stiffness, model), *shares
-        )
+    headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
     return [
         f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
         f"bearings of {model.state.origin}",
-        mode_table,
+        new_table(*headings, rows=(_mode_cells(model, number) for number in range(len(model.modes)))),
         f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",
         f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
         f"with rigid bearings          {model.rigid_frequency:.1f} Hz in mode 1",
     ]
+
+
+def _mode_cells(model: ModelSummary, number: int) -> list[str]:
+    mode = model.modes[number]
+    is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
+    stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
+    shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
+    return [str(number + 1), f"{mode.frequency:.2f}", stiffness, *shares]
 
 
 MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
@@ -145,39 +106,36 @@ UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written
 
 
 def tools_json(calibration: JointCalibration) -> dict[str, Any]:
-    """The fit, what it rests on, and other tools as it has them."""
-    return stiffness_fit_json(calibration.fit) | {
+    """Return the fit to several tools, what it rests on, and tools that it predicts."""
+    fit = calibration.fit
+    return stiffness_fit_json(fit) | {
         "taps": {tap.tool: tap.tap_id for tap in calibration.taps},
-        "tool": [calibration.taps[i].tool for i in calibration.fit.shaft],
-        "fits_one_spindle": not calibration.fit.has_misfit,
+        "tool": [calibration.taps[i].tool for i in fit.shaft],
+        "fits_one_spindle": not fit.has_misfit,
         "not_counted_hz": calibration.unmatched,
         "machine_toml": _joint_lines(calibration.joints),
         "predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()},
-        "remarks": [*map(asdict, calibration.fit.remarks), *map(asdict, calibration.remarks)],
+        "remarks": [*fit.remarks, *calibration.remarks],
     }
 
 
 def tools_texts(calibration: JointCalibration) -> list[str | Table]:
-    """The fit, what it rests on, and other tools, for people."""
-    label = [f"model: {calibration.label}"] if calibration.label else []
-    taps = [
-        f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed"
-        for number, tap in enumerate(calibration.taps, 1)
-    ]
-    left = [
-        f"not counted: {', '.join(f'{f:.1f}' for f in frequencies)} Hz of tool {tool}, nothing of the model is near"
-        for tool, frequencies in calibration.unmatched.items()
-    ]
-    warnings = [f"warning: {remark}" for remark in calibration.remarks]
-    return [
-        *label,
-        *taps,
+    """Return the fit to several tools in words, what it rests on, and tools that it predicts."""
+    for_people: list[str | Table] = [
+        *_label_lines(calibration.label),
+        *(
+            f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed"
+            for number, tap in enumerate(calibration.taps, 1)
+        ),
         str(calibration.fit),
-        *left,
-        *warnings,
+        *(
+            f"not counted: {', '.join(f'{f:.1f}' for f in frequencies)} Hz of tool {tool}, nothing of the model is near"
+            for tool, frequencies in calibration.unmatched.items()
+        ),
+        *(f"warning: {remark}" for remark in calibration.remarks),
         *_joint_entry_lines(calibration),
-        *_prediction_tables(calibration),
     ]
+    return [*for_people, *_prediction_tables(calibration)]
 
 
 def _joint_entry_lines(calibration: JointCalibration) -> list[str]:
@@ -189,7 +147,7 @@ def _joint_entry_lines(calibration: JointCalibration) -> list[str]:
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
-    """Joints as they stand in machine.toml."""
+    """Return joints as lines of machine.toml."""
     if not joints:
         return []
     lines = [
@@ -203,8 +161,12 @@ def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
 def _prediction_tables(calibration: JointCalibration) -> list[Table]:
     if not calibration.predicted or calibration.fit.has_misfit:
         return []
-    rows = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
-    for name, mode in calibration.predicted.items():
-        frequency = format_with_error(mode.frequency, mode.frequency_std)
-        rows.add_row(name, frequency, format_with_error(mode.stiffness, mode.stiffness_std, 1e6))
-    return [rows]
+    rows = (
+        (
+            name,
+            format_with_error(mode.frequency, mode.frequency_std),
+            format_with_error(mode.stiffness, mode.stiffness_std, 1e6),
+        )
+        for name, mode in calibration.predicted.items()
+    )
+    return [new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)", rows=rows)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from rich.table import Table
@@ -13,94 +12,84 @@ from rich.table import Table
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
+from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 from modal import Mode, Trust, assess_trust, trust_rules
 
 TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
 """Order in which modes are shown."""
 TRUST_SYMBOLS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
-"""Marks behind a mode."""
+"""Mark after a mode."""
 MIN_SHOWN_PHASE = 1.0
-"""Phase of a modal constant worth a column (degrees)."""
+"""Smallest phase of a modal constant that is shown (degrees)."""
 MIN_SHOWN_CORRELATION = 0.5
-"""Correlation of errors that a person should know."""
+"""Smallest correlation of errors that is shown."""
 FOUND_AGAIN_NOTE = "again: how many of the other measurements have it within 0.5 %"
-"""Line below a table with that column."""
+"""Line below a table with the column "again"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
-"""Words for where a fact on a file is from."""
+"""Words for the origin of a fact on a file."""
 NON_FILE_ORIGINS = "option", "default"
-"""Origins of facts that a file does not say itself."""
+"""Origins of facts that are not in the file."""
+
+
+MODE_FIELDS = json_fields("""
+    frequency_hz=frequency frequency_hz_std=frequency frequency_hz_std_of_fit=frequency
+    damping_ratio damping_ratio_std=damping_ratio damping_ratio_std_of_fit=damping_ratio
+    stiffness_n_per_m=stiffness stiffness_n_per_m_std=stiffness stiffness_n_per_m_std_of_fit=stiffness
+    interval_95=interval correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
+    misfit_share trust=method found_again=match_count half_power_damping_ratio=half_power_damping remarks method
+""")
+FILE_MODES_FIELDS = json_fields("""
+    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
+    remarks
+""")
 
 
 def mode_json(mode: Mode) -> dict[str, Any]:
-    """One mode."""
-    frequency, damping, stiffness = mode.standard_error
-    by_fit = mode.fit_error
-    return {
-        "frequency_hz": mode.frequency,
-        "frequency_hz_std": frequency,
-        "frequency_hz_std_of_fit": by_fit[0],
-        "damping_ratio": mode.damping_ratio,
-        "damping_ratio_std": damping,
-        "damping_ratio_std_of_fit": by_fit[1],
-        "stiffness_n_per_m": mode.stiffness,
-        "stiffness_n_per_m_std": stiffness,
-        "stiffness_n_per_m_std_of_fit": by_fit[2],
-        "interval_95": mode.interval(),
-        "correlation": mode.correlation,
-        "hits": mode.n_hits,
-        "driving_point": mode.is_driving_point,
-        "phase_deg": mode.phase_deg,
-        "phase_deg_std": mode.phase_deg_std,
-        "coherence": mode.coherence,
-        "misfit": mode.misfit,
-        "misfit_share": mode.misfit_share,
-        "trust": assess_trust(mode),
-        "found_again": mode.match_count,
-        "half_power_damping_ratio": mode.half_power_damping,
-        "remarks": [asdict(remark) for remark in mode.remarks],
-        "method": mode.method,
+    """Return one mode with its standard errors over the hits and of the fit."""
+    errors = {
+        f"{name}_{source}": value
+        for source, values in (("std", mode.standard_error), ("std_of_fit", mode.fit_error))
+        for name, value in zip(("frequency_hz", "damping_ratio", "stiffness_n_per_m"), values, strict=True)
     }
+    return MODE_FIELDS(mode) | errors | {"interval_95": mode.interval(), "trust": assess_trust(mode)}
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
-    """Trusted modes by rising frequency, then doubtful ones, then rejected ones where they are wanted, those that a
-    person chose always."""
-    kept = [mode for mode in modes if rejected or assess_trust(mode) is not Trust.REJECTED or _is_by_hand(mode)]
-    return sorted(kept, key=lambda mode: (TRUST_ORDER.index(assess_trust(mode)), mode.frequency))
+    """Sort modes by trust, then frequency; without rejected ones, keep those that a person chose."""
 
+    def is_kept(mode: Mode) -> bool:
+        return rejected or assess_trust(mode) is not Trust.REJECTED or any(r.code == "by-hand" for r in mode.remarks)
 
-def _is_by_hand(mode: Mode) -> bool:
-    return any(remark.code == "by-hand" for remark in mode.remarks)
+    return sorted(filter(is_kept, modes), key=lambda mode: (TRUST_ORDER.index(assess_trust(mode)), mode.frequency))
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
-    """Modes, a line each, value ± standard error, the phase where there is any, how many other FRFs have it where some
-    were looked at, and a mark where one is doubtful."""
+    """Return a table of modes, each value ± its standard error, with a mark on those that are not trusted.
+
+    The phase and how many other FRFs have the mode are columns only where there is something to show.
+    """
     with_phase = any(abs(mode.phase_deg) > MIN_SHOWN_PHASE for mode in modes)
-    with_others = any(mode.match_count for mode in modes)
-    headings = [*(["phase (deg)"] if with_phase else []), *(["again"] if with_others else [])]
-    rows = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
+    with_matches = any(mode.match_count for mode in modes)
+    headings = [*(["phase (deg)"] if with_phase else []), *(["again"] if with_matches else [])]
+    table = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
     for mode in modes:
-        values = (mode.frequency, mode.damping_ratio, mode.stiffness)
+        values = zip((mode.frequency, mode.damping_ratio, mode.stiffness), mode.standard_error, strict=True)
         cells = [
-            "not known"
-            if math.isnan(value)
-            else format_with_error(value, std, scale, percent=scale == 1e6 and not with_phase)
-            for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
+            "not known" if math.isnan(value) else format_with_error(value, std, scale, percent=percent)
+            for (value, std), scale, percent in zip(
+                values, (1.0, 0.01, 1e6), (False, False, not with_phase), strict=True
+            )
         ]
-        again = "" if mode.match_count is None else "{} of {}".format(*mode.match_count)
-        more = [*([_mode_phase_text(mode)] if with_phase else []), *([again] if with_others else [])]
-        rows.add_row(*cells, *more, TRUST_SYMBOLS[assess_trust(mode)])
-    return rows
-
-
-def _mode_phase_text(mode: Mode) -> str:
-    return format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
+        phase = format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
+        matches = "" if mode.match_count is None else "{} of {}".format(*mode.match_count)
+        optional = [*([phase] if with_phase else []), *([matches] if with_matches else [])]
+        table.add_row(*cells, *optional, TRUST_SYMBOLS[assess_trust(mode)])
+    return table
 
 
 def mode_notes(modes: Sequence[Mode]) -> list[str]:
-    """Lines below a table of modes: where ± comes from, what is found again, and correlated errors."""
+    """Return lines below a table of modes: source of ±, matches, correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
     how = "jackknife" if all(mode.has_stiffness for mode in modes) else "by how each moves the fit"
     lines = [f"± is the standard error over the {hits} hits ({how}, {hits - 1} degrees of freedom)"] if hits else []
@@ -114,28 +103,32 @@ def mode_notes(modes: Sequence[Mode]) -> list[str]:
 
 
 def mode_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
-    """Remarks on single modes and further ones, a line each; what several modes have in common is one."""
-    return [str(remark) for remark in merge_remarks([*(remark for mode in modes for remark in mode.remarks), *remarks])]
+    """Return a line for each remark on modes and for each further one, the same remark of several modes as one."""
+    return [str(remark) for remark in merge_remarks(_all_remarks(modes, remarks))]
+
+
+def _all_remarks(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[Remark]:
+    return [*(remark for mode in modes for remark in mode.remarks), *remarks]
 
 
 def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
-    """A line for each code: that of the first mode that has it, and which others have it, too."""
+    """Return a line for each code of a remark: that of the first mode, and which other modes have one alike."""
     by_code: dict[str, list[Remark]] = {}
-    for remark in [*(remark for mode in modes for remark in mode.remarks), *remarks]:
+    for remark in _all_remarks(modes, remarks):
         by_code.setdefault(remark.code, []).append(remark)
-    return [line for same in by_code.values() for line in _grouped_line(merge_remarks(same))]
+    return [line for same in by_code.values() for line in _grouped_lines(merge_remarks(same))]
 
 
-def _grouped_line(same: list[Remark]) -> list[str]:
-    first, *alike = same
-    about = ", ".join(remark.about for remark in alike)
-    if alike and not about:
-        return [str(remark) for remark in same]
+def _grouped_lines(remarks: list[Remark]) -> list[str]:
+    first, *others = remarks
+    about = ", ".join(remark.about for remark in others)
+    if others and not about:
+        return [str(remark) for remark in remarks]
     return [f"{first}{f' (the like of {about})' if about else ''}"]
 
 
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
-    """How many modes are trusted, doubtful and rejected, in a line."""
+    """Return how many modes are trusted, doubtful and rejected."""
     count = Counter(assess_trust(mode) for mode in modes)
     counts = ", ".join(f"{count[trust]} {trust}" for trust in TRUST_ORDER)
     looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
@@ -145,7 +138,7 @@ def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
 
 
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
-    """Which modes have hammer and sensor apart, and which are doubtful and rejected by which rules, a line each."""
+    """Return which modes are no driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in TRUST_ORDER[1:]:
@@ -159,53 +152,54 @@ def trust_reasons(modes: Sequence[Mode]) -> list[str]:
 
 
 def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
-    """Modes by peak picking, and how far each is from the fitted mode nearest to it."""
-    rows = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
-    for mode in picked:
-        near = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None)
-        same = near is not None and abs(near.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
-        rows.add_row(
+    """Return a table of modes by peak picking, and how far each is from the nearest fitted mode."""
+    rows = (
+        (
             f"{mode.frequency:.5g}",
             f"{100 * mode.damping_ratio:.5g}",
             format_rounded(mode.stiffness, scale=1e6, digits=5),
-            _difference_text(mode, near) if same and near is not None else "not fitted",
+            _difference_text(mode, fitted),
         )
-    return rows
+        for mode in picked
+    )
+    return new_table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit", rows=rows)
 
 
-def _difference_text(mode: Mode, fit: Mode) -> str:
+def _difference_text(mode: Mode, fitted: Sequence[Mode]) -> str:
+    fit = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None)
+    if fit is None or abs(fit.frequency - mode.frequency) >= mode.damping_ratio * mode.frequency:
+        return "not fitted"
     zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
     return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
 
 
 def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
-    """The modes of one file."""
-    return {
+    """Return the modes of one file, fitted and by peak picking."""
+    return FILE_MODES_FIELDS(file_modes) | {
         "file": str(file_modes.path),
-        "n_averages": None if file_modes.frf is None else file_modes.frf.n_averages,
-        "usable_band_hz": None if file_modes.frf is None else file_modes.frf.usable_band,
-        "facts": [asdict(fact) for fact in file_modes.facts],
-        "by_hand": asdict(file_modes.by_hand),
         "modes": [mode_json(mode) for mode in file_modes.fitted],
         "peak_picking": [mode_json(mode) for mode in file_modes.picked],
-        "remarks": [asdict(remark) for remark in file_modes.remarks],
     }
 
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:
-    """The modes of one file for people; those that are rejected, and each single remark, where everything is wanted."""
+    """Return the modes of one file in words; everything: rejected modes and each single remark, too."""
     shown = sort_modes(file_modes.fitted, rejected=everything)
+    trusted = [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]
     remarks = mode_remark_lines if everything else grouped_remark_lines
-    return [
+    texts: list[str | Table] = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),
         *trust_reasons(shown),
-        *mode_notes(shown if everything else [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]),
+        *mode_notes(shown if everything else trusted),
         *remarks(shown, file_modes.remarks),
-        *_peak_picking_texts(file_modes),
     ]
+    if file_modes.frf is not None:
+        picked = peak_picking_table(file_modes.picked, file_modes.as_recorded)
+        texts += ["peak picking (eqs. 28, 29), for comparison:", picked]
+    return texts
 
 
 def _frf_text(file_modes: FileModes) -> str:
@@ -217,14 +211,7 @@ def _frf_text(file_modes: FileModes) -> str:
     return f"{what}, {lines}{usable}"
 
 
-def _peak_picking_texts(file_modes: FileModes) -> list[str | Table]:
-    if file_modes.frf is None:
-        return []
-    picked = peak_picking_table(file_modes.picked, file_modes.as_recorded)
-    return ["peak picking (eqs. 28, 29), for comparison:", picked]
-
-
 def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGIN_WORDS)) -> list[str]:
-    """Facts on a file, a line for each place that it is from."""
+    """Return the facts on a file, a line for each origin."""
     texts = {origin: [f"{fact.name} {fact.value}" for fact in facts if fact.origin == origin] for origin in origins}
     return [f"{ORIGIN_WORDS[origin]}: {'; '.join(words)}" for origin, words in texts.items() if words]

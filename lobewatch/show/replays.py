@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -21,45 +21,41 @@ from lobewatch.logbook.replay_preview import ReplayPreview
 from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
-from lobewatch.show.programs.verdicts import program_texts, programs_json
-from lobewatch.show.terminal.output import emit, new_table, notes, remark_json, remark_lines
+from lobewatch.show.programs.verdicts import program_texts, verdict_json
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import emit, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
-"""Names of the steps of a replay for people."""
+"""Names of the steps of a replay."""
 REBUILD_PROGRESS_STEP = 10
-"""Tap tests between two lines of a rebuild."""
+"""Number of tap tests between two progress lines of a rebuild."""
 
 
 class ReplayProgress:
-    """A bar a step, on a terminal only; called with the step, how many files are done, and of how many."""
+    """Progress bar of each step of a replay, shown on a terminal only."""
 
     def __init__(self) -> None:
-        """Nothing is shown yet."""
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bars = Progress(*columns, console=notes, transient=True, disable=not notes.is_terminal)
         self._tasks: dict[str, int] = {}
 
     def __enter__(self) -> Self:
-        """Begin to show."""
         self._bars.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Take the bars away."""
+    def __exit__(self, *_: object) -> None:
         self._bars.stop()
 
     def __call__(self, step: str, done: int, of: int) -> None:
-        """So many are done."""
+        """Update the bar of a step: so many files are done, of so many."""
         if step not in self._tasks:
             self._tasks[step] = self._bars.add_task(REPLAY_STEP_NAMES[step], total=of)
         self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
 
 
 def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
-    """A line every few tap tests of the machine of this name; called with how many are done, and of how many."""
+    """Return a function that prints a progress line every few tap tests of this machine."""
 
     def show(done: int, of: int) -> None:
         if done % REBUILD_PROGRESS_STEP == 0:
@@ -69,54 +65,56 @@ def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
 
 
 MAX_PREVIEWS_IN_FULL = 6
-"""Files that are told in full at most; more of them get a line each."""
+"""Largest number of files that are shown in full."""
 
 
 def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
-    """Print what would become of files; passed: other files of the folders. DataError where some cannot be used."""
+    """Print what would become of files; passed: other files of the folders. Raise DataError for unusable files."""
     files = [preview_json(preview) for preview in previews]
     payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
-    if any(preview.rejection for preview in previews):
-        raise DataError(_refusal_text(previews))
+    if refused := sum(bool(preview.rejection) for preview in previews):
+        raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
+
+
+PREVIEW_FIELDS = json_fields("""
+    format=recording.title facts=recording.facts time=measurement.time tool=measurement.tool
+    direction=measurement.direction hits=tap.flags lines=tap.frf.frequency.size averages=tap.frf.n_averages
+    modes=measurement.modes followed=measurement.followed questions=measurement.remarks
+""")
+QUESTION_FIELDS = json_fields("code text")
 
 
 def preview_json(preview: ReplayPreview) -> dict[str, Any]:
-    """One file."""
-    measurement, tap, recording = preview.measurement, preview.tap, preview.recording
-    about: dict[str, Any] = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
-    if measurement is None or tap is None or recording is None:
-        return about
-    return about | {
-        "format": recording.title,
-        "facts": [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in recording.facts],
-        "time": measurement.time.isoformat(),
-        "tool": measurement.tool,
-        "direction": measurement.direction,
-        "hits": [flags.words for flags in tap.flags],
-        "lines": tap.frf.frequency.size if tap.frf else None,
-        "averages": tap.frf.n_averages if tap.frf else None,
-        "modes": [mode_json(mode) for mode in measurement.modes],
-        "followed": mode_json(measurement.followed) if measurement.followed else None,
-        "questions": [{"code": asked.code, "text": asked.text} for asked in find_open_questions(measurement.remarks)],
-    }
+    """Return what would become of one file."""
+    measurement, tap = preview.measurement, preview.tap
+    status: dict[str, Any] = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
+    if measurement is None or tap is None or preview.recording is None:
+        return status
+    return (
+        status
+        | PREVIEW_FIELDS(preview)
+        | {
+            "time": measurement.time.isoformat(),
+            "hits": [flags.words for flags in tap.flags],
+            "modes": [mode_json(mode) for mode in measurement.modes],
+            "followed": measurement.followed and mode_json(measurement.followed),
+            "questions": list(map(QUESTION_FIELDS, find_open_questions(measurement.remarks))),
+        }
+    )
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
-    """All files: in full where there are few, else in a line each, with what is asked and refused below."""
+    """Return a few files in full, many in a table with what is asked and refused below it."""
     if len(previews) <= MAX_PREVIEWS_IN_FULL:
-        return [
-            *(line for preview in previews if not preview.rejection for line in _preview_lines(preview)),
-            *_refused_lines(previews),
-        ]
-    rows = new_table("<date", "<series", "hits", "frequency (Hz)", "<", "~file")
-    for preview in previews:
-        rows.add_row(*_preview_row(preview))
-    return [rows, *_preview_notes(previews)]
+        usable = (preview for preview in previews if not preview.rejection)
+        return [*chain.from_iterable(map(_preview_lines, usable)), *_refused_lines(previews)]
+    headings = "<date", "<series", "hits", "frequency (Hz)", "<", "~file"
+    return [new_table(*headings, rows=map(_preview_row, previews)), *_preview_notes(previews)]
 
 
 def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
-    """How many would be stored, are known, refused and passed over."""
+    """Return how many files would be stored, are known, rejected and passed over."""
     fresh = sum(preview.tap is not None for preview in previews)
     n_known = sum(bool(preview.stored_tap_id) for preview in previews)
     refused = sum(bool(preview.rejection) for preview in previews)
@@ -125,43 +123,32 @@ def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
     return f"{count}{passed}; nothing is stored (--dry-run)"
 
 
-def _refusal_text(previews: Sequence[ReplayPreview]) -> str:
-    """How many files cannot be used."""
-    refused = sum(bool(preview.rejection) for preview in previews)
-    return f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above"
-
-
 def _preview_lines(preview: ReplayPreview) -> list[str]:
     if preview.stored_tap_id:
         return [f"{preview.file}: stored already as {preview.stored_tap_id}"]
-    measurement, tap, recording = preview.measurement, preview.tap, preview.recording
-    if measurement is None or tap is None or recording is None:
+    measurement, recording = preview.measurement, preview.recording
+    if measurement is None or preview.tap is None or recording is None:
         return []
-    lines = [
-        f"{preview.file}: {recording.title}, {_hits_text(preview)}",
-        *(f"  {line}" for line in fact_lines(recording.facts)),
-    ]
     modes = sort_modes(measurement.modes, rejected=False)[:8]
-    lines.append(f"  modes: {', '.join(map(_mode_text, modes)) or 'none'}")
-    followed = "none" if measurement.followed is None else f"{measurement.followed.frequency:.2f} Hz"
-    lines.append(f"  followed: {followed}")
-    asked = find_open_questions(measurement.remarks)
-    plausible = "  plausible for this machine: nothing would be asked"
-    return [
-        *lines,
-        *(f"  question ({question.code}): {question.text}" for question in asked),
-        *([] if asked else [plausible]),
+    questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
+    details = [
+        *fact_lines(recording.facts),
+        f"modes: {', '.join(map(_mode_text, modes)) or 'none'}",
+        f"followed: {f'{measurement.followed.frequency:.2f} Hz' if measurement.followed else 'none'}",
+        *(questions or ["plausible for this machine: nothing would be asked"]),
     ]
+    return [f"{preview.file}: {recording.title}, {_hits_text(preview)}", *(f"  {line}" for line in details)]
 
 
 def _mode_text(mode: Mode) -> str:
     f_std, zeta_std, k_std = mode.standard_error.tolist()
+    frequency, damping = format_rounded(mode.frequency, f_std), format_rounded(mode.damping_ratio, zeta_std, 0.01)
     stiffness = f", {format_rounded(mode.stiffness, k_std, 1e6)} N/um" if mode.has_stiffness else ""
-    return f"{format_rounded(mode.frequency, f_std)} Hz ({format_rounded(mode.damping_ratio, zeta_std, 0.01)} %{stiffness})"
+    return f"{frequency} Hz ({damping} %{stiffness})"
 
 
 def _hits_text(preview: ReplayPreview) -> str:
-    """Hits with their verdicts."""
+    """Return the number of hits by verdict."""
     if preview.tap is None or not preview.tap.hits:
         return "an FRF"
     words = Counter(flags.words for flags in preview.tap.flags)
@@ -180,7 +167,7 @@ def _preview_row(preview: ReplayPreview) -> list[str]:
 
 
 def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
-    """Lines on what was taken for want of a word, asked and refused; each once."""
+    """Return assumed facts, questions and rejections, each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
     asked = (
         (preview.file.name, f"question ({question.code}): {question.text}")
@@ -198,7 +185,7 @@ def _refused_lines(previews: Sequence[ReplayPreview]) -> list[str]:
 
 
 def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
-    """Facts, those that are another for each of many files as the first and the last."""
+    """Return facts, with values that differ in many files as the first and the last."""
     values: dict[tuple[str, Origin], list[str]] = {}
     for fact in facts:
         values.setdefault((fact.name, fact.origin), []).append(fact.value)
@@ -208,11 +195,11 @@ def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
 
 
 MAX_TAPS_IN_FULL = 3
-"""Tap tests that are told in full at most; more of them are summed up."""
+"""Largest number of tap tests that are shown in full."""
 MIN_FILES_TO_COUNT = 12
-"""Files of a replay above which those that were stored already are told by their number ..."""
+"""Largest number of files of which all known ones are listed."""
 MAX_KNOWN_LISTED = 3
-"""... unless these at most were."""
+"""Largest number of known files that are always listed."""
 
 
 def emit_replay(
@@ -237,7 +224,6 @@ def emit_replay(
 
 
 def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
-    """Files that were stored already: each where they are few."""
     if n_files > MIN_FILES_TO_COUNT and len(stored) > MAX_KNOWN_LISTED:
         notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
         return
@@ -245,82 +231,77 @@ def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
         notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
 
 
-def replay_json(stored: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
-    """All that was stored, with the lobes of each, known and refused."""
+def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
+    """Return all tap tests that were stored, and the files that were known already or rejected."""
+    stored = outcome.new_tap_ids
     return {
-        "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored.new_tap_ids],
-        "programs": programs_json(logbook.verdicts()) if stored.new_tap_ids else [],
-        "known": {str(file): tap_id for file, tap_id in stored.already_stored.items()},
-        "refused": {str(file): why for file, why in stored.rejected.items()},
-        "taken": list(stored.assumed_facts),
+        "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored],
+        "programs": [verdict_json(verdict) for verdict in logbook.verdicts()] if stored else [],
+        "known": {str(file): tap_id for file, tap_id in outcome.already_stored.items()},
+        "refused": {str(file): reason for file, reason in outcome.rejected.items()},
+        "taken": outcome.assumed_facts,
     }
 
 
-def replay_texts(stored: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
-    """A few tap tests in full, many as their series; then the programs."""
-    fresh = set(stored.new_tap_ids)
-    if len(fresh) <= MAX_TAPS_IN_FULL:
-        texts = [
-            text for tap_id in stored.new_tap_ids for text in measurement_texts(logbook.measurement(tap_id), logbook)
-        ]
+def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
+    """Return a few tap tests in full, many as their series, and the verdicts on the programs."""
+    stored, texts = outcome.new_tap_ids, list[str | Table]()
+    if len(set(stored)) <= MAX_TAPS_IN_FULL:
+        for tap_id in stored:
+            texts += measurement_texts(logbook.measurement(tap_id), logbook)
     else:
         rows = logbook.history.rows
         asked = {row.tap_id: row.questions for row in rows}
-        questions = question_remarks(
-            asked, logbook.folder.path, [tap_id for tap_id in stored.new_tap_ids if tap_id in asked]
-        )
-        texts = [_series_table([row for row in rows if row.tap_id in fresh])]
+        texts.append(_series_table([row for row in rows if row.tap_id in set(stored)]))
+        questions = question_remarks(asked, logbook.folder.path, [tap_id for tap_id in stored if tap_id in asked])
         texts += [f"asked of {question.finding}" for question in questions]
-    if stored.assumed_facts:
-        texts.append(f"taken where the files do not say: {', '.join(stored.assumed_facts)}")
-    return [*texts, *(program_texts(logbook) if fresh else [])]
+    if outcome.assumed_facts:
+        texts.append(f"taken where the files do not say: {', '.join(outcome.assumed_facts)}")
+    return [*texts, *(program_texts(logbook) if stored else [])]
 
 
-def _series_table(shown: Sequence[HistoryRow]) -> Table:
-    """A line for each tool and direction."""
+def _series_table(rows: Sequence[HistoryRow]) -> Table:
+    """Return a table with a line for each tool and direction."""
     series: dict[tuple[str, str], list[HistoryRow]] = {}
-    for row in shown:
+    for row in rows:
         series.setdefault((row.tool, row.direction), []).append(row)
-    rows = new_table(
-        "<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)"
+    headings = "<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)"
+    return new_table(*headings, rows=map(_series_cells, series.values()))
+
+
+def _series_cells(tests: Sequence[HistoryRow]) -> list[str]:
+    first, last = tests[0], tests[-1]
+    modes = [row.mode for row in tests if row.mode is not None]
+    ends = (modes[0], modes[-1]) if modes else ()
+    values = (
+        (f"{mode.frequency:.1f}" for mode in ends),
+        (f"{100 * mode.damping_ratio:.2f}" for mode in ends),
+        (f"{mode.stiffness / 1e6:.1f}" for mode in ends if mode.has_stiffness),
     )
-    for (tool, direction), tests in series.items():
-        modes = [row.mode for row in tests if row.mode is not None]
-        ends = (modes[0], modes[-1]) if modes else ()
-        values = [
-            " .. ".join(text % value for value in values)
-            for text, values in (
-                ("%.1f", [mode.frequency for mode in ends]),
-                ("%.2f", [100 * mode.damping_ratio for mode in ends]),
-                ("%.1f", [mode.stiffness / 1e6 for mode in ends if mode.has_stiffness]),
-            )
-        ]
-        days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
-        rows.add_row(tool, direction, str(len(tests)), *days, *values)
-    return rows
+    days = f"{first.time:%Y-%m-%d}", f"{last.time:%Y-%m-%d}"
+    return [first.tool, first.direction, str(len(tests)), *days, *map(" .. ".join, values)]
 
 
 class MachineRebuild(NamedTuple):
-    """Outcome of a rebuild of one machine."""
+    """Outcome of rebuilding one machine."""
 
     repairs: Sequence[str]
-    """Sentences on the files that were mended, a line each."""
+    """Sentences on repaired files."""
     n_taps: int
     """Number of tap tests in the new history."""
     is_saved: bool
-    """Whether the new history is on the disk."""
+    """Whether the new history is on disk."""
     remarks: Sequence[Remark]
-    """Remarks on the machine after it."""
+    """Remarks on the machine after the rebuild."""
 
 
 def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
-    """One machine."""
-    remarks = [remark_json(remark) for remark in rebuild.remarks]
-    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": remarks}
+    """Return the outcome of rebuilding one machine."""
+    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": rebuild.remarks}
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
-    """One machine for people."""
+    """Return the outcome of rebuilding one machine in words."""
     if rebuild.is_saved:
         history = f"history.rows: made anew from {rebuild.n_taps} tap test(s)"
     else:
@@ -329,11 +310,11 @@ def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
 
 
 def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> dict[str, Any]:
-    """The machines of a folder, by name."""
+    """Return the outcomes of rebuilding the machines of a folder, by name."""
     return {"machines": {name: rebuild_json(rebuild) for name, rebuild in rebuilds.items()}}
 
 
 def folder_rebuild_texts(rebuilds: Mapping[str, MachineRebuild], n_machines: int) -> list[str]:
-    """The machines of a folder for people; n_machines: those that could not be rebuilt too."""
+    """Return the outcomes of rebuilding a folder in words; n_machines: failed ones included."""
     lines = [f"{name}: {text}" for name, rebuild in rebuilds.items() for text in rebuild_texts(rebuild)]
     return [*lines, f"{len(rebuilds)} of {n_machines} machines rebuilt"]

@@ -7,10 +7,10 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from dsm import RemainingPreload, format_with_error
+from lobewatch.arrays import Floats, Indices
 from lobewatch.logbook.machine_forecast import MachineForecast
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
@@ -18,100 +18,91 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
 from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import format_csv, new_table
+from lobewatch.show.terminal.output import blank_nonfinite, format_csv, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
     " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
-"""What stands below every table of dates."""
+"""Note below every table of forecast dates."""
 UNKNOWN_NOW_TEXT = "unknown now, see check"
-"""In place of the dates of a program on which there is no word."""
+"""Text instead of the dates of a program without a verdict."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
-"""Characters of the plot itself."""
+"""Size of the plot area (characters)."""
 CHART_POINT, CHART_LINE = "o", "."
 
 
 def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> dict[str, Any]:
-    """Points, score, alarm, light, preload, forecast; percents are 100 ln of the frequency over that of the first."""
-    trend = series.trend
+    """Return points, score, alarm, status and forecast; percents are 100 ln of the frequency over that of the first."""
+    trend, status = series.trend, outlook.status
+    points, rate = (trend.points, trend.rate) if trend else ((), None)
     return {
         "tool": series.tool,
         "direction": series.direction,
-        "points": [] if trend is None else _points_json(trend),
-        "score": None if trend is None else float(trend.detection.scores[-1]),
-        "alarm": None if trend is None else _alarm_json(trend),
-        "alarms": [alarm.to_row(outlook.status.time) for alarm in outlook.status.alarms],
-        "light": outlook.status.status.value,
+        "points": [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points],
+        "score": trend and trend.detection.scores[-1],
+        "alarm": trend and _alarm_json(trend),
+        "alarms": [alarm.to_row(status.time) for alarm in status.alarms],
+        "light": status.status,
         "fall_percent": series.drop.value,
         "fall_std_percent": series.drop.std,
         "preload_left": preload,
-        "rate_percent_per_month": None if trend is None or trend.rate is None else trend.rate._asdict(),
+        "rate_percent_per_month": rate and rate._asdict(),
         "forecast": build_forecast_rows(outlook.programs, outlook.limits),
     }
 
 
 def trend_csv(series: SeriesStatus) -> str:
-    """A line a point, headings on top."""
+    """Return a CSV line for each point, below the headings."""
     rows: list[list[Any]] = [["time", "percent", "error_percent", "temperature_c", "taps", "score"]]
-    trend = series.trend
-    if trend is not None:
-        for point, score in zip(trend.points, _score_values(trend), strict=True):
-            numbers = (point.percent, point.error, point.temperature)
-            rows.append([point.time.isoformat(), *map(_csv_number, numbers), len(point.taps), _csv_number(score)])
+    if series.trend is not None:
+        for point, score in zip(series.trend.points, series.trend.detection.scores.tolist(), strict=True):
+            numbers = (point.percent, point.error, point.temperature, len(point.taps), score)
+            rows.append([point.time.isoformat(), *map(blank_nonfinite, numbers)])
     return format_csv(rows)
 
 
 def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> list[str | Table]:
-    """Chart, sentence and table; where no date can be given, why."""
+    """Return chart, sentence and forecast dates, and the change of the other series."""
     trend = series.trend
     if trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
-    further = [f"{side.name}: {change_since_start_text(side)}" for side in outlook.status.series if side is not series]
-    left = [] if preload is None else [str(preload)]
-    return [*chart_lines(trend), trend_sentence(series), *left, *_date_texts(outlook), *further]
-
-
-def _date_texts(outlook: MachineForecast) -> list[str | Table]:
     why_none = no_dates_text(outlook)
-    if why_none:
-        return [why_none]
-    dates = new_table("~what", "~becomes doubtful", "~is not stable")
-    for line in forecast_date_rows(outlook):
-        dates.add_row(*line)
-    return [dates, FORECAST_ASSUMPTIONS]
+    dates = new_table("~what", "~becomes doubtful", "~is not stable", rows=forecast_date_rows(outlook))
+    others = (other for other in outlook.status.series if other is not series)
+    return [
+        *chart_lines(trend),
+        trend_sentence(series),
+        *([] if preload is None else [str(preload)]),
+        *([why_none] if why_none else [dates, FORECAST_ASSUMPTIONS]),
+        *(f"{other.name}: {change_since_start_text(other)}" for other in others),
+    ]
 
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
-    """Name, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
-    now = outlook.status.time
-    programs = [
-        (name, reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
-        if name not in outlook.unknown_programs
-        else (name, UNKNOWN_NOW_TEXT, UNKNOWN_NOW_TEXT)
-        for name, fate in outlook.programs.items()
-    ]
-    return programs + [
-        (f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits
-    ]
+    """Return when each program becomes doubtful and not stable, and when the fixed limits are reached."""
+    now, rows = outlook.status.time, list[tuple[str, str, str]]()
+    for name, fate in outlook.programs.items():
+        dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
+        rows.append((name, *((UNKNOWN_NOW_TEXT,) * 2 if name in outlook.unknown_programs else dates)))
+    return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
 
 
 def no_dates_text(outlook: MachineForecast) -> str:
-    """Why no date can be given, in a sentence; empty where there is one, or nothing is left to foretell."""
-    fates = (reach for fate in outlook.programs.values() for reach in (fate.doubtful, fate.not_stable))
-    reaches = [*fates, *(reach for _, reach in outlook.limits)]
+    """Return why no date can be forecast; empty where one can, or where all limits are reached already."""
+    reaches = [reach for fate in outlook.programs.values() for reach in (fate.doubtful, fate.not_stable)]
+    reaches += [reach for _, reach in outlook.limits]
     if any(reach.forecast_end is not None for reach in reaches) or all(reach.is_measured for reach in reaches):
         return ""
     points = max((len(series.trend.points) for series in outlook.status.series if series.trend), default=0)
     if points >= MIN_FORECAST_POINTS:
         return "No dates: what was tapped lies too far back to foretell from it."
-    return (
-        f"No dates yet: a forecast needs {MIN_FORECAST_POINTS} points, there {'is' if points == 1 else 'are'} {points}."
-    )
+    there = f"there {'is' if points == 1 else 'are'} {points}"
+    return f"No dates yet: a forecast needs {MIN_FORECAST_POINTS} points, {there}."
 
 
 def trend_sentence(series: SeriesStatus) -> str:
-    """Course of the series so far, in a sentence."""
+    """Return the trend of the series in a sentence."""
     trend = series.trend
     if trend is None:
         return f"{series.name}: unknown"
@@ -126,7 +117,7 @@ def trend_sentence(series: SeriesStatus) -> str:
 
 
 def rate_text(trend: Trend) -> str:
-    """Change in % a month at the last point, with its 95 % interval; empty below 8 points."""
+    """Return the change in % a month at the last point, with its 95 % interval; empty below 8 points."""
     rate = trend.rate
     if rate is None:
         return ""
@@ -137,20 +128,20 @@ def rate_text(trend: Trend) -> str:
 
 
 def change_since_start_text(series: SeriesStatus) -> str:
-    """How far it has fallen since it started; of an only test, that there is nothing to compare it with."""
+    """Return the frequency change since the series started."""
     if series.is_baseline:
         return "first test, nothing to compare it with yet"
     return f"frequency {change_text(series)} since the first tests" if series.drop.is_known else "unknown"
 
 
 def change_text(series: SeriesStatus) -> str:
-    """Change of the frequency since the series started, with its standard error."""
+    """Return the frequency change since the series started, with its standard error."""
     fall = series.drop
     return f"{format_with_error(-fall.value, fall.std)} %" if fall.is_known else "unknown"
 
 
 def trend_text(trend: Trend) -> str:
-    """Its course: since when it falls where that rings, else the shape that fits it best; empty below 8 points."""
+    """Return since when the frequency drops, or else the shape that fits best; empty below 8 points."""
     fallen, since = trend.open_drop, trend.drop_since
     if fallen is not None and since is not None:
         course = f"{'fell at once before' if fallen.change.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
@@ -178,21 +169,10 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
 
 
 def _score_text(trend: Trend) -> str:
-    score = _score_values(trend)[-1]
-    return (
-        f"{score:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
-        if math.isfinite(score)
-        else f"from {MIN_MONITORED_POINTS} points on"
-    )
-
-
-def _score_values(trend: Trend) -> list[float]:
-    """Scores, one a point; NaN where none is judged."""
-    return [float(score) for score in trend.detection.scores]
-
-
-def _points_json(trend: Trend) -> list[dict[str, Any]]:
-    return [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in trend.points]
+    score = trend.detection.scores[-1]
+    if not math.isfinite(score):
+        return f"from {MIN_MONITORED_POINTS} points on"
+    return f"{score:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
 
 
 def _alarm_json(trend: Trend) -> dict[str, Any] | None:
@@ -202,12 +182,8 @@ def _alarm_json(trend: Trend) -> dict[str, Any] | None:
     return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
 
 
-def _csv_number(value: float) -> float | str:
-    return value if math.isfinite(value) else ""
-
-
 def reach_text(reach: ThresholdDates, now: datetime) -> str:
-    """When something is reached, for people."""
+    """Return when a limit is reached in words."""
     if reach.is_measured:
         return "already"
     if reach.forecast_end is None:
@@ -230,32 +206,25 @@ def _day_or_now(days: float, today: float) -> str:
 
 
 def chart_lines(trend: Trend) -> list[str]:
-    """Points and fitted line over the dates, fall downwards (%); the points alone below 8 of them."""
-    dates = point_days(trend.points)
+    """Return a chart of characters: points and fitted line (%) over the dates, a drop downwards."""
+    dates, rows = point_days(trend.points), CHART_HEIGHT
     percent = np.array([point.percent for point in trend.points]) - trend.start
     low, high = float(percent.min()), float(percent.max())
     low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
-    columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
-    canvas = np.full((CHART_HEIGHT, CHART_WIDTH), " ")
+    canvas = np.full((rows, CHART_WIDTH), " ")
     if trend.forecast is not None:
-        at = np.linspace(dates[0], dates[-1], CHART_WIDTH)
-        line = np.interp(at, dates, trend.forecast.fitted - trend.start)
-        canvas[_canvas_indices(np.clip(line, low, high), high, low, CHART_HEIGHT), np.arange(CHART_WIDTH)] = CHART_LINE
-    canvas[_canvas_indices(percent, high, low, CHART_HEIGHT), columns] = CHART_POINT
-    labels = [
-        f"{value:+8.2f} %" if row % 4 == 0 or row == CHART_HEIGHT - 1 else " " * 10
-        for row, value in _axis_ticks(low, high)
-    ]
+        line = np.interp(np.linspace(dates[0], dates[-1], CHART_WIDTH), dates, trend.forecast.fitted - trend.start)
+        canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = CHART_LINE
+    columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
+    canvas[_canvas_indices(percent, high, low, rows), columns] = CHART_POINT
+    ticks = [f"{value:+8.2f} %" for value in np.linspace(high, low, rows).tolist()]
+    labels = [tick if row % 4 == 0 or row == rows - 1 else " " * 10 for row, tick in enumerate(ticks)]
     drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]
     first, last = (f"{date_of_days(days):%Y-%m-%d}" for days in dates[[0, -1]])
     return [*drawn, " " * 11 + "+" + "-" * CHART_WIDTH, " " * 12 + first + last.rjust(CHART_WIDTH - len(first))]
 
 
-def _axis_ticks(low: float, high: float) -> list[tuple[int, float]]:
-    return list(enumerate(np.linspace(high, low, CHART_HEIGHT).tolist()))
-
-
-def _canvas_indices(values: NDArray[np.float64], start: float, end: float, count: int) -> NDArray[np.intp]:
+def _canvas_indices(values: Floats, start: float, end: float, count: int) -> Indices:
     span = end - start
     share = (values - start) / span if span else np.zeros(values.size)
     return np.round(share * (count - 1)).astype(np.intp)

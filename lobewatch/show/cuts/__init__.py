@@ -1,1 +1,1 @@
-"""What a cut sounded like, for people: sentences, JSON, a picture."""
+"""Show recorded and suggested test cuts."""

@@ -9,7 +9,8 @@ from typing import Any
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.programs.materials import power_text
+from lobewatch.show.terminal.json_fields import json_fields
 
 FAULT_TEXTS: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
@@ -29,16 +30,16 @@ FAULT_TEXTS: Mapping[str, str] = {
     "a cut gives to chatter; cut a little deeper, and listen for it without the cut",
     "slow-sampling": "fewer than three multiples of tooth passing are heard at this sample rate; take a higher one",
 }
-"""Fault and cure by the reason why it cannot be told."""
+"""Fault and remedy for each reason why chatter cannot be told from a stable cut."""
 
 
 MICROPHONE_NOTE = (
     "by microphone: it hears the shop too, so that a tone of another machine that runs in the cut alone is not known "
     "from one of the cut, and it does not tell how far the tool moves"
 )
-"""What a microphone cannot tell."""
+"""Limits of a recording by microphone."""
 MIN_RATE_FACTOR = 2 * MIN_TOOTH_HARMONICS
-"""Sample rate over tooth passing from which on enough multiples are below half of it."""
+"""Sample rate over tooth-passing frequency that holds enough harmonics of tooth passing."""
 
 
 NEXT_STEP_TEXTS: Mapping[str, str] = {
@@ -47,38 +48,39 @@ NEXT_STEP_TEXTS: Mapping[str, str] = {
     "flip": "cut at another speed, or less deep; lobewatch suggest names the next test cut",
     "cannot tell": "listen again; this one teaches nothing",
 }
-"""Next step by the word."""
+"""Next step for each verdict on a recorded cut."""
 
 
 def next_step_text(comparison: CutComparison) -> str:
-    """The next step, in a line."""
+    """Return the next step after a recorded cut."""
     return NEXT_STEP_TEXTS[comparison.detected.verdict]
 
 
 def reason_text(comparison: CutComparison) -> str:
-    """What the word rests on, or why it cannot be told, in a line."""
+    """Return what the verdict on a recorded cut rests on, or why there is none."""
     heard = comparison.detected
     return _fault_text(comparison) if heard.verdict == "cannot tell" else _energy_text(heard.energy_ratio)
 
 
 def _fault_text(comparison: CutComparison) -> str:
-    """Fault and cure, with the numbers of this cut."""
-    reason, tone = comparison.detected.reason, comparison.detected.tone
-    if reason == "speed-not-found" and math.isfinite(comparison.detected.distant_rpm):
-        return f"{FAULT_TEXTS[reason]}; these lines fit {comparison.detected.distant_rpm:.0f} rpm"
-    if reason == "tacho-contradicts":
-        return f"{FAULT_TEXTS[reason]}: {_speed_conflict_text(comparison)}"
-    if reason == "slow-sampling":
-        return f"{FAULT_TEXTS[reason]}: {MIN_RATE_FACTOR * comparison.tooth_passing_frequency:.0f} Hz or more"
-    if reason == "unexplained-tone":
-        mode = comparison.nearest_mode_frequency(tone)
-        away = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
-        return f"at {tone:.1f} Hz{away}: {FAULT_TEXTS[reason]}"
-    return FAULT_TEXTS[reason]
+    """Return the fault and its remedy, with the numbers of this cut."""
+    detected = comparison.detected
+    text = FAULT_TEXTS[detected.reason]
+    match detected.reason:
+        case "speed-not-found" if math.isfinite(detected.distant_rpm):
+            return f"{text}; these lines fit {detected.distant_rpm:.0f} rpm"
+        case "tacho-contradicts":
+            return f"{text}: {_speed_conflict_text(comparison)}"
+        case "slow-sampling":
+            return f"{text}: {MIN_RATE_FACTOR * comparison.tooth_passing_frequency:.0f} Hz or more"
+        case "unexplained-tone":
+            mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
+            distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
+            return f"at {tone:.1f} Hz{distance}: {text}"
+    return text
 
 
 def _speed_conflict_text(comparison: CutComparison) -> str:
-    """Both speeds, and what is to be looked at."""
     heard, set_rpm = comparison.detected, comparison.setting.speed_rpm
     measured, lines = heard.measured_rpm or math.nan, heard.distant_rpm
     both = f"{measured:.1f} rpm, not the {lines:.1f} rpm that {'was set' if lines == set_rpm else 'the lines fit'}"
@@ -89,12 +91,12 @@ def _speed_conflict_text(comparison: CutComparison) -> str:
 
 
 def _energy_text(ratio: float) -> str:
-    percent = f"{100 * ratio:.2g}" if ratio < 1 else f"{100 * ratio:.0f}"
-    return f"beside the lines of the spindle: {percent} % of their energy"
+    digits = ".2g" if ratio < 1 else ".0f"
+    return f"beside the lines of the spindle: {100 * ratio:{digits}} % of their energy"
 
 
 def cut_verdict_text(comparison: CutComparison) -> str:
-    """The word, in a line."""
+    """Return the verdict on a recorded cut, with the chatter frequency or the fault."""
     heard, chatter = comparison.detected, comparison.detected.chatter
     if heard.verdict == "cannot tell":
         return f"cannot tell ({heard.reason}): {_fault_text(comparison)}"
@@ -105,22 +107,22 @@ def cut_verdict_text(comparison: CutComparison) -> str:
 
 
 def recorded_cut_texts(comparison: CutComparison) -> list[str]:
-    """The word, and what it rests on."""
-    heard, chatter, texts = comparison.detected, comparison.detected.chatter, [cut_verdict_text(comparison)]
-    if heard.spindle_speed is not None:
-        off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+    """Return the verdict on a recorded cut, and what it rests on."""
+    detected, texts = comparison.detected, [cut_verdict_text(comparison)]
+    if detected.spindle_speed is not None:
+        difference = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+        duration = math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
         texts.append(
-            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
-            f"{comparison.tooth_passing_frequency:.1f} Hz; listened to {_analysed_seconds(comparison):.2f} s"
+            f"{comparison.speed_rpm:.1f} rpm ({difference:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
+            f"{comparison.tooth_passing_frequency:.1f} Hz; listened to {duration:.2f} s"
         )
-    if heard.measured_rpm is not None:
-        is_silent = math.isnan(heard.measured_rpm)
-        texts.append(f"tachometer: {'no speed in the cut' if is_silent else f'{heard.measured_rpm:.1f} rpm'}")
-    if math.isfinite(heard.energy_ratio):
-        texts.append(_energy_text(heard.energy_ratio))
-    if chatter is not None:
+    if (measured := detected.measured_rpm) is not None:
+        texts.append(f"tachometer: {'no speed in the cut' if math.isnan(measured) else f'{measured:.1f} rpm'}")
+    if math.isfinite(detected.energy_ratio):
+        texts.append(_energy_text(detected.energy_ratio))
+    if detected.chatter is not None:
         lobe = comparison.lobe_number
-        texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(chatter.peaks)} side bands")
+        texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(detected.chatter.peaks)} side bands")
     if comparison.sensor == "microphone":
         texts.append(MICROPHONE_NOTE)
     if comparison.power is not None:
@@ -129,65 +131,54 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
 
 
 def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:
-    """What was heard of each cut in a recording; saved: names under which they are kept."""
+    """Return what was detected in each cut of a recording; saved: names under which the cuts are kept."""
     texts = list[str]()
     for number, comparison in enumerate(comparisons):
         parts = comparison.detected.parts
-        head = [f"cut {number + 1} of {len(comparisons)}, {parts.begin:.2f} to {parts.end:.2f} s:"]
-        texts += head if len(comparisons) > 1 else []
+        if len(comparisons) > 1:
+            texts.append(f"cut {number + 1} of {len(comparisons)}, {parts.begin:.2f} to {parts.end:.2f} s:")
         texts += [*recorded_cut_texts(comparison), *(f"saved {name}" for name in saved[number : number + 1])]
     return texts
 
 
 def _prediction_texts(comparison: CutComparison) -> list[str]:
-    if comparison.predicted is None:
+    expected, difference = comparison.predicted, comparison.frequency_difference
+    if expected is None:
         return []
-    word = "stable" if comparison.predicted.stable else "chatter"
-    text = f"by the tap tests, at rest: {word}, at this depth {comparison.predicted.frequency:.1f} Hz"
-    if comparison.frequency_difference is not None:
-        text += f", {comparison.frequency_difference:.1f} Hz from what was heard modulo tooth passing"
-    return [text]
+    apart = "" if difference is None else f", {difference:.1f} Hz from what was heard modulo tooth passing"
+    frequency = f"at this depth {expected.frequency:.1f} Hz"
+    return [f"by the tap tests, at rest: {_stability_text(expected.stable)}, {frequency}{apart}"]
 
 
-def _analysed_seconds(comparison: CutComparison) -> float:
-    spectrum = comparison.detected.spectrum
-    return math.nan if spectrum is None else 1 / spectrum.bin_width
+RECORDED_CUT_FIELDS = json_fields("""
+    word=detected.verdict reason=detected.reason chatter_frequency_hz=detected.chatter.frequency
+    chatter_frequency_hz_std=detected.chatter.error elsewhere_rpm=detected.distant_rpm
+    unexplained_tone_hz=detected.tone sensor speed_rpm=detected.speed_rpm
+    speed_rpm_std=detected.spindle_speed.error*60 commanded_rpm=setting.speed_rpm measured_rpm=detected.measured_rpm
+    depth_mm=setting.depth*1e3 tooth_frequency_hz=tooth_passing_frequency energy_ratio=detected.energy_ratio
+    lobe=lobe_number side_bands_hz=detected.chatter.peaks.frequency power_kw=power.watts/1e3
+    tangential_by_power_n_per_mm2=power.tangential/1e6 predicted predicted_frequency_hz=predicted.frequency
+    predicted_apart_hz=frequency_difference begin_s=detected.parts.begin end_s=detected.parts.end
+    steady_begin_s=detected.parts.steady_begin steady_end_s=detected.parts.steady_end
+""")
 
 
 def recorded_cut_json(comparison: CutComparison) -> dict[str, Any]:
-    """A cut with all that was heard of it."""
-    heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
-    return {
-        "word": heard.verdict,
-        "reason": heard.reason,
-        "chatter_frequency_hz": None if chatter is None else chatter.frequency,
-        "chatter_frequency_hz_std": None if chatter is None else chatter.error,
-        "elsewhere_rpm": heard.distant_rpm,
-        "unexplained_tone_hz": heard.tone,
-        "sensor": comparison.sensor,
-        "speed_rpm": heard.speed_rpm,
-        "speed_rpm_std": None if heard.spindle_speed is None else 60 * heard.spindle_speed.error,
-        "commanded_rpm": comparison.setting.speed_rpm,
-        "measured_rpm": heard.measured_rpm,
-        "depth_mm": 1e3 * comparison.setting.depth,
-        "tooth_frequency_hz": comparison.tooth_passing_frequency,
-        "energy_ratio": heard.energy_ratio,
-        "lobe": comparison.lobe_number,
+    """Return a recorded cut with all that was detected in it."""
+    chatter, expected = comparison.detected.chatter, comparison.predicted
+    return RECORDED_CUT_FIELDS(comparison) | {
         "side_bands_hz": [] if chatter is None else sorted(chatter.peaks.frequency.tolist()),
-        **power_json(comparison.power),
-        "predicted": None if expected is None else ("stable" if expected.stable else "chatter"),
-        "predicted_frequency_hz": None if expected is None else expected.frequency,
-        "predicted_apart_hz": comparison.frequency_difference,
-        "begin_s": heard.parts.begin,
-        "end_s": heard.parts.end,
-        "steady_begin_s": heard.parts.steady_begin,
-        "steady_end_s": heard.parts.steady_end,
+        "predicted": None if expected is None else _stability_text(expected.stable),
     }
 
 
-def recording_json(comparisons: Sequence[CutComparison], beside: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """The cut in a recording; several stand in `cuts`. beside: more of each."""
-    each = [recorded_cut_json(comparison) for comparison in comparisons]
-    for cut, more in zip(each, beside, strict=False):
-        cut.update(more)
-    return each[0] if len(each) == 1 else {"cuts": each}
+def _stability_text(is_stable: bool) -> str:
+    return "stable" if is_stable else "chatter"
+
+
+def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """Return the cut in a recording, several as a list in `cuts`; more: further keys of each."""
+    cuts = [recorded_cut_json(comparison) for comparison in comparisons]
+    for cut, keys in zip(cuts, more, strict=False):
+        cut.update(keys)
+    return cuts[0] if len(cuts) == 1 else {"cuts": cuts}

@@ -12,27 +12,19 @@ from matplotlib.figure import Figure
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
-from lobewatch.show.figures.drawing import (
-    ALARM_ORANGE,
-    EVENT_GREY,
-    FIRST_GREY,
-    GOOD_GREEN,
-    NEWEST_BLUE,
-    new_axes,
-    save_figure,
-)
+from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
 from lobewatch.tool.assembly import Assembly
 
 LINE_KIND_MARKS = {
-    "turns": ("turns of the spindle", FIRST_GREY, "|"),
-    "tooth": ("tooth passing", NEWEST_BLUE, "o"),
-    "air": ("there in air", EVENT_GREY, "x"),
-    "chatter": ("chatter", ALARM_ORANGE, "D"),
+    "turns": ("turns of the spindle", Paint.FIRST, "|"),
+    "tooth": ("tooth passing", Paint.NEWEST, "o"),
+    "air": ("there in air", Paint.EVENT, "x"),
+    "chatter": ("chatter", Paint.ALARM, "D"),
 }
-"""Label, colour and mark of lines."""
+"""Label, grey-safe mark and paint of each kind of spectral line."""
 MIN_SHOWN_AMPLITUDE = 1e-4
-"""Share of the loudest amplitude down to which is drawn."""
+"""Smallest amplitude drawn, as a share of the largest."""
 
 
 def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
@@ -41,7 +33,7 @@ def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
 
 
 def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
-    """Amplitude over frequency, a panel for each cut; the word alone where it did not get as far as a spectrum."""
+    """Plot amplitude over frequency, a panel for each cut; only its title where there is no spectrum."""
     figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
     for axis, comparison in zip(axes, comparisons, strict=True):
         _draw_spectrum(axis, comparison)
@@ -49,7 +41,6 @@ def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
 
 
 def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
-    """One cut."""
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
@@ -72,8 +63,7 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
 
 
 def _draw_modes(axis: Axes, assembly: Assembly) -> None:
-    """Modes of the tool as it was tapped."""
     for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
         for number, mode in enumerate(modes or ()):
             label = f"modes in {name}, at rest" if number == 0 else None
-            axis.axvline(mode.frequency, color=GOOD_GREEN, ls=dashes, lw=1, label=label)
+            axis.axvline(mode.frequency, color=Paint.GOOD, ls=dashes, lw=1, label=label)

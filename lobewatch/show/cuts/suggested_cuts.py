@@ -19,62 +19,59 @@ from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import factor_text
-from lobewatch.show.terminal.output import new_table, remark_json, remark_lines
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import count_noun, new_table, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
+
+SPEED_POCKET_FIELDS = json_fields("speed_rpm window_rpm depth_mm=speed_rpm over_lowest_limit=gain")
+SUGGESTED_CUT_FIELDS = json_fields("""
+    speed_rpm depth_mm=depth chance_of_chatter=chatter_probability expected_gain=gain settles=most_informative repeats
+""")
+INTERVAL_FIELDS = json_fields("mean low high std")
 
 
 def speed_pocket_json(pocket: SpeedPocket) -> dict[str, Any]:
-    """One pocket; its depth is not known."""
-    return {
-        "speed_rpm": pocket.speed_rpm,
-        "window_rpm": pocket.window_rpm,
-        "depth_mm": None,
-        "over_lowest_limit": pocket.gain,
-    }
+    """Return one pocket, whose depth is not known."""
+    return SPEED_POCKET_FIELDS(pocket) | {"depth_mm": None}
 
 
 def speed_pocket_table(pockets: Sequence[SpeedPocket]) -> Table:
-    """Pockets, a line each."""
-    rows = new_table("speed (rpm)", "window (rpm)", "over the lowest limit")
-    for pocket in pockets:
-        low, high = pocket.window_rpm
-        gain = f"{pocket.gain:.1f} times" if pocket.gain < MAX_POCKET_GAIN else f"{MAX_POCKET_GAIN:g} times or more"
-        rows.add_row(
-            format_rpm(round(pocket.speed_rpm)), f"{format_rpm(math.ceil(low))}..{format_rpm(math.floor(high))}", gain
-        )
-    return rows
+    """Return a table with a line for each pocket."""
+    return new_table("speed (rpm)", "window (rpm)", "over the lowest limit", rows=map(_pocket_cells, pockets))
+
+
+def _pocket_cells(pocket: SpeedPocket) -> list[str]:
+    low, high = pocket.window_rpm
+    gain = f"{pocket.gain:.1f} times" if pocket.gain < MAX_POCKET_GAIN else f"{MAX_POCKET_GAIN:g} times or more"
+    return [format_rpm(round(pocket.speed_rpm)), f"{format_rpm(math.ceil(low))}..{format_rpm(math.floor(high))}", gain]
 
 
 def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> dict[str, Any]:
-    """The pockets of a cut, and why no depth is known."""
-    return {
-        "cut": cut,
-        "pockets": [speed_pocket_json(pocket) for pocket in pockets],
-        "remarks": [remark_json(remark) for remark in merge_remarks(remarks)],
-    }
+    """Return the pockets of a cut, and why no depth is known."""
+    return {"cut": cut, "pockets": list(map(speed_pocket_json, pockets)), "remarks": merge_remarks(remarks)}
 
 
 def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> list[str | Table]:
-    """The same for people."""
+    """Return the pockets of a cut as a table, and why no depth is known."""
     heading = f"{cut}: pockets by frequency and damping, the largest removal rate first; how deep, test cuts tell"
     return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
 
 
 def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], first: float) -> dict[str, Any]:
-    """The next cut, and what was heard in each pocket."""
+    """Return the next test cut, and the depths that were tried in each pocket; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     return {
         "program": program.name,
-        "suggested": None if following is None else {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
+        "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
         "pockets": [
-            speed_pocket_json(heard.pocket)
+            speed_pocket_json(tried.pocket)
             | {
-                "cut_at_rpm": heard.speed_rpm,
-                "cuts": [cut.id for cut in heard.cuts],
-                "heard_stable_mm": _round_to_mm(heard.stable_depth) if heard.stable_depth else None,
-                "heard_chatter_mm": _round_to_mm(heard.chatter_depth) if math.isfinite(heard.chatter_depth) else None,
+                "cut_at_rpm": tried.speed_rpm,
+                "cuts": [cut.id for cut in tried.cuts],
+                "heard_stable_mm": _round_to_mm(tried.stable_depth) if tried.stable_depth else None,
+                "heard_chatter_mm": _round_to_mm(tried.chatter_depth) if math.isfinite(tried.chatter_depth) else None,
             }
-            for heard in depths
+            for tried in depths
         ],
     }
 
@@ -82,29 +79,29 @@ def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], firs
 def tried_depths_lines(
     program: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path
 ) -> Iterator[str]:
-    """The next cut, and the depths that were heard stable."""
+    """Return the next test cut, and the depths that were stable; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     if following is not None:
         speed, depth = following
-        made = len(depths[0].cuts)
-        number = f"test cut {made + 1} of at most {MAX_POCKET_CUTS} in the pocket nearest to it"
+        number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the pocket nearest to it"
         yield f"{program.name}: {number}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm"
-        observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program.name])
-        yield f"then: {observe} --speed {speed:g} --depth {_round_to_mm(depth):g} --stable (or --chatter --frequency HZ)"
-    for heard in depths:
-        if heard.stable_depth:
-            above = (
-                f", chatter at {_round_to_mm(heard.chatter_depth):g} mm" if math.isfinite(heard.chatter_depth) else ""
-            )
-            count = len(heard.cuts)
-            cuts = f"{count} cut{'s' if count > 1 else ''}"
-            yield f"recommended by {cuts}: {_round_to_mm(heard.stable_depth):g} mm at {format_rpm(heard.speed_rpm)} rpm, heard stable{above}"
-    if not any(heard.stable_depth for heard in depths):
+        yield _observe_text(folder, program.name, speed, f"{_round_to_mm(depth):g}")
+    stable = [tried for tried in depths if tried.stable_depth]
+    for tried in stable:
+        chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
+        place = f"{_round_to_mm(tried.stable_depth):g} mm at {format_rpm(tried.speed_rpm)} rpm"
+        yield f"recommended by {count_noun(len(tried.cuts), 'cut')}: {place}, heard stable{chatter}"
+    if not stable:
         yield "no depth is recommended yet: none was heard stable in a pocket"
 
 
+def _observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
+    observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
+    return f"then: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+
+
 def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, float] | None:
-    """Speed (rpm) and depth (m) of the next cut, in the pocket nearest to the program; None where all is heard."""
+    """Return speed (rpm) and depth (m) of the next cut, in the nearest pocket; None where all are done."""
     wanted = depths[0].next_depth(first) if depths else None
     return None if wanted is None else (depths[0].speed_rpm, wanted)
 
@@ -114,55 +111,47 @@ def _round_to_mm(depth: float) -> float:
 
 
 def suggestion_json(next_cut: NextCut) -> dict[str, Any]:
-    """The cut, and what it rests on."""
-    cut, best = next_cut.suggestion, _best_stable_cut(next_cut)
+    """Return the next test cut, and what it rests on."""
+    learning, best = next_cut.learning, _best_stable_cut(next_cut.learning)
     return {
-        "program": next_cut.learning.program.name,
-        "suggested": None if cut is None else _suggested_cut_json(cut),
-        "cuts_made": len(next_cut.learning.own_cuts),
+        "program": learning.program.name,
+        "suggested": next_cut.suggestion and _suggested_cut_json(next_cut.suggestion),
+        "cuts_made": len(learning.own_cuts),
         "cuts_left": next_cut.cuts_left,
-        "best_heard": None if best is None else {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
-        "learnt": learned_json(next_cut.learning),
+        "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
+        "learnt": learned_json(learning),
     }
 
 
 def _suggested_cut_json(cut: Suggestion) -> dict[str, Any]:
-    return {
-        "speed_rpm": cut.speed_rpm,
-        "depth_mm": round(1e3 * cut.depth, 6),
-        "chance_of_chatter": cut.chatter_probability,
-        "expected_gain": cut.gain,
-        "settles": cut.most_informative,
-        "repeats": cut.repeats or None,
-    }
+    return SUGGESTED_CUT_FIELDS(cut) | {"depth_mm": round(1e3 * cut.depth, 6), "repeats": cut.repeats or None}
 
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
-    """A line for each thing a person needs."""
-    name, cut, n_made = next_cut.learning.program.name, next_cut.suggestion, len(next_cut.learning.own_cuts)
+    """Return the next test cut, how to enter it, and the best stable cut so far."""
+    learning, cut = next_cut.learning, next_cut.suggestion
+    program, n_made = learning.program, len(learning.own_cuts)
     if cut is None:
-        yield f"{name}: {_no_suggestion_text(next_cut)}"
+        yield f"{program.name}: {_no_suggestion_text(next_cut)}"
     else:
         depth = f"{1e3 * cut.depth:.4g}"
+        number = f"test cut {n_made + 1} of {n_made + next_cut.cuts_left}"
         yield (
-            f"{name}: test cut {n_made + 1} of {n_made + next_cut.cuts_left}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm, "
-            f"chance of chatter {round(100 * cut.chatter_probability)} %; {_suggestion_reason(cut, next_cut.learning)}"
+            f"{program.name}: {number}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm, "
+            f"chance of chatter {round(100 * cut.chatter_probability)} %; {_suggestion_reason(cut, learning)}"
         )
-        observe = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
-        power = (
-            "" if next_cut.learning.program.feed_per_tooth_mm is None else "; --power KW, where it is shown, tells Kt"
-        )
-        yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ){power}"
-    best = _best_stable_cut(next_cut)
+        power = "" if program.feed_per_tooth_mm is None else "; --power KW, where it is shown, tells Kt"
+        yield _observe_text(folder, program.name, cut.speed_rpm, depth) + power
+    best = _best_stable_cut(learning)
     if best is not None:
         gain = f"; the next is expected to gain {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
         yield f"most chips heard stable: {1e3 * best[1]:.4g} mm at {format_rpm(best[0])} rpm{gain}"
     yield "a test cut is no advice: lobewatch check says what may be run"
 
 
-def _suggestion_reason(cut: Suggestion, lesson: LearningResult) -> str:
+def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
     if cut.repeats:
-        is_believed = cut.repeats in [made.id for made in lesson.accepted_cuts]
+        is_believed = cut.repeats in [made.id for made in learning.accepted_cuts]
         return f"{cut.repeats} once more, since {'its word may be wrong' if is_believed else 'it is not believed'}"
     return f"it tells most of {factor_text(cut.most_informative)}"
 
@@ -175,55 +164,50 @@ def _no_suggestion_text(next_cut: NextCut) -> str:
     return "no test cut is worth making: nothing more is to be gained"
 
 
-def _best_stable_cut(next_cut: NextCut) -> tuple[float, float] | None:
-    """Speed (rpm) and depth (m) of most chips that were heard stable; None where none was."""
-    lesson = next_cut.learning
-    believed = [cut for cut in lesson.own_cuts if cut not in lesson.rejected_cuts]
-    stable = [(cut.speed_rpm, cut.depth) for cut in believed if not cut.has_chatter]
+def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
+    """Return speed (rpm) and depth (m) of the stable cut with the largest removal rate; None where none was stable."""
+    accepted = [cut for cut in learning.own_cuts if cut not in learning.rejected_cuts]
+    stable = [(cut.speed_rpm, cut.depth) for cut in accepted if not cut.has_chatter]
     return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
 
 
-def learned_json(lesson: LearningResult) -> dict[str, Any]:
-    """Factors on what was tapped at rest (Kt, Kr/Kt: on what machine.toml says), with and without the cuts."""
-    before, now = lesson.prior.intervals, lesson.posterior.intervals
+def learned_json(learning: LearningResult) -> dict[str, Any]:
+    """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
+    before, after = learning.prior.intervals, learning.posterior.intervals
     return {
-        "cuts": [cut.id for cut in lesson.accepted_cuts],
-        "chatter_frequencies": lesson.posterior.n_frequencies,
-        "frequency_learnt": lesson.posterior.n_frequencies > 0,
-        "effective_sample_size": lesson.posterior.effective_size,
-        "factors": {name: _interval_json(now[name]) | {"before": _interval_json(before[name])} for name in now},
+        "cuts": [cut.id for cut in learning.accepted_cuts],
+        "chatter_frequencies": learning.posterior.n_frequencies,
+        "frequency_learnt": learning.posterior.n_frequencies > 0,
+        "effective_sample_size": learning.posterior.effective_size,
+        "factors": {name: INTERVAL_FIELDS(after[name]) | {"before": INTERVAL_FIELDS(before[name])} for name in after},
     }
 
 
-def _interval_json(interval: Interval) -> dict[str, float]:
-    return {"mean": interval.mean, "low": interval.low, "high": interval.high, "std": interval.std}
+def learned_texts(learning: LearningResult) -> list[str | Table]:
+    """Return a table of what the test cuts have taught; nothing where there are none."""
+    count = len(learning.accepted_cuts)
+    return [f"learnt from {count_noun(count, 'cut')}:", learned_table(learning)] if count else []
 
 
-def learned_texts(lesson: LearningResult) -> list[str | Table]:
-    """What the cuts have taught; nothing where there are none."""
-    count = len(lesson.accepted_cuts)
-    return [f"learnt from {count} cut{'s' if count > 1 else ''}:", learned_table(lesson)] if count else []
+def learned_table(learning: LearningResult) -> Table:
+    """Return a table of the factors before and after the test cuts."""
+    before, after = learning.prior.intervals, learning.posterior.intervals
+    rows = ((factor_text(name), _interval_text(before[name]), _learned_text(learning, name)) for name in after)
+    return new_table("~at speed, over at rest", "before (95 %)", "learnt (95 %)", rows=rows)
 
 
-def learned_table(lesson: LearningResult) -> Table:
-    """Factors, a line each: before the cuts, and now."""
-    rows = new_table("~at speed, over at rest", "before (95 %)", "learnt (95 %)")
-    before, now = lesson.prior.intervals, lesson.posterior.intervals
-    for name in now:
-        is_open = name.startswith("frequency") and not lesson.posterior.n_frequencies
-        rows.add_row(
-            factor_text(name), _interval_text(before[name]), "not learnt" if is_open else _interval_text(now[name])
-        )
-    return rows
+def _learned_text(learning: LearningResult, name: str) -> str:
+    is_open = name.startswith("frequency") and not learning.posterior.n_frequencies
+    return "not learnt" if is_open else _interval_text(learning.posterior.intervals[name])
 
 
 def _interval_text(interval: Interval) -> str:
     return f"{interval.mean:.3f} ({interval.low:.3f}..{interval.high:.3f})"
 
 
-def learned_remarks(lesson: LearningResult) -> Iterator[Remark]:
-    """What was left out, and what the cuts say nothing of."""
-    yield from inconsistent_cut_remarks(lesson.posterior, lesson.inconsistent_cuts, lesson.program.name)
-    if lesson.accepted_cuts and not lesson.posterior.n_frequencies:
+def learned_remarks(learning: LearningResult) -> Iterator[Remark]:
+    """Return remarks on rejected cuts, and on what the cuts do not determine."""
+    yield from inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, learning.program.name)
+    if learning.accepted_cuts and not learning.posterior.n_frequencies:
         text = "f not learnt: no chatter frequency was heard yet"
-        yield Remark("frequency-not-learnt", lesson.program.name, text, "tell what the next chatter sounds at")
+        yield Remark("frequency-not-learnt", learning.program.name, text, "tell what the next chatter sounds at")

@@ -1,1 +1,1 @@
-"""Pictures: trend, modes, model, stability lobes, and what they are marked with."""
+"""Plot figures: trend, modes, model, stability lobes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -15,12 +16,18 @@ from matplotlib.ticker import LogFormatter
 
 from lobewatch.show.terminal.output import make_printable
 
-NEWEST_BLUE = "#0072B2"
-FIRST_GREY = "#777777"
-ALARM_ORANGE = "#D55E00"
-GOOD_GREEN = "#009E73"
-UNKNOWN_GREY = "#767676"
-EVENT_GREY = "#555555"
+
+class Paint(StrEnum):
+    """Paint of a thing in every figure, distinct in grey too by dashes and marks."""
+
+    NEWEST = "#0072B2"
+    FIRST = "#777777"
+    ALARM = "#D55E00"
+    GOOD = "#009E73"
+    UNKNOWN = "#767676"
+    EVENT = "#555555"
+
+
 FIGURE_STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.grid": True,
@@ -46,7 +53,7 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 
 def render_svg(figure: Figure) -> str:
-    """The picture as an <svg> element."""
+    """Return the figure as an <svg> element."""
     text = io.StringIO()
     _disable_math_text(figure)
     with mpl.rc_context(FIGURE_STYLE):
@@ -55,9 +62,9 @@ def render_svg(figure: Figure) -> str:
 
 
 def _disable_math_text(figure: Figure) -> None:
-    """Texts stand as they are: a program may be called "cost $5 to $6". Logarithmic axes have plain numbers then.
+    """Show texts as they are, without mathematical notation and control characters.
 
-    Characters that no picture can hold are replaced.
+    A program may be called "cost $5 to $6". Logarithmic axes get plain numbers.
     """
     for text in figure.findobj(Text):
         text.set_parse_math(False)
@@ -68,7 +75,7 @@ def _disable_math_text(figure: Figure) -> None:
 
 
 def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """A figure of this size (inches) with rows of axes, one above the other."""
+    """Return a figure of this size (inches) with rows of axes, one above the other."""
     with mpl.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
@@ -83,21 +90,21 @@ LABEL_SIDES: dict[LabelSide, tuple[float, float]] = {
     "below": (0, -1),
 }
 LABEL_FONT_SIZE = 8.5
-"""Size of the letters (points)."""
+"""Font size of labels (points)."""
 PHONE_FONT_SIZE = 11.5
-"""The same of a small picture on a phone, where letters are larger than the picture is (report.css)."""
+"""Font size to reserve in a small figure, which a phone shows with larger letters (report.css; points)."""
 MAX_HIDDEN_SHARE = 0.15
-"""Share of its area, at most, that words may cover or lie outside before they are left out."""
+"""Largest share of its area that a label may cover or leave the axes by."""
 LETTER_WIDTH, LINE_HEIGHT = 0.62, 1.35
-"""A letter and a line, at most, over the size."""
+"""Largest width of a letter and height of a line, over the font size."""
 LABEL_DISTANCE = 9.0
-"""Distance from a place to its words (points)."""
+"""Distance from a point to its label (points)."""
 LABEL_BACKGROUND = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
-"""Look of the paper behind words that stand on lines."""
+"""Background of labels that lie on lines."""
 
 
 class _Box(NamedTuple):
-    """A rectangle in points of the axes."""
+    """Rectangle in points of the axes."""
 
     left: float
     low: float
@@ -110,17 +117,17 @@ class _Box(NamedTuple):
         return (self.right - self.left) * (self.high - self.low)
 
     def overlap(self, box: _Box) -> float:
-        """Area in common."""
+        """Return the common area (points squared)."""
         wide = min(self.right, box.right) - max(self.left, box.left)
         high = min(self.high, box.high) - max(self.low, box.low)
         return wide * high if wide > 0 and high > 0 else 0.0
 
 
 class LabelPlacer:
-    """Words in one picture, whose limits are set already."""
+    """Labels of one figure that avoid each other; the limits of the axes are set before."""
 
     def __init__(self, axes: Axes, room: float = LABEL_FONT_SIZE, *, may_lack: bool = False) -> None:
-        """None yet. room: size of letters (points) to leave room for; may_lack: words without room are left out."""
+        """Set the font size to reserve (points); may_lack: leave out labels that find no room."""
         self._axes = axes
         self._room = room
         self._above = LABEL_DISTANCE / 2 * room / LABEL_FONT_SIZE
@@ -134,7 +141,7 @@ class LabelPlacer:
         colour: str = "black",
         sides: Sequence[LabelSide] = tuple(LABEL_SIDES),
     ) -> None:
-        """Put words to that side of a place where they cover least of what is there, the first of several."""
+        """Add a label at the side of a point where it covers least, the first of several equal sides."""
         boxes = {side: self._box(text, place, side) for side in sides}
         best = min(boxes, key=lambda side: self._covered(boxes[side]))
         if self._may_lack and self._covered(boxes[best]) > MAX_HIDDEN_SHARE * boxes[best].area:
@@ -154,11 +161,11 @@ class LabelPlacer:
         )
 
     def reserve_area(self, low: tuple[float, float], high: tuple[float, float]) -> None:
-        """No words between two corners, where there is a choice."""
+        """Keep labels out of the rectangle between two corners where they have a choice."""
         self._taken.append(_Box(*self._points(low), *self._points(high)))
 
     def reserve_mark(self, place: tuple[float, float], size: float) -> None:
-        """No words over a mark of this size (points), where there is a choice."""
+        """Keep labels off a mark of this size (points) where they have a choice."""
         x, y = self._points(place)
         self._taken.append(_Box(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
 
@@ -170,7 +177,7 @@ class LabelPlacer:
         return _Box(middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
 
     def _covered(self, box: _Box) -> float:
-        """Area of other words, and area outside of the axes."""
+        """Return the area of a box on other labels and outside of the axes."""
         inside = box.overlap(_Box(0, 0, *self._size))
         return box.area - inside + sum(box.overlap(taken) for taken in self._taken)
 

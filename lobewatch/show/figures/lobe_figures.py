@@ -15,60 +15,49 @@ from matplotlib.dates import AutoDateLocator, DateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
 from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
-from lobewatch.show.figures.drawing import (
-    ALARM_ORANGE,
-    FIRST_GREY,
-    GOOD_GREEN,
-    NEWEST_BLUE,
-    PHONE_FONT_SIZE,
-    UNKNOWN_GREY,
-    LabelPlacer,
-    new_axes,
-    save_figure,
-)
+from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, LabelPlacer, Paint, new_axes, save_figure
+from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
 from lobewatch.verdicts import Setting, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 
-Floats = NDArray[np.float64]
-
 DEPTH_COLORMAP = "cividis"
-"""Colours of depth: dark is shallow, bright is deep, in grey too."""
+"""Colormap of depth: dark is shallow, bright is deep, in grey too."""
 BAND_LABEL = "what is not known of spindle and cut moves the limit within this band"
 WINDOW_LABEL = "safe speeds and depths"
 DOUBTFUL_YELLOW = "#B58900"
 VERDICT_MARKS = {
-    Stability.STABLE: (GOOD_GREEN, "o"),
+    Stability.STABLE: (Paint.GOOD, "o"),
     Stability.DOUBTFUL: (DOUBTFUL_YELLOW, "^"),
-    Stability.NOT_STABLE: (ALARM_ORANGE, "X"),
-    Stability.UNKNOWN: (UNKNOWN_GREY, "D"),
+    Stability.NOT_STABLE: (Paint.ALARM, "X"),
+    Stability.UNKNOWN: (Paint.UNKNOWN, "D"),
 }
-"""Colour and mark of a program by the verdict on it."""
+"""Paint and mark of a program for each verdict."""
 POCKET_GREEN = "#00664A"
 LEARNED_PURPLE = "#8A3D78"
 LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (5.6, 2.3)
-"""Size of a diagram that stands alone, and of one beside words (inches)."""
+"""Size of a diagram that stands alone, and of one that accompanies text (inches)."""
 MAP_LEVELS = 12
-"""Steps of colour in a map."""
+"""Number of levels of a map."""
 DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"
 MAX_DAYS_WITH_TIME = 10.0
-"""Days below which dates are told with their time."""
-TEST_CUT_MARKS = {False: ("heard stable", GOOD_GREEN, "o"), True: ("heard to chatter", ALARM_ORANGE, "x")}
-"""Name, colour and mark of cuts by whether they chatter; wide and hollow, so that a program's own shows through."""
+"""Longest range that is labelled with times, not only with dates (days)."""
+TEST_CUT_MARKS = {False: ("heard stable", Paint.GOOD, "o"), True: ("heard to chatter", Paint.ALARM, "x")}
+"""Label, paint and mark of stable cuts and of cuts with chatter, wide and hollow."""
 TEST_CUT_MARK_SIZE, PROGRAM_MARK_SIZE = 11.0, 9.0
-"""Size of these marks, and of those of programs (points)."""
+"""Size of the marks of test cuts and of programs (points)."""
 MAX_SPEED_TICKS = 6
-"""Number of speeds, at most, that are named along a small picture."""
+"""Largest number of speed labels of a small figure."""
 
 
 def plot_lobes(
@@ -83,10 +72,10 @@ def plot_lobes(
     *,
     is_small: bool = False,
 ) -> Figure:
-    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
+    """Plot a stability lobe diagram: the last of `depths` (m, by label) is the newest, those before it are the first.
 
-    band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it;
-    learnt: what these have taught; is_small: beside words that say the rest, with the names of programs alone.
+    band: uncertainty band of the newest; pockets: recommended settings; heard: test cuts of this cut; learnt: lobes
+    corrected by them; is_small: smaller, with only the names of programs as labels.
     """
     figure, (axes,) = new_axes(1, SMALL_FIGURE_SIZE if is_small else LARGE_FIGURE_SIZE)
     *earlier, now = depths.items()
@@ -96,12 +85,12 @@ def plot_lobes(
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
     low, high = (now[1], now[1]) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
-    axes.fill_between(speed_rpm, high, 2 * top, color=NEWEST_BLUE, alpha=0.10, lw=0)
+    axes.fill_between(speed_rpm, high, 2 * top, color=Paint.NEWEST, alpha=0.10, lw=0)
     if band is not None:
-        axes.fill_between(speed_rpm, low, high, color=NEWEST_BLUE, alpha=0.35, lw=0, label=BAND_LABEL)
-    axes.plot(speed_rpm, now[1] * 1e3, color=NEWEST_BLUE, lw=1.6, label=now[0])
+        axes.fill_between(speed_rpm, low, high, color=Paint.NEWEST, alpha=0.35, lw=0, label=BAND_LABEL)
+    axes.plot(speed_rpm, now[1] * 1e3, color=Paint.NEWEST, lw=1.6, label=now[0])
     for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=FIRST_GREY, ls="--", lw=1.2, label=f"{label}, first tap tests")
+        axes.plot(speed_rpm, depth * 1e3, color=Paint.FIRST, ls="--", lw=1.2, label=f"{label}, first tap tests")
     if learnt is not None:
         _draw_learned(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
@@ -116,7 +105,7 @@ def plot_lobes(
 
 
 def plot_waterfall(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, title: str = "") -> Figure:
-    """Limiting depth over speed and time: depth (n, m) in m at n times, the oldest below."""
+    """Plot limiting depth over speed and time: depth (m), shape (n, m), at n times, the oldest at the bottom."""
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     top = _map_limit(depth)
     rows, columns = _cell_edges(date2num(times), 30.0), _cell_edges(speed_rpm, 1.0)
@@ -132,10 +121,10 @@ def plot_waterfall(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, 
 
 
 def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: str = "") -> Figure:
-    """Limiting depth over speed and radial depth for a cutter of this diameter (m), as a map with lines.
+    """Plot limiting depth over speed and radial depth of cut for a cutter of this diameter (m) as a contour map.
 
-    present is the immersion (radial depth over diameter) of the cut itself, a dashed line. The contours are those of
-    one over depth, which is smooth where a pocket has no limit.
+    present: radial immersion of the cut itself, drawn as a dashed line. The contours are those of 1/depth, which is
+    smooth where a pocket has no limit.
     """
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     depths = np.asarray(MaxNLocator(MAP_LEVELS).tick_values(0, _map_limit(lobes.depth)))[1:]
@@ -144,7 +133,7 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
     colours = colormaps[DEPTH_COLORMAP](np.linspace(1, 0, levels.size + 1))
     mesh = axes.contourf(lobes.speed_rpm, radial, softness, levels=levels, colors=colours, extend="both")
     axes.contour(lobes.speed_rpm, radial, softness, levels=levels, colors="black", linewidths=0.3)
-    axes.axhline(present * diameter * 1e3, color=ALARM_ORANGE, ls="--", lw=2, clip_on=False)
+    axes.axhline(present * diameter * 1e3, color=Paint.ALARM, ls="--", lw=2, clip_on=False)
     bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=DEPTH_SCALE_LABEL)
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
@@ -156,21 +145,21 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
 
 
 def _cell_edges(middles: Floats, alone: float) -> Floats:
-    """Edges of cells around their middles; a cell that stands alone has this width."""
+    """Return the edges of cells around their centers; a single cell has the width `alone`."""
     halves = np.diff(middles) / 2 if middles.size > 1 else np.array([alone / 2])
     inner = middles[:-1] + halves[: middles.size - 1]
     return np.concatenate((middles[:1] - halves[0], inner, middles[-1:] + halves[-1]))
 
 
 def _map_limit(depth: Floats) -> float:
-    """Depth (mm) at which a map of depths (m) ends."""
+    """Return the largest depth (mm) of a map of depths (m)."""
     finite = depth[np.isfinite(depth)] * 1e3
     return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
 
 
 def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
-    """Line and band of the spindle at speed; depths (mm) end at the deepest."""
-    label = f"at speed, learnt from {learnt.n_cuts} test cut{'s' if learnt.n_cuts > 1 else ''}"
+    """Draw the line and the band of the rotating spindle, clipped at the deepest depth (mm)."""
+    label = f"at speed, learnt from {count_noun(learnt.n_cuts, 'test cut')}"
     left = "98 % of what test cuts have left open"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)
@@ -180,7 +169,7 @@ def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
 def _draw_marks(
     axes: Axes, programs: Sequence[Verdict], pockets: Sequence[Setting], heard: Sequence[CutEntry], is_small: bool
 ) -> None:
-    """What stands on the lobes; the words of a small picture are names of programs, as far as there is room."""
+    """Draw test cuts, pockets and programs with their labels."""
     labels = LabelPlacer(axes, PHONE_FONT_SIZE, may_lack=True) if is_small else LabelPlacer(axes)
     draw_test_cuts(axes, heard, labels)
     for i, pocket in enumerate(pockets):
@@ -196,7 +185,6 @@ def _draw_marks(
 
 
 def _draw_pocket(axes: Axes, pocket: Setting, labels: LabelPlacer, label: str) -> None:
-    """A box as wide as the window and as high as the depth."""
     low, high = pocket.window_rpm
     box = Rectangle(
         (low, 0), high - low, pocket.depth_mm, fc="white", ec=POCKET_GREEN, lw=1.2, hatch="////", label=label
@@ -212,12 +200,12 @@ def _draw_program(axes: Axes, verdict: Verdict, labels: LabelPlacer) -> None:
 
 
 def _program_point(verdict: Verdict) -> tuple[float, float]:
-    """Speed (rpm) and depth (mm) of a program."""
+    """Return speed (rpm) and axial depth of cut (mm) of a program."""
     return verdict.program.speed_rpm, verdict.program.depth_mm
 
 
 def select_test_cuts(cuts: Sequence[CutEntry], name: str, tool: str, cut: Cut) -> list[CutEntry]:
-    """Test cuts of this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
+    """Select usable test cuts of this tool, cutter and immersion, with the same name or the same coefficients."""
     alike = [
         heard
         for heard in cuts
@@ -228,7 +216,7 @@ def select_test_cuts(cuts: Sequence[CutEntry], name: str, tool: str, cut: Cut) -
 
 
 def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) -> None:
-    """A mark for each cut, with the frequency that it chattered at; before other words look for a place."""
+    """Draw a mark for each test cut, labelled with its chatter frequency."""
     for chatters, (name, colour, mark) in TEST_CUT_MARKS.items():
         marked = [cut for cut in cuts if cut.has_chatter == chatters]
         if marked:
@@ -238,12 +226,12 @@ def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) ->
         labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
     for cut in cuts:
         if cut.chatter_frequency_hz is not None:
-            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM_ORANGE)
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
 
 
 RADIAL_IMMERSIONS = np.linspace(0.05, 1.0, 39)
 MAX_WATERFALL_ROWS = 200
-"""Tap tests of a waterfall."""
+"""Largest number of tap tests in a waterfall."""
 
 
 def save_lobe_figures(
@@ -270,7 +258,7 @@ def save_lobe_figures(
 
 
 def plot_comparison(machine: Machine, comparison: LobeComparison, cuts: Sequence[CutEntry]) -> Figure:
-    """The diagram now in its doubt, beside the one then, with safe settings, programs and test cuts of the same cut."""
+    """Plot the newest diagram with its uncertainty band and the first one, with pockets, programs and test cuts."""
     now = comparison.now
     depths = {diagram.assembly.label: diagram.lobes.depth for diagram in (comparison.then, now) if diagram is not None}
     title = f"{_lobes_title(machine, now)}, from the {now.source}"
@@ -287,7 +275,7 @@ def _lobes_title(machine: Machine, now: LobeChart) -> str:
 
 
 def plot_radial_lobes(machine: Machine, now: LobeChart, method: LobeMethod) -> tuple[Figure, tuple[Remark, ...]]:
-    """The limits over speed and radial depth, and what is wrong with the method at small ones."""
+    """Plot the limits over speed and radial depth of cut, and return the remarks on the method."""
     speeds = now.lobes.speed_rpm if method is not LobeMethod.SEMI_DISCRETISATION else now.lobes.speed_rpm[::4]
 
     def limits(cut: Cut) -> StabilityLobes:
@@ -300,7 +288,7 @@ def plot_radial_lobes(machine: Machine, now: LobeChart, method: LobeMethod) -> t
 
 
 def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
-    """The limits over all tap tests of the series of the newest; DataError where there are no measured ones."""
+    """Plot the limits over all tap tests of the newest series; raise DataError without measured lobes."""
     cut, tool = now.name, now.assembly.tool
     newest = None if now.assembly.predicted else logbook.measurement(now.assembly.tap_id)
     series = [] if newest is None else logbook.history.series(tool, newest.direction)
@@ -316,7 +304,7 @@ def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
 
 
 def _pick_evenly(rows: Sequence[HistoryRow]) -> list[HistoryRow]:
-    """The first, the newest, and others evenly between them, no more than one can see."""
+    """Return the first row, the newest, and others evenly spaced between them."""
     return [
         rows[i]
         for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_WATERFALL_ROWS)).round().astype(int))

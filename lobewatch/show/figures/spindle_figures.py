@@ -11,35 +11,37 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
 
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
+from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook.chart_data import ModelFigureData
-from lobewatch.show.figures.drawing import ALARM_ORANGE, FIGURE_STYLE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE
+from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 
 CIRCLES_PER_ROW = 4
-"""Circles in a row."""
+"""Number of circles in a row."""
 MAX_CIRCLES = 8
-"""Circles at most: of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
+"""Largest number of circles: the most trusted modes, then those with the highest peaks."""
 MIN_LABEL_SPACING = 0.014
-"""Between labels of modes that are close (share of the axis)."""
+"""Smallest distance between labels of close modes (share of the axis)."""
 LEGEND_SHARE = 0.08
-"""Room for it below all lines (share of the axis)."""
+"""Room for the legend below all lines (share of the axis)."""
 ORDER_AXIS_TOP = 10.5
-"""Just above the poles of the highest order."""
+"""Upper end of the axis of model orders."""
 CIRCLE_HALF_WIDTHS = 3.0
-"""A circle is drawn over this many half-power half-widths on either side."""
+"""Range of a circle on either side of its resonance (half-power half-widths)."""
 
 
 TRUST_MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
-"""Mark behind the frequency of a mode."""
+"""Mark after the frequency of a mode."""
 
 
 def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
-    """|Accelerance| measured, fitted and what is left; LSCF poles of every order, with those named that are stable but
-    no modes; circle and phase of each mode. Of free decays the spectrum of the first one, and no circles."""
+    """Plot the accelerance with its fit and residual, the stabilization chart, and a mobility circle of each mode.
+
+    Stable poles without a mode are labelled. Free decays are shown as the spectrum of the first one, without circles.
+    """
     circles = sorted((mode for mode in modes if mode.has_stiffness), key=_circle_rank)[:MAX_CIRCLES]
     rows = -(-len(circles) // CIRCLES_PER_ROW)
     with mpl.rc_context(FIGURE_STYLE):
@@ -55,22 +57,22 @@ def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
 
 
 def _circle_rank(mode: Mode) -> tuple[int, float]:
-    """Trusted modes first, of those the one with the highest peak."""
+    """Return a sort key: trusted modes first, among them those with the highest peak."""
     return list(Trust).index(assess_trust(mode)), -(mode.frequency**2) * mode.peak
 
 
 def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     f = state.frf.frequency
-    axes.semilogy(f, np.abs(state.frf.accelerance), color=FIRST_GREY, lw=0.8, label="measured")
+    axes.semilogy(f, np.abs(state.frf.accelerance), color=Paint.FIRST, lw=0.8, label="measured")
     for i, band in enumerate(state.bands):
         part = f[band.lines]
         size = (2 * np.pi * part) ** 2
         left = state.residual(band)[0]
         fitted = state.frf.receptance[band.lines] - left
         axes.semilogy(
-            part, np.abs(fitted) * size, color=NEWEST_BLUE, ls="--", label="fit in its bands" if i == 0 else None
+            part, np.abs(fitted) * size, color=Paint.NEWEST, ls="--", label="fit in its bands" if i == 0 else None
         )
-        axes.semilogy(part, np.abs(left) * size, color=ALARM_ORANGE, lw=0.6, label="measured - fit" if i == 0 else None)
+        axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label="measured - fit" if i == 0 else None)
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
     for mode, place in zip(modes, places, strict=True):
         axes.annotate(
@@ -101,7 +103,7 @@ def _frequency_text(frequency: float) -> str:
 
 
 def _spread_labels(places: Sequence[float], least: float) -> list[float]:
-    """Rising places, each moved up as far as it must be to stand this far from the one before."""
+    """Return rising positions, each moved up to the least distance from the one before."""
     moved: list[float] = []
     for place in places:
         moved.append(max(place, moved[-1] + least) if moved else place)
@@ -110,15 +112,15 @@ def _spread_labels(places: Sequence[float], least: float) -> list[float]:
 
 def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     for band in state.bands:
-        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=FIRST_GREY, alpha=0.10, lw=0)
+        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=Paint.FIRST, alpha=0.10, lw=0)
         chart = band.data.chart
-        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=FIRST_GREY, ms=3)
+        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=Paint.FIRST, ms=3)
     for chart in stabilisation_charts(state):
-        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=NEWEST_BLUE, ms=3)
-    axes.plot([], [], "x", color=FIRST_GREY, ms=3, label="pole (in the bands)")
-    axes.plot([], [], "o", color=NEWEST_BLUE, ms=3, label="stable pole")
+        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=Paint.NEWEST, ms=3)
+    axes.plot([], [], "x", color=Paint.FIRST, ms=3, label="pole (in the bands)")
+    axes.plot([], [], "o", color=Paint.NEWEST, ms=3, label="stable pole")
     for mode in modes:
-        axes.axvline(mode.frequency, color=NEWEST_BLUE, lw=0.6)
+        axes.axvline(mode.frequency, color=Paint.NEWEST, lw=0.6)
     others = candidate_frequencies(state)
     for frequency, place in zip(
         others, _spread_labels(others.tolist(), MIN_LABEL_SPACING * np.ptp(axes.get_xlim())), strict=True
@@ -130,7 +132,7 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
             ha="center",
             va="bottom",
             fontsize=7,
-            color=NEWEST_BLUE,
+            color=Paint.NEWEST,
         )
     axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
     axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
@@ -146,7 +148,7 @@ def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequ
 
 
 def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) -> None:
-    """Mobility of the mode over its resonance: lines measured, with all that is fitted beside it taken off; the fit.
+    """Draw the mobility circle of a mode near its resonance: measured minus all other modes, and fitted.
 
     The line from the origin to the natural frequency has the angle of the modal constant: 0 degrees for a real mode of
     a driving point.
@@ -158,13 +160,14 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     points = _mobility(f, mode.receptance(f) + state.residual(band)[0])[near]
     curve = _mobility(fine, mode.receptance(fine))
     top = complex(np.exp(1j * np.angle(mode.constant)) * np.max(np.abs(curve)))
-    axes.axhline(0.0, color=FIRST_GREY, lw=0.5)
-    axes.plot(points.real, points.imag, ".", color=FIRST_GREY, ms=4, label="measured")
-    axes.plot(curve.real, curve.imag, color=NEWEST_BLUE, lw=1, label="fit")
-    axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM_ORANGE, lw=1, label="phase")
+    axes.axhline(0.0, color=Paint.FIRST, lw=0.5)
+    axes.plot(points.real, points.imag, ".", color=Paint.FIRST, ms=4, label="measured")
+    axes.plot(curve.real, curve.imag, color=Paint.NEWEST, lw=1, label="fit")
+    axes.plot([0.0, top.real], [0.0, top.imag], color=Paint.ALARM, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(
-        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\nmobility (mm/s/N)",
+        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\n"
+        "mobility (mm/s/N)",
         fontsize=8,
     )
     axes.tick_params(labelsize=7)
@@ -172,26 +175,25 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     axes.yaxis.set_major_locator(MaxNLocator(4))
 
 
-def _mobility(frequency: NDArray[np.float64], receptance: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Mobility (mm/s/N)."""
+def _mobility(frequency: Floats, receptance: Complexes) -> Complexes:
+    """Return the mobility (mm/s/N)."""
     return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
 
 
 def _phase_text(mode: Mode) -> str:
-    """Phase of the modal constant against that of a real mode, with its error."""
+    """Return the phase of the modal constant with its standard error, or "real"."""
     if not mode.phase_deg:
         return "real"
     return f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°"
 
 
-Floats = NDArray[np.float64]
 STEEL_GREY = "#c9d3dc"
-MODE_LINES = ((NEWEST_BLUE, "-"), (ALARM_ORANGE, "--"), (GOOD_GREEN, "-."), (FIRST_GREY, ":"))
-"""Colour and dashes of the modes, in order."""
+MODE_LINES = ((Paint.NEWEST, "-"), (Paint.ALARM, "--"), (Paint.GOOD, "-."), (Paint.FIRST, ":"))
+"""Paint and dashes of the modes, in order."""
 
 
 def plot_model(picture: ModelFigureData) -> Figure:
-    """All pictures of the model on one page."""
+    """Plot all figures of a model on one page."""
     with mpl.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(12.0, 10.0), layout="constrained")
         axes: dict[str, Axes] = figure.subplot_mosaic(
@@ -209,7 +211,7 @@ def plot_model(picture: ModelFigureData) -> Figure:
 
 
 def draw_shaft(axes: Axes, spindle: Spindle) -> None:
-    """Longitudinal section to scale, the tool tip at the left; bearings are triangles, joints dashed lines."""
+    """Draw the shaft to scale, the tool tip at the left, with triangles for bearings and dashed lines for joints."""
     start = 0.0
     for segment in spindle.segments:
         _draw_segment(axes, segment, start)
@@ -219,12 +221,12 @@ def draw_shaft(axes: Axes, spindle: Spindle) -> None:
         for side in (-1, 1):
             marker = "^" if side < 0 else "v"
             axes.plot(
-                bearing.position * 1e3, side * (radius + 5), marker, color=NEWEST_BLUE, ms=7, mec="white", mew=0.5
+                bearing.position * 1e3, side * (radius + 5), marker, color=Paint.NEWEST, ms=7, mec="white", mew=0.5
             )
     for mass in spindle.masses:
-        axes.plot(mass.position * 1e3, 0, "o", color=ALARM_ORANGE, ms=9, mec="white")
+        axes.plot(mass.position * 1e3, 0, "o", color=Paint.ALARM, ms=9, mec="white")
     for joint in spindle.joints:
-        axes.axvline(joint.position * 1e3, color=ALARM_ORANGE, ls="--", lw=1)
+        axes.axvline(joint.position * 1e3, color=Paint.ALARM, ls="--", lw=1)
     axes.axhline(0, color="black", lw=0.6, ls=(0, (12, 3, 2, 3)))
     axes.set(xlabel="distance from the tool tip (mm)", ylabel="radius (mm)", title="shaft, to scale")
     axes.set_xlim(-0.02 * start * 1e3, 1.02 * start * 1e3)
@@ -242,7 +244,7 @@ def _draw_segment(axes: Axes, segment: Segment, start: float) -> None:
 
 
 def _radius_at(spindle: Spindle, position: float) -> float:
-    """Largest outer radius of the segments that reach a place (m)."""
+    """Return the largest outer radius (m) of the segments at a position (m)."""
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
     slack = 1e-6 * ends[-1]
     near = [
@@ -254,7 +256,7 @@ def _radius_at(spindle: Spindle, position: float) -> float:
 
 
 def draw_shapes(axes: Axes, modes: Modes) -> None:
-    """Deflection of each mode, scaled to its largest, upwards at the tip."""
+    """Draw the deflection of each mode over its largest one, positive at the tip."""
     for number, (colour, dashes) in zip(range(modes.frequency.size), MODE_LINES, strict=False):
         shape = modes.deflection[number]
         shape = shape / np.max(np.abs(shape)) * (np.sign(shape[0]) or 1.0)
@@ -267,17 +269,17 @@ def draw_shapes(axes: Axes, modes: Modes) -> None:
 
 
 def draw_stiffness_curve(axes: Axes, curve: tuple[Floats, Floats], points: tuple[Floats, Floats]) -> None:
-    """Frequency over bearing stiffness, with the tap tests on it."""
-    axes.semilogx(curve[0] / 1e6, curve[1], color=NEWEST_BLUE, lw=1.6, label="model")
+    """Draw frequency over bearing stiffness, with the tap tests."""
+    axes.semilogx(curve[0] / 1e6, curve[1], color=Paint.NEWEST, lw=1.6, label="model")
     if points[0].size:
-        axes.plot(points[0] / 1e6, points[1], "o", color=FIRST_GREY, ms=4, label="tap tests")
-        axes.plot(points[0][-1] / 1e6, points[1][-1], "o", color=ALARM_ORANGE, ms=7, mec="white", label="newest")
+        axes.plot(points[0] / 1e6, points[1], "o", color=Paint.FIRST, ms=4, label="tap tests")
+        axes.plot(points[0][-1] / 1e6, points[1][-1], "o", color=Paint.ALARM, ms=7, mec="white", label="newest")
     axes.set(xlabel="bearing stiffness (N/µm)", ylabel="frequency (Hz)", title="followed mode over bearing stiffness")
     axes.legend(loc="lower right")
 
 
 def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
-    """Forward and backward whirl over speed, seen from the housing and from the shaft."""
+    """Draw forward and backward whirl frequencies over speed, in the fixed and in the rotating frame."""
     speed = whirl.speed_rpm / 1e3
     for number, (colour, _) in zip(range(whirl.forward.shape[0]), MODE_LINES, strict=False):
         first = number == 0
@@ -292,20 +294,20 @@ def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
             axes.plot(speed, values, color=colour, ls=dashes, label=label if first and label else None, **style)
     top = float(np.max(whirl.forward)) * 1.1
     axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once a revolution")
-    axes.axvspan(0, highest_speed / 1e3, color=GOOD_GREEN, alpha=0.10, lw=0, label="speed range of the machine")
+    axes.axvspan(0, highest_speed / 1e3, color=Paint.GOOD, alpha=0.10, lw=0, label="speed range of the machine")
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="frequency (Hz)", title="whirl speeds")
     axes.set(xlim=(0, speed[-1]), ylim=(0, top))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
 
 
 def draw_model_frf(axes: Axes, model: Frf, measured: Frf | None) -> None:
-    """Magnitude of receptance, model against measured."""
+    """Draw the magnitude of the receptance of the model and of the newest tap test."""
     if measured is not None:
         shown = measured.in_band((float(model.frequency[0]), float(model.frequency[-1])))
         axes.semilogy(
-            shown.frequency, np.abs(shown.receptance) * 1e9, color=FIRST_GREY, lw=1.0, label="measured, newest"
+            shown.frequency, np.abs(shown.receptance) * 1e9, color=Paint.FIRST, lw=1.0, label="measured, newest"
         )
-    axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=NEWEST_BLUE, lw=1.6, ls="--", label="model")
+    axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=Paint.NEWEST, lw=1.6, ls="--", label="model")
     axes.set(xlabel="frequency (Hz)", ylabel="|receptance| (nm/N)")
     axes.set_xlim(model.frequency[0], model.frequency[-1])
     axes.legend(loc="upper right")

@@ -11,50 +11,48 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobewatch.arrays import Floats
 from lobewatch.machine.settings.setup_tables import LimitsTable
 from lobewatch.monitoring.trend import Trend, point_days
-from lobewatch.show.figures.drawing import ALARM_ORANGE, EVENT_GREY, FIRST_GREY, NEWEST_BLUE, new_axes
-
-Floats = NDArray[np.float64]
+from lobewatch.show.figures.drawing import Paint, new_axes
 
 TREND_FIGURE_SIZE = (8.0, 2.8)
-"""Size of a picture of one value (inches)."""
+"""Size of a figure of one value (inches)."""
 FORECAST_SHARE = 0.5
-"""Share of the length of the series that is drawn beyond it."""
+"""Forecast time drawn, as a share of the length of the series."""
 
 
 class TrendMarks(NamedTuple):
-    """Marks beside a trend."""
+    """Marks next to a trend."""
 
     events: Sequence[tuple[datetime, str]] = ()
-    """Times and texts of what was done."""
+    """Times and texts of maintenance events."""
     excluded: Sequence[tuple[datetime, float]] = ()
-    """Values that do not count."""
+    """Times and values of excluded tap tests."""
 
 
 NO_MARKS = TrendMarks()
 
 
 class TrendCurve(NamedTuple):
-    """The fitted line of a series and what it may become, in the unit of the series."""
+    """Fitted line of a series and its forecast, in the unit of the series."""
 
     days: Floats
     """Days since 1970, from the first point on, shape (n,)."""
     line: Floats
-    """Values of the mixture, shape (n,)."""
+    """Values of the fitted mixture, shape (n,)."""
     days_ahead: Floats
     """Days since 1970, from the last point on, shape (m,)."""
     low: Floats
-    """Values that are undercut with a chance of 10 %, shape (m,)."""
+    """10 % quantile of the forecast, shape (m,)."""
     high: Floats
-    """Values that are exceeded with a chance of 10 %, shape (m,)."""
+    """90 % quantile of the forecast, shape (m,)."""
 
 
 def make_trend_curve(trend: Trend) -> TrendCurve | None:
-    """The curve of a trend; None below 8 points."""
+    """Return the curve of a trend; None below 8 points."""
     forecast = trend.forecast
     if forecast is None:
         return None
@@ -70,13 +68,16 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
 def plot_frf(
     earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
 ) -> Figure:
-    """Real and imaginary part of receptance and coherence, the newest and the first test.
+    """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test.
 
-    size: of a picture (inches) that has room for the receptance alone.
+    size: of a smaller figure (inches) that shows the receptance only.
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [(now, "now", NEWEST_BLUE, "-"), *([(earliest, "first", FIRST_GREY, "--")] if earliest is not None else [])]
+    tests = [
+        (now, "now", Paint.NEWEST, "-"),
+        *([(earliest, "first", Paint.FIRST, "--")] if earliest is not None else []),
+    ]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -96,25 +97,25 @@ def plot_frf(
 
 def plot_trend(
     times: Sequence[datetime],
-    values: NDArray[np.float64],
-    stds: NDArray[np.float64],
+    values: Floats,
+    stds: Floats,
     label: str,
     limits: LimitsTable | None = None,
     marks: TrendMarks = NO_MARKS,
     course: TrendCurve | None = None,
     size: tuple[float, float] = TREND_FIGURE_SIZE,
 ) -> Figure:
-    """A value over time with its 95 % interval; with limits, where its fall calls for attention.
+    """Plot a value over time with its 95 % interval, and the limits of its drop where given.
 
-    limits: in % of the first value of the course, else of the first value; size: of the picture (inches).
+    limits: in % of the first value of the curve, or else of the first value; size: of the figure (inches).
     """
     figure, (axes,) = new_axes(1, size)
     days = date2num(times)
-    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NEWEST_BLUE, capsize=2)
+    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=Paint.NEWEST, capsize=2)
     if limits is not None:
         for percent, colour, dashes in (
-            (limits.frequency_warn_percent, FIRST_GREY, "--"),
-            (limits.frequency_alarm_percent, ALARM_ORANGE, "-"),
+            (limits.frequency_warn_percent, Paint.FIRST, "--"),
+            (limits.frequency_alarm_percent, Paint.ALARM, "-"),
         ):
             level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
@@ -124,8 +125,8 @@ def plot_trend(
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
     if course is not None:
-        axes.plot(course.days, course.line, color=NEWEST_BLUE, lw=1)
-        axes.fill_between(course.days_ahead, course.low, course.high, color=NEWEST_BLUE, alpha=0.2, lw=0)
+        axes.plot(course.days, course.line, color=Paint.NEWEST, lw=1)
+        axes.fill_between(course.days_ahead, course.low, course.high, color=Paint.NEWEST, alpha=0.2, lw=0)
     _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
@@ -138,10 +139,10 @@ def plot_trend(
 def _add_marks(axes: Axes, marks: TrendMarks) -> None:
     if marks.excluded:
         days = date2num([time for time, _ in marks.excluded])
-        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=NEWEST_BLUE)
+        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=Paint.NEWEST)
     for time, text in marks.events:
         day = date2num(time)
-        axes.axvline(day, color=EVENT_GREY, ls=":", lw=1)
+        axes.axvline(day, color=Paint.EVENT, ls=":", lw=1)
         place: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points", "rotation": 90, "fontsize": 8}
         axes.annotate(
             shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place

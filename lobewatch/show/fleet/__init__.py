@@ -1,1 +1,1 @@
-"""Many machines at once: a line each, for people and as CSV."""
+"""Show and export many machines at once."""

@@ -18,31 +18,34 @@ from numpy.typing import NDArray
 
 from acquisition import DataError
 from acquisition.file_io import make_folder, sync_folder
+from lobewatch.arrays import Floats, Indices
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
 from lobewatch.machine.folder_lock import FolderLock
 from lobewatch.show.terminal.output import format_csv_cell
 
 
 class ExportOutcome(NamedTuple):
-    """The tap tests that were exported, and what there is to say besides."""
+    """Exported tap tests, and what to tell about the export."""
 
     tap_tests: int
-    """Number of tap tests of the machines that could be read."""
+    """Number of tap tests of all machines that could be read."""
     fields: Mapping[str, Any]
-    """Fields for other programs: the place under its name first."""
+    """JSON keys and values, the destination first."""
     sentences: Sequence[str] = ()
     """Sentences for people."""
 
 
 EXPORT_COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *TAP_NUMBER_COLUMNS, "remarks")
-"""Columns of a line, in order."""
+"""Columns of an exported row, in order."""
 EMPTY_TABLE = TapTable("", "", (), (), (), (), (), np.empty((0, len(TAP_NUMBER_COLUMNS))))
 
 
 @contextmanager
 def open_duckdb(tables: Iterable[TapTable], purpose: str) -> Iterator[Any]:
-    """A connection to DuckDB in memory that has the lines; DataError, which names the purpose, without DuckDB and for
-    what it cannot read or write."""
+    """Open a DuckDB connection in memory with the tap tests as the table `lines`.
+
+    Raise DataError, which names the purpose, without DuckDB and for files that it cannot read or write.
+    """
     try:
         import duckdb
     except ImportError as error:
@@ -66,7 +69,7 @@ def write_parquet(base: Any, query: str, path: Path) -> int:
 
 
 def _table_arrays(table: TapTable) -> dict[str, NDArray[Any]]:
-    """Columns of a table as arrays, by name."""
+    """Return the columns of a table as arrays, by name."""
     n, of_series = len(table.tap_id), np.array(table.series_numbers, np.int64)
     tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
     return {
@@ -83,7 +86,7 @@ def _table_arrays(table: TapTable) -> dict[str, NDArray[Any]]:
 
 
 CSV_DIGITS, CSV_ERROR_DIGITS = 7, 3
-"""Significant digits of a number in CSV: a part in ten million, finer than any of them is known, and of its error."""
+"""Significant digits of a number in CSV, a tenth of a millionth at worst, and of its standard error."""
 SQLITE_SCHEMA = """
 CREATE TABLE machine (id INTEGER PRIMARY KEY, folder TEXT NOT NULL, machine TEXT NOT NULL);
 CREATE TABLE series (id INTEGER PRIMARY KEY, machine_id INTEGER NOT NULL REFERENCES machine, series INTEGER NOT NULL,
@@ -94,11 +97,9 @@ CREATE VIEW taps AS SELECT folder, machine, tap_id, strftime('%Y-%m-%dT%H:%M:%SZ
   tool, direction, series, {names}, remarks
   FROM tap JOIN series ON series.id = series_id JOIN machine ON machine.id = machine_id;
 """
-"""One line a tap test is the view `taps`; what repeats stands once."""
+"""Normalized tables; the view `taps` has a row for each tap test."""
 _POWERS_OF_TEN = 10.0 ** np.arange(23)
-"""Powers of ten that are numbers of the computer."""
-
-Floats = NDArray[np.float64]
+"""Powers of ten that are exact floating-point numbers."""
 
 
 def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
@@ -144,7 +145,7 @@ def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
 
 
 def _compact_numbers(numbers: Floats) -> Floats:
-    """Whole where that is a part in ten million at most: SQLite keeps it in half the bytes."""
+    """Round large numbers to integers, which SQLite stores in half the bytes, with a relative error below 1e-7."""
     return np.where(numbers > 1e7, np.rint(numbers), numbers)
 
 
@@ -176,7 +177,7 @@ def _csv_rows(table: TapTable) -> Iterator[str]:
 
 
 def _number_cells(numbers: Floats) -> list[str]:
-    """Cells of each line with commas between, by the encoder of JSON, which is quick; nothing for NaN."""
+    """Return the numbers of each row joined by commas, NaN as empty cells; the JSON encoder is fast."""
     if not len(numbers):
         return []
     digits = np.array([CSV_ERROR_DIGITS if name.endswith("_std") else CSV_DIGITS for name in TAP_NUMBER_COLUMNS])
@@ -184,8 +185,8 @@ def _number_cells(numbers: Floats) -> list[str]:
     return cells[2:-2].replace("null", "").replace(".0,", ",").split("],[")
 
 
-def round_significant(values: Floats, digits: NDArray[np.intp]) -> Floats:
-    """Values to significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
+def round_significant(values: Floats, digits: Indices) -> Floats:
+    """Round values (n, c) to the significant digits of each column (c,); to fewer digits below 1e-16."""
     with np.errstate(divide="ignore", invalid="ignore"):
         places = digits - 1 - np.floor(np.log10(np.abs(values)))
     places = np.clip(np.nan_to_num(places), 1 - _POWERS_OF_TEN.size, _POWERS_OF_TEN.size - 1).astype(np.intp)
@@ -204,11 +205,11 @@ TABLE_WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {
     ".csv.gz": _write_gzip,
     ".parquet": _write_parquet,
 }
-"""Writer of a table by the ending of the file name."""
+"""Writer of a table for each file name extension."""
 
 
 EXPORT_LOCK_WAIT = 60.0
-"""Time for which another export into the folder is waited for (s); chosen."""
+"""Longest wait for another export into the same folder (s); chosen."""
 MISSING_QUERY = """
 CREATE TABLE missing AS SELECT strftime(time, '%Y-%m') AS month, * FROM lines ANTI JOIN present USING (folder, tap_id)
 """
@@ -219,10 +220,10 @@ WHERE folder IN (SELECT unnest(?::VARCHAR[])) AND (lines.time IS NULL OR {differ
 
 
 def append_months(tables: Iterable[TapTable], folder: Path) -> ExportOutcome:
-    """Add what is missing there, in `month=YYYY-MM/` (of the time in UTC), a file a month, each whole or not at all.
+    """Add missing tap tests to a folder as `month=YYYY-MM/*.parquet` (month in UTC), each file complete or not written.
 
-    A tap test is known by folder and tap_id. Files that are there are never altered. DataError without DuckDB, for a
-    file there that is no such table, and where another export goes on for longer than PATIENCE.
+    Folder and tap_id identify a tap test. Existing files are never changed. Raise DataError without DuckDB, for a file
+    that is no such table, and where another export takes longer than EXPORT_LOCK_WAIT.
     """
     tables = [*tables]
     with open_duckdb(tables, f"--append {folder}") as base:
@@ -247,7 +248,7 @@ def append_months(tables: Iterable[TapTable], folder: Path) -> ExportOutcome:
 
 
 def _load_existing(base: Any, folder: Path) -> None:
-    """The lines that are there as the table `present`."""
+    """Load the existing rows as the table `present`."""
     base.execute("CREATE TABLE present AS SELECT *, '' AS month FROM lines LIMIT 0")
     files = [glob.escape(str(file)) for file in sorted(folder.glob("month=*/*.parquet"))]
     if files:
@@ -256,7 +257,7 @@ def _load_existing(base: Any, folder: Path) -> None:
 
 
 def _write_month(base: Any, folder: Path, month: str) -> int:
-    """Add a file whose name follows from the tap tests in it, so that the same are never there under two names."""
+    """Write a file whose name is a hash of its tap tests, so that the same tap tests never exist under two names."""
     lines = f"SELECT * EXCLUDE (month) FROM missing WHERE month = '{month}' ORDER BY folder, time, tap_id"
     keys = f"SELECT md5(string_agg(folder || chr(10) || tap_id, chr(10))) FROM ({lines})"
     name = f"{base.execute(keys).fetchone()[0]}.parquet"

@@ -14,23 +14,24 @@ from lobewatch.show.fleet.export_files import EXPORT_COLUMNS, ExportOutcome
 
 POSTGRES_TABLE = "lobewatch_taps"
 POSTGRES_BATCH_TAPS = 20_000
-"""Tap tests from which on what was read is written in one transaction; chosen."""
+"""Smallest number of tap tests written in one transaction; chosen."""
 POSTGRES_LOCK_WAIT = 60
-"""Time for which another export is waited for (s); chosen."""
+"""Longest wait for another export (s); chosen."""
 CONNECTION_TIMEOUTS = {"connect_timeout": 10, "keepalives_idle": 10, "keepalives_interval": 5, "keepalives_count": 4}
-"""Settings (s) by which a server that is gone without a word is told; those in the address come first; chosen."""
+"""Settings (s) that detect a server that no longer answers, unless the address sets them; chosen."""
 KEY_COLUMNS = ("folder", "tap_id", "time")
-"""Columns by which a line is known; with the time, as a hypertable wants it."""
+"""Columns that identify a row; a hypertable needs the time among them."""
 COLUMN_TYPES = dict.fromkeys(TAP_NUMBER_COLUMNS, "double precision") | {"time": "timestamptz", "series": "integer"}
 COLUMN_DEFINITIONS = ", ".join(f"{name} {COLUMN_TYPES.get(name, 'text')}" for name in EXPORT_COLUMNS)
 CREATE_TABLE = f"""
-CREATE TABLE IF NOT EXISTS {POSTGRES_TABLE} ({COLUMN_DEFINITIONS}, counts boolean NOT NULL, PRIMARY KEY ({", ".join(KEY_COLUMNS)}))
+CREATE TABLE IF NOT EXISTS {POSTGRES_TABLE}
+  ({COLUMN_DEFINITIONS}, counts boolean NOT NULL, PRIMARY KEY ({", ".join(KEY_COLUMNS)}))
 """
 CREATE_HYPERTABLE = f"SELECT create_hypertable('{POSTGRES_TABLE}', 'time', chunk_time_interval => INTERVAL '1 month')"
 CREATE_INCOMING = (
     f"CREATE TEMPORARY TABLE incoming ({COLUMN_DEFINITIONS.replace('timestamptz', 'double precision')}) ON COMMIT DROP"
 )
-"""Lines as they are sent, the time in seconds since 1970."""
+"""Rows as they are sent, the time in seconds since 1970."""
 INCOMING_VALUES = ", ".join(
     "to_timestamp(time)" if n == "time" else f"nullif({n}, 'NaN')" if n in TAP_NUMBER_COLUMNS else n
     for n in EXPORT_COLUMNS
@@ -38,13 +39,14 @@ INCOMING_VALUES = ", ".join(
 UPDATED_COLUMNS = [name for name in (*EXPORT_COLUMNS, "counts") if name not in KEY_COLUMNS]
 UPSERT = f"""
 INSERT INTO {POSTGRES_TABLE} SELECT {INCOMING_VALUES}, true FROM incoming
-ON CONFLICT ({", ".join(KEY_COLUMNS)}) DO UPDATE SET {", ".join(f"{name} = excluded.{name}" for name in UPDATED_COLUMNS)}
+ON CONFLICT ({", ".join(KEY_COLUMNS)})
+  DO UPDATE SET {", ".join(f"{name} = excluded.{name}" for name in UPDATED_COLUMNS)}
 WHERE ({", ".join(f"{POSTGRES_TABLE}.{name}" for name in UPDATED_COLUMNS)})
   IS DISTINCT FROM ({", ".join(f"excluded.{name}" for name in UPDATED_COLUMNS)})
 """
 MARK_EXCLUDED = f"""
-UPDATE {POSTGRES_TABLE} SET counts = false WHERE counts AND folder = ANY(%s)
-  AND NOT EXISTS (SELECT FROM incoming WHERE (incoming.folder, incoming.tap_id) = ({POSTGRES_TABLE}.folder, {POSTGRES_TABLE}.tap_id))
+UPDATE {POSTGRES_TABLE} AS stored SET counts = false WHERE counts AND folder = ANY(%s)
+  AND NOT EXISTS (SELECT FROM incoming WHERE (incoming.folder, incoming.tap_id) = (stored.folder, stored.tap_id))
 """
 
 
@@ -52,7 +54,7 @@ POSTGRES_SCHEMES = ("postgresql://", "postgres://")
 EXPORT_LOCK_QUERY = f"SELECT pg_advisory_xact_lock(hashtext('{POSTGRES_TABLE}'))"
 HAS_TIMESCALE = "SELECT EXISTS (SELECT FROM pg_proc WHERE proname = 'create_hypertable')"
 PSYCOPG_LOG = logging.getLogger("psycopg")
-"""Log of what a lost connection cannot do any more; the error says it."""
+"""Log of the driver about lost connections, which the error message covers."""
 PSYCOPG_LOG.addHandler(logging.NullHandler())
 PSYCOPG_LOG.propagate = False
 
@@ -61,19 +63,19 @@ class _ExportCounts(NamedTuple):
     """Numbers of tap tests."""
 
     read: int
-    """Number of those that were read."""
+    """Number of tap tests read."""
     written: int
-    """Number of those that were not there, or otherwise."""
+    """Number of rows that were added or changed."""
     set_aside: int
-    """Number of those there that count no longer."""
+    """Number of stored rows that no longer count."""
 
 
 def upsert_table(tables: Iterable[TapTable], address: str) -> ExportOutcome:
-    """Have the table `lobewatch_taps` hold the tap tests as they are, in transactions of some machines each.
+    """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
-    Lines of these machines that count no longer stay, and say so. Machines are read while no other export writes. A
-    hypertable where TimescaleDB is in the database. DataError without psycopg, for no address, and where the server
-    cannot be reached, goes away or refuses; what it has taken until then stays.
+    Rows that no longer count stay and are marked. Each transaction reads its machines while no other export writes.
+    With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and where
+    the server fails; rows written before that stay.
     """
     place, remaining = server_name(address), iter(tables)
     total = _ExportCounts(0, 0, 0)
@@ -90,7 +92,7 @@ def upsert_table(tables: Iterable[TapTable], address: str) -> ExportOutcome:
 
 
 def server_name(address: str) -> str:
-    """Host, port and database of an address, nothing that is secret; DataError for none, and without psycopg."""
+    """Return host, port and database of an address, without secrets; raise DataError for an invalid one."""
     try:
         from psycopg import ProgrammingError
         from psycopg.conninfo import conninfo_to_dict
@@ -108,7 +110,7 @@ def server_name(address: str) -> str:
 
 @contextmanager
 def _connection(address: str, place: str) -> Iterator[Any]:
-    """A connection; DataError for whatever goes wrong with it."""
+    """Open a connection; raise DataError for any failure of it."""
     import psycopg
     from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
@@ -142,7 +144,7 @@ def _make_table(connection: Any) -> bool:
 
 
 def _write_next(connection: Any, remaining: Iterator[TapTable]) -> _ExportCounts | None:
-    """Read some machines more, and write them; None where there are none."""
+    """Read the next machines and write them; None where none are left."""
     with connection.transaction(), connection.cursor() as cursor:
         cursor.execute(EXPORT_LOCK_QUERY)
         batch = _read_batch(remaining)
@@ -166,7 +168,7 @@ def _read_batch(remaining: Iterator[TapTable]) -> list[TapTable]:
 
 
 def _table_rows(table: TapTable) -> Iterator[Sequence[Any]]:
-    """Lines in the order of the columns."""
+    """Return rows in the order of the columns."""
     series = [(tool, direction, n) for n, (tool, direction) in enumerate(table.series, 1)]
     taps = zip(table.tap_id, table.time, table.series_numbers, table.numbers.tolist(), table.remarks, strict=True)
     for tap_id, time, number, numbers, remarks in taps:

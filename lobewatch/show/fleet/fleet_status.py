@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
-from rich.cells import cell_len, set_cell_size
-
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
@@ -19,20 +17,20 @@ from lobewatch.monitoring.threshold_dates import (
     build_limit_row,
     find_next_limit,
 )
-from lobewatch.show.terminal.output import format_csv, make_printable
+from lobewatch.show.terminal.output import align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
-"""Reasons that stand beside the others as the fall and the date."""
+"""Codes of reasons that have columns of their own."""
 
 
 def fleet_rows(machines: Sequence[FleetMachine]) -> list[dict[str, Any]]:
-    """Rows in the order of the standings; the series is the one that fell most."""
+    """Return a row for each machine, in their order."""
     return [fleet_row(machine) for machine in machines]
 
 
 def fleet_row(machine: FleetMachine) -> dict[str, Any]:
-    """Row of one machine."""
+    """Return the row of one machine, with the series of the largest frequency drop."""
     summary, dated = machine.summary, machine.current
     ahead = find_next_limit(summary.limits)
     worst = summary.series[0] if summary.series else None
@@ -66,7 +64,7 @@ def fleet_row(machine: FleetMachine) -> dict[str, Any]:
 
 
 def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:
-    """The fixed limit that is reached next: "5 %: 2026-11 to 2027-02"; empty where nothing can be foretold."""
+    """Return the next fixed limit, such as "5 %: 2026-11 to 2027-02"; empty without a forecast."""
     if limit is None:
         return ""
     percent, reach = limit
@@ -81,21 +79,19 @@ def _month_text(days: float | None) -> str:
 
 
 FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
-"""Keys of a row of the dashboard, in the order of the CSV."""
+"""Keys of a row that are columns of the CSV, in order."""
 FLEET_HEADINGS = ("machine", "light", "fallen (%)", "last tap", "limit ahead")
 
 
 def fleet_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A line a machine, with its worst reason and the next step below it."""
-    lines = [FLEET_HEADINGS, *map(_fleet_cells, rows)]
-    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
-    shown = ["  ".join(map(set_cell_size, line, widths)).rstrip() for line in lines]
+    """Return a line for each machine, with its worst reason and the next step below it."""
+    lines = align_columns([FLEET_HEADINGS, *map(_fleet_cells, rows)])
     texts = [[], *map(_machine_notes, rows)]
-    return "\n".join(part for line, below in zip(shown, texts, strict=True) for part in (line, *below))
+    return "\n".join(part for line, below in zip(lines, texts, strict=True) for part in (line, *below))
 
 
 def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A line a machine below the headings."""
+    """Return a CSV line for each machine, below the headings."""
     return format_csv([FLEET_COLUMNS, *([row[name] for name in FLEET_COLUMNS] for row in rows)])
 
 
@@ -105,7 +101,7 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
-    """Its name where the folder has another, the worst reason, and what to do."""
+    """Return its name where the folder has another, the worst reason, and the next step."""
     first, *further = row["reasons"] or [row["why"]]
     why = first + (f" (and {len(further)} more)" if further else "")
     named = row["name"] if row["name"] != row["key"] else ""

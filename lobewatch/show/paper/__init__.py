@@ -1,1 +1,1 @@
-"""The paper beside lobewatch, for people: one table, its figures drawn anew, a page."""
+"""Show the comparison with the paper."""

@@ -11,25 +11,25 @@ import jinja2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import DataError
 from acquisition.file_io import atomic_write, make_folder
 from dsm import WhirlMap, mode_shapes
+from lobewatch.arrays import Complexes, Floats
 from lobewatch.paper import PaperStudy, printed
 from lobewatch.paper.finite_elements import ELEMENT_COUNTS, ElementKind
-from lobewatch.show.figures.drawing import ALARM_ORANGE, FIRST_GREY, GOOD_GREEN, NEWEST_BLUE, new_axes, save_figure
+from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.show.figures.spindle_figures import draw_shaft, draw_shapes
 from lobewatch.show.paper.paper_text import paper_cells
 
 PAPER_FIGURE_SIZE = (8.0, 4.4)
-"""Inches."""
-PAPER_MARK: dict[str, Any] = {"color": ALARM_ORANGE, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
+"""Size of a figure (inches)."""
+PAPER_MARK: dict[str, Any] = {"color": Paint.ALARM, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
 """Mark of a number of the paper."""
 RESPONSE_BAND = (1300.0, 2200.0)
-"""Frequencies of Figs. 5 and 6 (Hz)."""
+"""Frequency range of Figs. 5 and 6 (Hz)."""
 MAX_DEPTH_RATIO = 6.0
-"""Depth up to which lobes are drawn, in lowest limits of the new spindle."""
+"""Largest depth drawn, in lowest limits of the new spindle."""
 
 
 def _plot_shaft(study: PaperStudy) -> Figure:
@@ -44,9 +44,9 @@ def _plot_shaft(study: PaperStudy) -> Figure:
 def _plot_convergence(study: PaperStudy) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     looks: tuple[tuple[ElementKind, str, str, str], ...] = (
-        ("linear", "straight lines with shear (as BEAM188)", ALARM_ORANGE, "s"),
-        ("timoshenko", "cubics with shear", NEWEST_BLUE, "o"),
-        ("euler-bernoulli", "cubics without shear", GOOD_GREEN, "^"),
+        ("linear", "straight lines with shear (as BEAM188)", Paint.ALARM, "s"),
+        ("timoshenko", "cubics with shear", Paint.NEWEST, "o"),
+        ("euler-bernoulli", "cubics without shear", Paint.GOOD, "^"),
     )
     for kind, label, colour, mark in looks:
         error = np.array(study.meshes.frequencies[kind]) / study.meshes.exact[kind] - 1
@@ -70,18 +70,18 @@ def _plot_response(study: PaperStudy, part: str) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     tap = study.tap
 
-    def values(receptance: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def values(receptance: Complexes) -> Floats:
         return (receptance.real if part == "Re" else receptance.imag) * 1e6
 
     axes.plot(
-        tap.frf.frequency, values(tap.frf.receptance), color=NEWEST_BLUE, lw=1.8, label="mode with the paper's numbers"
+        tap.frf.frequency, values(tap.frf.receptance), color=Paint.NEWEST, lw=1.8, label="mode with the paper's numbers"
     )
     surrogate = f"surrogate, {len(tap.surrogate_modes)} modes"
     axes.plot(
-        tap.surrogate_frf.frequency, values(tap.surrogate_frf.receptance), color=FIRST_GREY, ls="--", label=surrogate
+        tap.surrogate_frf.frequency, values(tap.surrogate_frf.receptance), color=Paint.FIRST, ls="--", label=surrogate
     )
     hits = tap.tapped.in_band(RESPONSE_BAND)
-    axes.plot(hits.frequency, values(hits.receptance), ".", color=GOOD_GREEN, ms=5, label="ten emulated hits on it")
+    axes.plot(hits.frequency, values(hits.receptance), ".", color=Paint.GOOD, ms=5, label="ten emulated hits on it")
     if part == "Re":
         below, above = tap.extremes
         _draw_mark(axes, tap.measured.receptance(np.array([below])).real[0] * 1e6, below, "omega_A")
@@ -95,7 +95,7 @@ def _plot_response(study: PaperStudy, part: str) -> Figure:
 
 
 def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
-    axes.plot(frequency, height, color=ALARM_ORANGE, marker="o", ls="")
+    axes.plot(frequency, height, color=Paint.ALARM, marker="o", ls="")
     text: dict[str, Any] = {"xytext": (10, 0), "textcoords": "offset points", "va": "center"}
     axes.annotate(f"{name}: {frequency:.1f} Hz, {height:.4f} µm/N", (frequency, height), **text)
 
@@ -112,12 +112,14 @@ def _plot_whirl(maps: tuple[WhirlMap, WhirlMap], critical: float) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     plain, shear = maps
     speed = plain.speed_rpm / 1e3
-    axes.plot(speed, plain.rotating_forward[0], color=NEWEST_BLUE, lw=1.8, label="seen from the shaft, as in the paper")
-    axes.plot(speed, plain.forward[0], color=GOOD_GREEN, lw=1.8, ls="--", label="seen from the housing")
+    axes.plot(
+        speed, plain.rotating_forward[0], color=Paint.NEWEST, lw=1.8, label="seen from the shaft, as in the paper"
+    )
+    axes.plot(speed, plain.forward[0], color=Paint.GOOD, lw=1.8, ls="--", label="seen from the housing")
     label = "the same with shear and gyroscopic moments"
-    axes.plot(speed, shear.rotating_forward[0], color=NEWEST_BLUE, lw=0.9, ls=":")
-    axes.plot(speed, shear.forward[0], color=GOOD_GREEN, lw=0.9, ls=":", label=label)
-    axes.plot(speed, shear.backward[0], color=GOOD_GREEN, lw=0.9, ls=":")
+    axes.plot(speed, shear.rotating_forward[0], color=Paint.NEWEST, lw=0.9, ls=":")
+    axes.plot(speed, shear.forward[0], color=Paint.GOOD, lw=0.9, ls=":", label=label)
+    axes.plot(speed, shear.backward[0], color=Paint.GOOD, lw=0.9, ls=":")
     axes.plot(speed, plain.speed_rpm / 60, color="black", lw=0.8, ls="-.", label="once a revolution")
     axes.plot(critical / 1e3, 0, label="critical speed in the paper", clip_on=False, **PAPER_MARK)
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="first frequency (Hz)")
@@ -132,9 +134,9 @@ def _plot_stiffness_curve(study: PaperStudy) -> Figure:
         (study.plain, "Euler-Bernoulli, as in the paper", "-"),
         (study.shear, "Timoshenko", "--"),
     ):
-        axes.semilogx(*shaft.curve, color=NEWEST_BLUE, ls=dashes, label=f"surrogate, {name}")
-        axes.axhline(shaft.rigid_frequency, color=FIRST_GREY, lw=0.8, ls=dashes)
-    axes.annotate("rigid bearings", (1.2e7, study.plain.rigid_frequency + 25), color=FIRST_GREY, fontsize=9)
+        axes.semilogx(*shaft.curve, color=Paint.NEWEST, ls=dashes, label=f"surrogate, {name}")
+        axes.axhline(shaft.rigid_frequency, color=Paint.FIRST, lw=0.8, ls=dashes)
+    axes.annotate("rigid bearings", (1.2e7, study.plain.rigid_frequency + 25), color=Paint.FIRST, fontsize=9)
     points = (printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS), (printed.FREQUENCY, printed.OLD_FREQUENCY)
     axes.plot(*points, label="paper, new and old", **PAPER_MARK)
     axes.plot(1e13, printed.RIGID_FREQUENCY, label="paper, rigid", **(PAPER_MARK | {"marker": "s"}))
@@ -149,9 +151,9 @@ def _plot_paper_lobes(study: PaperStudy) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     lobes = study.lobes
     looks = (
-        (lobes.new, "new: 1722 Hz", FIRST_GREY, "-"),
-        (lobes.by_rule, "old, K x 0.9 as in the paper", ALARM_ORANGE, "-"),
-        (lobes.by_model, "old, K of the model", NEWEST_BLUE, "--"),
+        (lobes.new, "new: 1722 Hz", Paint.FIRST, "-"),
+        (lobes.by_rule, "old, K x 0.9 as in the paper", Paint.ALARM, "-"),
+        (lobes.by_model, "old, K of the model", Paint.NEWEST, "--"),
     )
     for chart, label, colour, dashes in looks:
         depth = np.minimum(chart.depth / lobes.new.minimum.depth, 2 * MAX_DEPTH_RATIO)
@@ -167,10 +169,10 @@ def _plot_paper_lobes(study: PaperStudy) -> Figure:
 
 
 class PaperFigure(NamedTuple):
-    """A figure of the page."""
+    """Figure of the page."""
 
     caption: str
-    """What it shows."""
+    """Caption of the figure."""
     draw: Callable[[PaperStudy], Figure]
     """Function that draws it."""
 
@@ -185,15 +187,15 @@ PAPER_FIGURES: Mapping[str, PaperFigure] = {
     "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_imaginary_part),
     "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _plot_paper_lobes),
 }
-"""Figures 3 and 5 to 10, and the convergence of the finite elements, by the names of their files."""
+"""Figures 3 and 5 to 10, and the convergence of the finite elements, by file name."""
 
 
 PAPER_PAGE_NAME = "paper.md"
-"""Name of the page, and of its template."""
+"""Name of the page and of its template."""
 
 
 def render_paper_page(study: PaperStudy) -> str:
-    """The page in Markdown."""
+    """Return the page in Markdown."""
     template = resources.files("lobewatch.show.paper").joinpath(PAPER_PAGE_NAME).read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     return environment.from_string(template).render(study=study, cells=paper_cells, figures=PAPER_FIGURES)

@@ -8,41 +8,32 @@ from pathlib import Path
 from typing import Any
 
 from lobewatch.paper import Claim, Comparison, PaperStudy
+from lobewatch.show.terminal.json_fields import json_fields
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
-"""Characters of the columns: the whole fits 80."""
+"""Widths of the columns, 80 characters in all."""
 
 PAPER_DIGITS = 7
-"""Digits of a number of the paper, where it has so many."""
+"""Largest number of digits of a number of the paper."""
+
+
+NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference reason")
+CLAIM_FIELDS = json_fields("claim=text verdict evidence")
 
 
 def paper_json(study: PaperStudy, page: Path | None) -> dict[str, Any]:
-    """Every number and every claim, and the page that was written."""
+    """Return every number and every claim of the paper, and the page that was written."""
+    rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {
-        "numbers": [
-            {
-                "section": section.title,
-                "quantity": row.quantity,
-                "where": row.where,
-                "unit": row.unit,
-                "paper": row.printed,
-                "ours": row.ours,
-                "difference": row.difference,
-                "reason": row.reason,
-            }
-            for section in study.sections
-            for row in section.comparisons
-        ],
-        "claims": [
-            {"claim": claim.text, "verdict": claim.verdict, "evidence": claim.evidence} for claim in study.claims
-        ],
+        "numbers": [{"section": title, **NUMBER_FIELDS(row)} for title, row in rows],
+        "claims": list(map(CLAIM_FIELDS, study.claims)),
         "page": page and str(page),
     }
 
 
 def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
-    """One table of all numbers, the reason of each below it, then the claims; so many characters a line."""
+    """Return a table of all numbers with reasons, and the claims, in lines of this width (characters)."""
     yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, beside a surrogate of the"
     yield "spindle (its drawing is not public): fitted to the frequencies in the paper."
     for section in study.sections:
@@ -57,18 +48,18 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
 
 
 def claim_text(claim: Claim) -> str:
-    """A claim with the word for it."""
+    """Return a claim with the verdict on it."""
     return f"{claim.verdict}: {claim.text}"
 
 
 def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
-    """Quantity, place, both values, unit and difference."""
+    """Return quantity, place, both values, unit and difference."""
     printed = "-" if row.printed is None else number_text(row.printed, PAPER_DIGITS, whole=False)
     return row.quantity, row.where, printed, number_text(row.ours, row.digits), row.unit, difference_text(row)
 
 
 def number_text(value: float, digits: int, *, whole: bool = True) -> str:
-    """A number with so many significant digits, all of them or as many as it needs; a large or small one by powers."""
+    """Return a number with significant digits; whole: with trailing zeros, too."""
     form = "#" if whole else ""
     if value == 0 or 1e-3 <= abs(value) < 1e6:
         return f"{value:{form}.{digits}g}".removesuffix(".")
@@ -77,7 +68,7 @@ def number_text(value: float, digits: int, *, whole: bool = True) -> str:
 
 
 def difference_text(row: Comparison) -> str:
-    """By how much ours is larger, as a share; percents differ by points."""
+    """Return our value minus that of the paper as a share of it, for percents in points."""
     if row.difference is None or row.printed is None:
         return ""
     if row.unit == "%":

@@ -1,1 +1,1 @@
-"""Verdicts, lobes, advice and doubt of cutting programs for people and as JSON."""
+"""Show verdicts, lobes and advice for cutting programs."""

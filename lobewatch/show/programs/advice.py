@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,29 +17,30 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.show.programs.verdicts import verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.output import remark_json, remark_lines
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import count_noun, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
 
 NO_LIMIT_CODES = ("not-checked", "heard-alone")
-"""Remarks that stand for a word without a limit."""
+"""Codes of remarks that replace a limit."""
 LINE_REMARK_CODES = ("doubt-decides", *NO_LIMIT_CODES)
-"""Remarks that the lines of a program hold already."""
+"""Codes of remarks that the advice lines contain."""
 MIN_FEED_RATIO = 1.02
-"""Directions of feed whose limits differ by less are not told apart."""
+"""Smallest ratio of the limits along two feed directions that is worth a note."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramAdvice:
-    """A program with all that is said of it."""
+    """Program with its verdict and advice."""
 
     verdict: Verdict
-    """The word and the limit."""
+    """Verdict and limit."""
     advice: Advice
-    """Settings to go to, and how much decay is left."""
+    """Recommended settings, and the tolerable frequency drop."""
     first_verdict: StoredVerdict | None
-    """Ruling at the first tap tests of the same tool and directions; None without earlier ones."""
+    """Verdict at the first tap tests of the same tool and directions; None without earlier ones."""
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -48,31 +49,27 @@ class ProgramAdvice:
 
     @property
     def other_remarks(self) -> tuple[Remark, ...]:
-        """The remarks that are said apart from its lines."""
+        """Remarks that the advice lines do not contain."""
         return tuple(remark for remark in self.remarks if remark.code not in LINE_REMARK_CODES)
 
     @property
     def is_no_longer_stable(self) -> bool:
-        """Whether it chatters now, and did not at first."""
+        """Whether the program chatters now and did not at first."""
         return self.verdict.is_stable is False and self.first_verdict is not None and bool(self.first_verdict.is_stable)
 
 
 def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvice:
-    """All that is said of one program."""
+    """Return one program with its verdict and advice."""
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.initial_verdict(verdict))
 
 
 def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> dict[str, Any]:
-    """All programs; remarks: on the files."""
-    return {
-        "programs": [advice_json(program) for program in programs],
-        **count_unsafe(programs),
-        "remarks": [remark_json(remark) for remark in remarks],
-    }
+    """Return all programs with advice, and how many may not be run; remarks: on the files."""
+    return {"programs": [advice_json(program) for program in programs], **count_unsafe(programs), "remarks": remarks}
 
 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
-    """All programs for people: the table, what is called for, how to read it."""
+    """Return all programs in words: the table, the advice, and notes on reading it."""
     decays = [frequency_margin_text(program.advice) for program in programs]
     verdicts = [program.verdict for program in programs]
     return [
@@ -83,20 +80,20 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
     ]
 
 
+ADVICE_FIELDS = json_fields("""
+    was_stable_at_first=first_verdict.is_stable verdict_at_first=first_verdict.stability advice=advice.best
+    advice_here=advice.deepest_here tolerable_decay=advice.tolerable_drop remarks
+""")
+
+
 def advice_json(program: ProgramAdvice) -> dict[str, Any]:
-    """One program."""
-    return verdict_json(program.verdict) | {
-        "was_stable_at_first": None if program.first_verdict is None else program.first_verdict.is_stable,
-        "verdict_at_first": None if program.first_verdict is None else program.first_verdict.stability,
-        "advice": setting_json(program.advice.best),
-        "advice_here": setting_json(program.advice.deepest_here),
-        "tolerable_decay": program.advice.tolerable_drop,
-        "remarks": [asdict(remark) for remark in program.remarks],
-    }
+    """Return one program with its verdict and advice."""
+    settings = {"advice": setting_json(program.advice.best), "advice_here": setting_json(program.advice.deepest_here)}
+    return verdict_json(program.verdict) | ADVICE_FIELDS(program) | settings
 
 
 def frequency_margin_text(advice: Advice) -> str:
-    """How far the frequency may fall in the middle of the doubt."""
+    """Return how far f1 can drop before the program chatters (median estimate)."""
     if math.isnan(advice.tolerable_drop):
         return "-"
     if advice.tolerable_drop == 0:
@@ -105,7 +102,7 @@ def frequency_margin_text(advice: Advice) -> str:
 
 
 def count_unsafe(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
-    """How many there are of each that may not be run."""
+    """Count the programs of each kind that may not be run."""
     words = Counter(program.verdict.stability for program in programs)
     return {
         "unstable": words[Stability.NOT_STABLE],
@@ -116,18 +113,17 @@ def count_unsafe(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
 
 
 def check_summary_text(programs: Sequence[ProgramAdvice], others: int) -> str:
-    """How many there are of each word, and of those without a speed or a depth."""
+    """Return how many programs have each verdict, and how many have no speed or depth."""
     words = Counter(program.verdict.stability for program in programs)
     texts = [f"{words[word]} {word}" for word in Stability if words[word]]
     beyond = count_unsafe(programs)["beyond_drive"]
     texts += [f"{beyond} beyond the drive"] if beyond else []
     texts += [f"{others} without a speed or a depth"] if others else []
-    number = len(programs) + others
-    return f"{number} program{'s' if number > 1 else ''}: {', '.join(texts)}"
+    return f"{count_noun(len(programs) + others, 'program')}: {', '.join(texts)}"
 
 
 def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
-    """What is wrong and what to do, a line for each thing that is called for."""
+    """Return what is wrong with a program and what to do, a line for each."""
     verdict = program.verdict
     name = verdict.program.name
     if worded := [remark for remark in verdict.remarks if remark.code in NO_LIMIT_CODES]:
@@ -151,7 +147,7 @@ def _chatter_text(program: ProgramAdvice) -> str:
 
 
 def worst_feed_text(verdict: Verdict) -> str:
-    """The direction of feed that is worst, where it matters."""
+    """Return the feed direction with the lowest limit where it matters."""
     limits = np.ones(1) if verdict.samples is None else verdict.samples.limits
     if np.max(limits) <= MIN_FEED_RATIO * np.min(limits):
         return ""
@@ -160,14 +156,13 @@ def worst_feed_text(verdict: Verdict) -> str:
 
 
 def _interim_texts(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
-    """What to do until it is settled; tapping what was not tapped comes first."""
+    """Return what to do until the verdict is settled; open measurements come first."""
     verdict = program.verdict
     if verdict.assembly is not None and is_compliance_known(verdict.program, verdict.assembly):
         yield f"until then {_alternative_text(program, machine)}"
 
 
 def _alternative_text(advice: ProgramAdvice, machine: Machine) -> str:
-    """Where to go."""
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.deepest_here
     gap = None if verdict.assembly is None else find_open_question(verdict.program, verdict.assembly)
     if gap is not None:
@@ -187,7 +182,7 @@ def _alternative_text(advice: ProgramAdvice, machine: Machine) -> str:
 
 
 def _speed_range_text(reach: CutRange) -> str:
-    """Speeds that were looked at."""
+    """Return the range of speeds that was searched."""
     if reach.is_empty:
         return "that the tool bears"
     return f"in {format_rpm(reach.low_rpm)} to {format_rpm(reach.high_rpm)} rpm"
@@ -198,30 +193,25 @@ def _is_same_setting(best: Setting, shallower: Setting | None) -> bool:
 
 
 def _floor_depth_text(depth: float) -> str:
-    """The deepest cut (mm) of two decimals that is not deeper (m)."""
+    """Return a depth (m) in mm, rounded down to two decimals."""
     return f"{math.floor(depth * 1e5) / 100:.2f}"
 
 
+SETTING_FIELDS = json_fields("speed_rpm depth_mm window_rpm depth_margin frequency_left=drop_margin")
+
+
 def setting_json(setting: Setting | None) -> dict[str, Any] | None:
-    """One setting."""
-    if setting is None:
-        return None
-    return {
-        "speed_rpm": setting.speed_rpm,
-        "depth_mm": setting.depth_mm,
-        "window_rpm": list(setting.window_rpm),
-        "depth_margin": setting.depth_margin,
-        "frequency_left": setting.drop_margin,
-    }
+    """Return a recommended speed and depth with its robustness."""
+    return None if setting is None else SETTING_FIELDS(setting)
 
 
 def format_rpm(speed: float) -> str:
-    """A speed in groups of three digits."""
+    """Return a speed in groups of three digits."""
     return f"{speed:,.10g}".replace(",", " ")
 
 
 def robustness_text(setting: Setting) -> str:
-    """How far a setting is from what is not safe; all of it rounded towards it."""
+    """Return the margins of a setting in speed, depth and frequency, rounded down."""
     low, high = setting.window_rpm
     margin = f"{math.floor(100 * setting.depth_margin + 1e-6)} % of depth to spare"
     return (

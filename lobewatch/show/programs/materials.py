@@ -12,57 +12,63 @@ from rich.table import Table
 from lobes import Cut, CuttingCoefficients
 from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
 from lobewatch.machine.settings.drive_power import CutPower
+from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 
 MAX_MATERIALS_IN_FULL = 5
-"""Most materials whose sources are said."""
+"""Largest number of materials that are shown with their sources."""
 
 
-def material_json(known: CuttingCoefficients) -> dict[str, Any]:
-    """One material; ranges are [lowest, highest], null where no spread is published."""
-    return {
-        "name": known.material,
-        "iso_group": known.iso_group,
-        "equivalents": known.equivalents,
-        "kt_n_per_mm2": known.tangential / 1e6,
-        "kt_range_n_per_mm2": known.tangential_range and [limit / 1e6 for limit in known.tangential_range],
-        "kr_n_per_mm2": known.radial / 1e6,
-        "kr_over_kt": known.radial / known.tangential,
-        "kr_over_kt_range": known.ratio_range,
-        "kte_n_per_mm": known.tangential_edge / 1e3,
-        "kre_n_per_mm": known.radial_edge / 1e3,
-        "chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if known.specific_forces else None,
-        "specific_forces": [
-            {"kc1_1_n_per_mm2": force.at_1_mm / 1e6, "mc": force.exponent, "source": force.source}
-            for force in known.specific_forces
-        ],
-        "note": known.note,
-        "source": known.source,
+MATERIAL_FIELDS = json_fields("""
+    name=material iso_group equivalents kt_n_per_mm2=tangential/1e6 kt_range_n_per_mm2=tangential_range
+    kr_n_per_mm2=radial/1e6 kr_over_kt=radial kr_over_kt_range=ratio_range kte_n_per_mm=tangential_edge/1e3
+    kre_n_per_mm=radial_edge/1e3 chip_thickness_mm=specific_forces specific_forces note source
+""")
+SPECIFIC_FORCE_FIELDS = json_fields("kc1_1_n_per_mm2=at_1_mm/1e6 mc=exponent source")
+
+
+def material_json(material: CuttingCoefficients) -> dict[str, Any]:
+    """Return one material; a range is [lowest, highest], or None where no spread is published."""
+    tangential, forces = material.tangential_range, material.specific_forces
+    return MATERIAL_FIELDS(material) | {
+        "kt_range_n_per_mm2": tangential and [limit / 1e6 for limit in tangential],
+        "kr_over_kt": material.radial / material.tangential,
+        "chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None,
+        "specific_forces": [SPECIFIC_FORCE_FIELDS(force) for force in forces],
     }
 
 
-def material_texts(known: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
-    """A table of them, what its numbers are, and the sources of a few."""
-    in_short = len(known) > MAX_MATERIALS_IN_FULL
-    heads = "~material", "<ISO", "Kt\n(N/mm²)", "low..high", "Kr/Kt"
-    rows = new_table(*heads, *([] if in_short else ["low..high", "Kte\n(N/mm)", "~also"]))
-    for one in known:
-        force = f"{one.tangential / 1e6:.0f}", _range_text(one.tangential_range, 1e6, 0)
-        ratio = f"{one.radial / one.tangential:.2f}", _range_text(one.ratio_range, 1.0, 2)
-        edge = "-" if math.isnan(one.tangential_edge) else f"{one.tangential_edge / 1e3:.0f}"
-        cells = escape(one.material), one.iso_group or "-", *force, *ratio, edge, escape(", ".join(one.equivalents))
-        rows.add_row(*(cells[: len(heads)] if in_short else cells))
-    yield rows
-    if not in_short:
-        yield from (f"{one.material}: {'; '.join(filter(None, (one.note, one.source)))}" for one in known)
-    else:
+def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
+    """Return a table of materials, what its numbers are, and the sources where there are few."""
+    is_short = len(materials) > MAX_MATERIALS_IN_FULL
+    headings = "~material", "<ISO", "Kt\n(N/mm²)", "low..high", "Kr/Kt", "low..high", "Kte\n(N/mm)", "~also"
+    n_columns = 5 if is_short else len(headings)
+    yield new_table(*headings[:n_columns], rows=(_material_cells(material)[:n_columns] for material in materials))
+    if is_short:
         yield "range of Kr/Kt, force at the edge, other names, sources: lobewatch materials NAME, or --json"
-    if any(one.specific_forces for one in known):
+    else:
+        yield from (f"{one.material}: {'; '.join(filter(None, (one.note, one.source)))}" for one in materials)
+    if any(material.specific_forces for material in materials):
         thin, thick = (f"{chip * 1e3:g}" for chip in CHIP_THICKNESS_RANGE)
         yield (
-            f"from kc1.1 and mc: Kt = (1 - mc) kc1.1 h^-mc and Kte = mc kc1.1 h^(1 - mc) at h = {REFERENCE_CHIP_THICKNESS * 1e3:g} mm, "
-            f"the range over all publications and h = {thin} to {thick} mm (docs/lobes.md)"
+            f"from kc1.1 and mc: Kt = (1 - mc) kc1.1 h^-mc and Kte = mc kc1.1 h^(1 - mc) at h = "
+            f"{REFERENCE_CHIP_THICKNESS * 1e3:g} mm, the range over all publications and h = {thin} to {thick} mm "
+            "(docs/lobes.md)"
         )
+
+
+def _material_cells(material: CuttingCoefficients) -> list[str]:
+    edge = material.tangential_edge
+    return [
+        escape(material.material),
+        material.iso_group or "-",
+        f"{material.tangential / 1e6:.0f}",
+        _range_text(material.tangential_range, 1e6, 0),
+        f"{material.radial / material.tangential:.2f}",
+        _range_text(material.ratio_range, 1.0, 2),
+        "-" if math.isnan(edge) else f"{edge / 1e3:.0f}",
+        escape(", ".join(material.equivalents)),
+    ]
 
 
 def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) -> str:
@@ -70,14 +76,6 @@ def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) ->
 
 
 def power_text(power: CutPower, cut: Cut) -> str:
-    """A power, and the Kt that it says beside that which the cut was taken for."""
+    """Return the power of a cut, its Kt, and that of machine.toml."""
     by_power, known = power.tangential / 1e6, cut.tangential / 1e6
     return f"{power.watts / 1e3:.4g} kW say Kt {by_power:.0f} N/mm2, machine.toml {known:.0f}"
-
-
-def power_json(power: CutPower | None) -> dict[str, Any]:
-    """The same; None where nobody has read it."""
-    return {
-        "power_kw": None if power is None else power.watts / 1e3,
-        "tangential_by_power_n_per_mm2": None if power is None else power.tangential / 1e6,
-    }

@@ -16,48 +16,53 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import LINE_REMARK_CODES, format_rpm, robustness_text, setting_json, worst_feed_text
-from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, new_table, remark_json, remark_lines
+from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, new_table, remark_lines
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation
 
 UNIT_FEED_MM = 0.1
-"""Feed per tooth (mm) that chips are said for where it is not known."""
+"""Feed per tooth (mm) of the removal rate where the feed is not known."""
+
+
+PROGRAM_FIELDS = json_fields("name tool material teeth tool_diameter_mm radial_depth_mm")
+RECOMMENDED_FIELDS = json_fields("""
+    direction=program.direction worse_direction=program.direction feed=program.feed worst_feed_deg=verdict.feed_angle
+    verdict=verdict.stability measured=verdict.is_measured cuts=verdict.n_cuts chance_turning=verdict.chatter_risk
+""")
+PROPOSAL_FIELDS = json_fields("""
+    tool=verdict.program.tool teeth=verdict.program.teeth speed_rpm=verdict.program.speed_rpm depth_mm=proposed
+    equal_is_as_good=proposed proposed_deg=proposed.pattern.pitch_deg half_wave_deg
+    chatter_frequency_hz=verdict.chatter_frequency
+""")
+PITCH_FIELDS = json_fields("""
+    pitch_deg=pattern.pitch_deg pattern=pattern.name limit_mm=limit*1e3 limit_low_mm=low*1e3 limit_high_mm=high*1e3 gain
+    gain_low gain_high share_worse least_chip=pattern largest_chip=pattern verdict=stability
+    off_centre=pattern.imbalance
+""")
 
 
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> dict[str, Any]:
-    """The recommended setting or the reason; remarks: on the files."""
-    program = answer.program
-    return {
-        "name": program.name,
-        "tool": program.tool,
-        "material": program.material,
-        "teeth": program.teeth,
-        "tool_diameter_mm": program.tool_diameter_mm,
-        "radial_depth_mm": program.radial_depth_mm,
+    """Return the recommended setting or the reason why there is none; remarks: on the files."""
+    alternatives = (
+        {"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives
+    )
+    return PROGRAM_FIELDS(answer.program) | {
         "recommended": _recommended_json(answer),
         "reason": answer.reason or None,
-        "what_would_change_it": list(answer.remedies),
-        "alternatives": [
-            {"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives
-        ],
-        "remarks": [remark_json(remark) for remark in [*remarks, *_other_remarks(answer)]],
+        "what_would_change_it": answer.remedies,
+        "alternatives": list(alternatives),
+        "remarks": [*remarks, *_other_remarks(answer)],
     }
 
 
 def _recommended_json(answer: Recommendation) -> dict[str, Any] | None:
     if answer.setting is None or answer.verdict is None:
         return None
-    return _setting_with_feed_json(answer.setting, answer) | {
-        "direction": "either" if answer.any_direction else answer.program.direction,
-        "worse_direction": answer.program.direction,
-        "feed": answer.program.feed,
-        "worst_feed_deg": math.degrees(answer.verdict.feed_angle),
-        "verdict": answer.verdict.stability,
-        "measured": answer.verdict.is_measured,
-        "cuts": answer.verdict.n_cuts,
-        "chance_turning": answer.verdict.chatter_risk,
-    }
+    recommended = _setting_with_feed_json(answer.setting, answer) | RECOMMENDED_FIELDS(answer)
+    either = {"direction": "either"} if answer.any_direction else {}
+    return recommended | either | {"worst_feed_deg": math.degrees(answer.verdict.feed_angle)}
 
 
 def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> dict[str, Any]:
@@ -71,31 +76,31 @@ def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> dict[st
 
 
 def cutting_speed(setting: Setting, program: ProgramTable) -> float:
-    """Speed of the edge (m/min)."""
+    """Return the cutting speed vc (m/min)."""
     return math.pi * program.tool_diameter_mm * setting.speed_rpm / 1e3
 
 
 def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
-    """Chips a minute (cm3/min) at a feed per tooth (mm)."""
+    """Return the material removal rate (cm3/min) at a feed per tooth (mm)."""
     area = setting.depth_mm * program.radial_mm[1]
     return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
 
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
-    """The answer first, then what it rests on; remarks: on the files."""
-    others = [(other.label, other.setting) for other in answer.alternatives]
+    """Return the recommendation first, then what it rests on; remarks: on the files."""
     return [
         *(_recommended_lines(answer) if answer.setting else _no_setting_lines(answer)),
-        *(
-            f"{what}: {_setting_text(place, answer)} {robustness_text(place)}; {_removal_rate_text(place, answer)}"
-            for what, place in others
-        ),
+        *(f"{other.label}: {_alternative_text(other.setting, answer)}" for other in answer.alternatives),
         *remark_lines([*remarks, *_other_remarks(answer)]),
     ]
 
 
+def _alternative_text(setting: Setting, answer: Recommendation) -> str:
+    return f"{_setting_text(setting, answer)} {robustness_text(setting)}; {_removal_rate_text(setting, answer)}"
+
+
 def saved_lines(folder: Path, name: str) -> list[str]:
-    """Where the setting was saved as a program, and what to do next."""
+    """Return where the setting was saved as a program, and the next step."""
     return [f"saved in {folder / 'machine.toml'} as program {name!r}", f"next: {format_command('check', folder)}"]
 
 
@@ -109,7 +114,8 @@ def _recommended_lines(answer: Recommendation) -> Iterator[str]:
     yield f"  {robustness_text(setting).strip('()')}"
     yield f"  {_removal_rate_text(setting, answer)}{worst_feed_text(verdict)}"
     if verdict.n_cuts:
-        yield f"  as {verdict.n_cuts} test cut{'s have' if verdict.n_cuts > 1 else ' has'} taught of the turning spindle"
+        has = "s have" if verdict.n_cuts > 1 else " has"
+        yield f"  as {verdict.n_cuts} test cut{has} taught of the turning spindle"
 
 
 def _no_setting_lines(answer: Recommendation) -> Iterator[str]:
@@ -124,70 +130,45 @@ def _setting_text(setting: Setting, answer: Recommendation) -> str:
 
 
 def _removal_rate_text(setting: Setting, answer: Recommendation) -> str:
+    program = answer.program
     if answer.feed_mm is None:
-        return f"{removal_rate(setting, answer.program, UNIT_FEED_MM):.3g} cm3/min for each {UNIT_FEED_MM:g} mm of feed a tooth"
-    teeth_per_min = answer.program.teeth * setting.speed_rpm
-    texts = [
-        (f"{removal_rate(setting, answer.program, feed):.3g}", f"{feed:.3g}", format_rpm(round(feed * teeth_per_min)))
-        for feed in dict.fromkeys(answer.feed_mm)
-    ]
-    volumes, feeds, speeds = (" to ".join(part) for part in zip(*texts, strict=True))
-    return f"{volumes} cm3/min at {feeds} mm a tooth ({speeds} mm/min)"
+        rate = removal_rate(setting, program, UNIT_FEED_MM)
+        return f"{rate:.3g} cm3/min for each {UNIT_FEED_MM:g} mm of feed a tooth"
+    feeds = list(dict.fromkeys(answer.feed_mm))
+    rates = " to ".join(f"{removal_rate(setting, program, feed):.3g}" for feed in feeds)
+    speeds = " to ".join(format_rpm(round(feed * (program.teeth * setting.speed_rpm))) for feed in feeds)
+    return f"{rates} cm3/min at {' to '.join(f'{feed:.3g}' for feed in feeds)} mm a tooth ({speeds} mm/min)"
 
 
 def _other_remarks(answer: Recommendation) -> list[Remark]:
-    """Remarks that are said apart from its lines."""
     return [remark for remark in answer.remarks if remark.code not in LINE_REMARK_CODES]
 
 
 HIDDEN_PITCH_CODES = ("doubt-decides",)
-"""Remarks on the word, which is not said here."""
+"""Codes of remarks on the verdict, which this output does not show."""
 
 
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> dict[str, Any]:
-    """Equal pitch, the patterns, and which of them is proposed; remarks: on the files."""
-    program, proposed = proposal.verdict.program, proposal.proposed
-    return {
-        "tool": program.tool,
-        "teeth": program.teeth,
-        "speed_rpm": program.speed_rpm,
+    """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
+    return PROPOSAL_FIELDS(proposal) | {
         "depth_mm": depth_mm,
-        "equal_is_as_good": proposed is None,
-        "proposed_deg": None if proposed is None else proposed.pattern.pitch_deg,
-        "half_wave_deg": proposal.half_wave_deg,
-        "chatter_frequency_hz": proposal.verdict.chatter_frequency,
+        "equal_is_as_good": proposal.proposed is None,
         "equal": _pitch_json(proposal.equal, depth_mm),
-        "unequal": [_pitch_json(judged, depth_mm) for judged in proposal.unequal],
-        "remarks": [remark_json(remark) for remark in _pitch_remarks(proposal, remarks)],
+        "unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal],
+        "remarks": _pitch_remarks(proposal, remarks),
     }
 
 
-def _pitch_json(judged: PitchEvaluation, depth_mm: float | None) -> dict[str, Any]:
-    least, most = judged.pattern.feed_ratio_range
-    return {
-        "pitch_deg": judged.pattern.pitch_deg,
-        "pattern": judged.pattern.name,
-        "limit_mm": 1e3 * judged.limit,
-        "limit_low_mm": 1e3 * judged.low,
-        "limit_high_mm": 1e3 * judged.high,
-        "gain": judged.gain,
-        "gain_low": judged.gain_low,
-        "gain_high": judged.gain_high,
-        "share_worse": judged.share_worse,
-        "least_chip": least,
-        "largest_chip": most,
-        "verdict": None if depth_mm is None else judged.stability,
-        "off_centre": judged.pattern.imbalance,
-    }
+def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> dict[str, Any]:
+    least, largest = pitch.pattern.feed_ratio_range
+    verdict = None if depth_mm is None else pitch.stability
+    return PITCH_FIELDS(pitch) | {"least_chip": least, "largest_chip": largest, "verdict": verdict}
 
 
 def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> list[str | Table]:
-    """The patterns for people, and what to have ground; depth_mm: the one that was asked about."""
-    return [
-        _pitches_table(proposal, depth_mm),
-        *_proposal_lines(proposal),
-        *remark_lines(_pitch_remarks(proposal, remarks)),
-    ]
+    """Return a table of the patterns, and which to have ground; depth_mm: requested depth of cut, None for any."""
+    table = _pitches_table(proposal, depth_mm)
+    return [table, *_proposal_lines(proposal), *remark_lines(_pitch_remarks(proposal, remarks))]
 
 
 def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[Remark]:
@@ -195,37 +176,34 @@ def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[R
 
 
 def _pitches_table(proposal: PitchProposal, depth_mm: float | None) -> Table:
-    """Each pattern in as many lines as its angles need, two at least, equal pitch first."""
-    words = [] if depth_mm is None else [f"<at {depth_mm:g} mm"]
-    heads = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
-    rows = new_table(*heads, *words)
-    for judged in (proposal.equal, *proposal.unequal):
-        columns = [*_pitch_columns(judged, judged is proposal.equal), *([[judged.stability.value]] if words else [])]
-        for line in zip_longest(*columns, fillvalue=""):
-            rows.add_row(*line)
-    return rows
+    """Return each pattern in as many lines as its angles need, two at least, equal pitch first."""
+    verdicts = [] if depth_mm is None else [f"<at {depth_mm:g} mm"]
+    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
+    table = new_table(*headings, *verdicts)
+    for pitch in (proposal.equal, *proposal.unequal):
+        columns = [*_pitch_columns(pitch, pitch is proposal.equal), *([[pitch.stability.value]] if verdicts else [])]
+        for cells in zip_longest(*columns, fillvalue=""):
+            table.add_row(*cells)
+    return table
 
 
-def _pitch_columns(judged: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:
-    """Lines of each column but that of the word."""
-    yield textwrap.wrap(" ".join(f"{angle:.4g}" for angle in judged.pattern.pitch_deg), MIN_COLUMN_WIDTH)
-    yield [judged.pattern.name]
-    yield [_pitch_limit_text(judged.limit), f"({_pitch_limit_text(judged.low)}..{_pitch_limit_text(judged.high)})"]
-    yield [""] if is_equal else _gain_texts(judged)
-    yield [f"{judged.pattern.feed_ratio_range[1]:.2f}"]
-    yield [f"{100 * judged.pattern.imbalance:.1f} %"]
+def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:
+    """Return the lines of each column but that of the verdict."""
+    gain, low, high = (f"{100 * share:+.0f}" for share in (pitch.gain, pitch.gain_low, pitch.gain_high))
+    yield textwrap.wrap(" ".join(f"{angle:.4g}" for angle in pitch.pattern.pitch_deg), MIN_COLUMN_WIDTH)
+    yield [pitch.pattern.name]
+    yield [_pitch_limit_text(pitch.limit), f"({_pitch_limit_text(pitch.low)}..{_pitch_limit_text(pitch.high)})"]
+    yield [""] if is_equal else [f"{gain} %", f"({low}..{high} %)"]
+    yield [f"{pitch.pattern.feed_ratio_range[1]:.2f}"]
+    yield [f"{100 * pitch.pattern.imbalance:.1f} %"]
 
 
 def _pitch_limit_text(depth: float) -> str:
     return f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none"
 
 
-def _gain_texts(judged: PitchEvaluation) -> list[str]:
-    return [f"{100 * judged.gain:+.0f} %", f"({100 * judged.gain_low:+.0f}..{100 * judged.gain_high:+.0f} %)"]
-
-
 def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
-    """What to have ground, what that asks of the feed, and where it holds."""
+    """Return the proposed pitches, the uneven chips that they make, and where they hold."""
     proposed, program = proposal.proposed, proposal.verdict.program
     at = f"at {format_rpm(program.speed_rpm)} rpm"
     if proposed is None:

@@ -1,1 +1,1 @@
-"""The report: its page, its sections, the data of its figures; the page of all machines."""
+"""Write the HTML report of a machine or a fleet."""

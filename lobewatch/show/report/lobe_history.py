@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from lobes import StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
@@ -31,46 +31,35 @@ from lobewatch.verdicts.frequency_drop import model_softening
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 from modal import Mode
 
-Floats = NDArray[np.float64]
-
 
 class LobeDiagram(NamedTuple):
-    """What is drawn of one cut."""
+    """Lobe diagram of one cut, then and now."""
 
     cut: str
     """Name of the cut: the reference cut, or else the first program of the tool."""
     now: StabilityLobes
     """Lobes of the newest tap tests."""
     depths: Mapping[str, Floats]
-    """Limiting depths at first, where that is known, and now (m), shape (n,), by the dates of the tap tests."""
+    """Limiting depths (m), shape (n,), at first, where known, and now, by the dates of the tap tests."""
     verdicts: Sequence[Verdict]
     """Verdicts on the programs with the same cut."""
     advice: Sequence[Setting]
-    """Settings recommended for them."""
+    """Settings recommended for these programs."""
     band: LimitBand | None
-    """How far the doubt moves the limit."""
+    """Uncertainty band of the limit."""
     heard: Sequence[CutEntry]
     """Test cuts of the same cut."""
     learned: LobesAtSpeed | None
-    """What test cuts have taught of the turning spindle."""
+    """Lobes of the rotating spindle, corrected by test cuts."""
 
     def figure(self, *, is_small: bool = False) -> Figure:
-        """The picture; a small one stands beside words."""
-        return plot_lobes(
-            self.now.speed_rpm,
-            self.depths,
-            self.verdicts,
-            "",
-            self.band,
-            self.advice,
-            self.heard,
-            self.learned,
-            is_small=is_small,
-        )
+        """Plot the diagram; is_small: smaller, to accompany text."""
+        drawn = self.depths, self.verdicts, "", self.band, self.advice, self.heard, self.learned
+        return plot_lobes(self.now.speed_rpm, *drawn, is_small=is_small)
 
     @property
     def edges(self) -> dict[str, Floats]:
-        """Depths beside those of now and of then (m), by name."""
+        """Depths (m) of the bands and of the rotating spindle, by name."""
         edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
         if self.learned is not None:
             edges |= {"at speed": self.learned.lobes.depth, "at speed, lowest": self.learned.band.low}
@@ -79,7 +68,7 @@ class LobeDiagram(NamedTuple):
 
 
 def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence[ProgramAdvice]) -> LobeDiagram | None:
-    """The diagram of a tool as tapped; None where it has no lobes."""
+    """Return the lobe diagram of a tool as tapped; None where it has no lobes."""
     machine = analysis.machine
     lobes = compute_lobes(assembly, machine)
     if not lobes:
@@ -106,39 +95,39 @@ def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence
 
 
 MAX_LOBE_DIAGRAMS = 24
-"""Tap tests shown, at most."""
+"""Largest number of tap tests shown."""
 MAX_LOBE_SPEEDS = 600
-"""Speeds given of each diagram, at most."""
+"""Largest number of speeds of each diagram."""
 MAX_FORECAST_DROP = 0.5
-"""Fall of the frequencies from which on no diagram is foretold: no such spindle still cuts; chosen."""
+"""Frequency drop from which on no diagram is forecast: no such spindle still cuts; chosen."""
 FORECAST_MONTHS = (6, 12)
-"""Months after the newest test that are foretold."""
+"""Months after the newest test that are forecast."""
 
 
 class LobeHistory(NamedTuple):
-    """Diagrams of one cut, oldest first; at least two."""
+    """Lobe diagrams of one cut over time, oldest first; at least two."""
 
     cut: str
     """Name of the cut."""
     speed_rpm: Floats
-    """Speeds common to all (rpm), shape (n,)."""
+    """Speeds common to all diagrams (rpm), shape (n,)."""
     times: Sequence[datetime]
     """Times of the tap tests, m of them."""
     depth: Floats
     """Limiting depths after each tap test (m), shape (m, n)."""
     ahead: Mapping[str, Floats]
-    """Limiting depths that are foretold (m), shape (n,), by what each diagram is called."""
+    """Forecast limiting depths (m), shape (n,), by the label of each diagram."""
     heard: Sequence[CutEntry] = ()
-    """Test cuts of the same cut, as they were heard."""
+    """Test cuts of the same cut."""
 
     @property
     def labels(self) -> list[str]:
-        """Names of the diagrams."""
+        """Labels of the diagrams."""
         return [*(f"{time:%Y-%m-%d}" for time in self.times), *self.ahead]
 
     @property
     def numbers(self) -> NumberTable:
-        """Speed, and depth in mm for each."""
+        """Depth (mm) over speed of each diagram."""
         step = max(math.ceil(self.speed_rpm.size / MAX_LOBE_SPEEDS), 1)
         depths = [*self.depth, *self.ahead.values()]
         return tabulate_lobes(
@@ -147,9 +136,9 @@ class LobeHistory(NamedTuple):
 
     @property
     def marks(self) -> NumberTable | None:
-        """The cuts, each with the number of the diagram (from 1) from which on it was known; None without any.
+        """Test cuts, each with the number of the diagram (from 1) that it first belongs to; None without any.
 
-        A cut that is younger than the newest tap test belongs to that.
+        A cut after the newest tap test belongs to the newest diagram.
         """
         diagrams = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
         lines = [
@@ -168,10 +157,10 @@ def compute_lobe_history(
     machine: Machine,
     cuts: Sequence[CutEntry] = (),
 ) -> LobeHistory | None:
-    """Over the rows of a series that show the cut; None where fewer than two do.
+    """Return the lobe diagrams of a series that show the cut; None where fewer than two do.
 
-    assembly: that of now; series: of the same tool, where it goes; cuts: all that were heard. All modes fall alike,
-    K follows the model.
+    assembly: the newest; series: of the same tool, for the forecast; cuts: all test cuts. The forecast lets all
+    modes drop by the same share, with K from the model.
     """
     shown = [row for row in rows if row.x or row.y]
     picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MAX_LOBE_DIAGRAMS)).round().astype(int)).tolist()
@@ -203,7 +192,7 @@ def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], 
 
 
 def _forecast_drop(trend: Trend, months: int) -> float | None:
-    """Share by which the line falls from the last point on; None where nothing is foretold for that long or so far."""
+    """Return the relative drop of the forecast line after some months; None where it is too long or too large."""
     forecast, last = trend.forecast, days_since_epoch(trend.points[-1].time)
     at = last + months * DAYS_PER_MONTH
     if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:

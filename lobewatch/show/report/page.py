@@ -15,16 +15,19 @@ from markupsafe import Markup, escape
 
 from acquisition import DataError, atomic_write
 from acquisition.errors import PERMISSION_ERRNOS
+from lobewatch.show.terminal.option_names import with_option_names
 
 UPLOT_NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
-"""First line of the script of the plots in place of its own, which has an address: a page names none."""
+"""First line of the plot script, instead of its own, which has an address: a page contains none."""
 
 
 def render_page(template: str, **content: Any) -> str:
-    """HTML of a template beside `report.html`; it is handed styles, script and plots."""
+    """Return the HTML of a template in this folder; it gets styles, scripts and plots."""
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
-    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, finalize=_name_options
+    )
     environment.filters |= {
         "in_css": _escape_css,
         "named": _label_svg,
@@ -35,8 +38,13 @@ def render_page(template: str, **content: Any) -> str:
     return environment.get_template(template).render(_static_files() | content)
 
 
+def _name_options(value: object) -> object:
+    """Name options in what an expression of a template shows, except in finished HTML."""
+    return with_option_names(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 def script_sources() -> str:
-    """The scripts of pages as sources of a content security policy."""
+    """Return the scripts of pages as sources of a content security policy."""
     digests = (hashlib.sha256(_static_files()[name].encode()).digest() for name in ("script", "plot_script"))
     return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
 
@@ -64,17 +72,17 @@ def _static_files() -> dict[str, str]:
 
 
 def _escape_css(text: str) -> str:
-    """A name as part of a string of a style sheet."""
+    """Escape a name inside a string of a style sheet."""
     return re.sub(r"[^\w .,:;()+-]", lambda match: f"\\{ord(match[0]):x} ", text)
 
 
 def _macro_name(part: object) -> str:
-    """The macro of parts.html that shows a part of a section: the name of its class in small letters."""
+    """Return the macro of parts.html for a part of a section: its class name in lower case."""
     return type(part).__name__.lower()
 
 
 def _join_units(text: str) -> str:
-    """No line ends within a number, between it and its error, or before its unit."""
+    """Prevent line breaks within a number, before its error and before its unit."""
     return re.sub(r"(?<=\d) (?=\d{3}\b|%|±|mm\b|rpm\b|Hz\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
@@ -83,25 +91,25 @@ def _label_svg(picture: str, name: str) -> Markup:
 
 
 GAUGE_WIDTH = 120.0
-"""Width of the scale, which ends a quarter beyond the alarm (units of the picture)."""
+"""Width of the scale (units of the figure)."""
 GAUGE_OVERSHOOT = 1.25
 
 
 class Gauge(NamedTuple):
-    """Lengths in units of the picture."""
+    """Lengths of a gauge in units of the figure."""
 
     text: str
-    """The fall in words, with its limits."""
+    """Frequency change in words, with its limits."""
     length: float
     """Length of the bar."""
     warn: float
-    """Place of the warning."""
+    """Place of the warning limit."""
     alarm: float
-    """Place of the alarm."""
+    """Place of the alarm limit."""
 
 
 def make_gauge(fall: float, warn: float, alarm: float) -> Gauge:
-    """The gauge of a fall, with the limits of it (%); of a rise it is empty."""
+    """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty."""
     scale = GAUGE_WIDTH / (GAUGE_OVERSHOOT * alarm)
     text = f"frequency {-fall:+z.2f} %; warning at -{warn:g} %, alarm at -{alarm:g} %"
     return Gauge(text, min(max(fall, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

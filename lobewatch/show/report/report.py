@@ -16,10 +16,11 @@ from lobewatch.monitoring.status_rules import StatusLevel
 from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS
 from lobewatch.show.history import condition_texts
 from lobewatch.show.report.page import make_gauge, render_page, write_page
-from lobewatch.show.report.report_data import ReportData, collect_report_data
+from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
 from lobewatch.show.report.summary import make_summary
+from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.status_labels import status_css_class
 from lobewatch.verdicts.verdict import Stability
 
@@ -49,43 +50,38 @@ def render_report(
     now: datetime | None = None,
     sections: Sequence[SectionMaker] = SECTIONS,
 ) -> str:
-    """HTML of one series (tool and direction); ValueError where it holds no tap test. now: None for the clock's."""
+    """Return the HTML of one series; raise ValueError where it has no tap test. now: None for the current time."""
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
+
+
+REPORT_FIELDS = json_fields("""
+    name=machine.machine.name tool=last.tool direction=last.direction last=last.time label=machine.spindle.label
+    tap_id=newest.id software=analysis.history.software
+""")
 
 
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
 ) -> dict[str, Any]:
-    """All that the template shows, from one analysis."""
-    material = collect_report_data(analysis, tool, direction, now)
-    groups = [make(material) for make in sections]
-    has_plots = any(section.has_plot for group in groups for section in group)
-    return {"groups": groups, "has_plots": has_plots, "numbering": count(1), **_page_frame(material)}
-
-
-def _page_frame(material: ReportData) -> dict[str, Any]:
-    """What stands above the sections and below them."""
-    machine, last, tap = material.machine, material.last, material.newest
-    return {
-        "name": machine.machine.name,
-        "tool": last.tool,
-        "direction": last.direction,
-        "first": material.rows[0].time,
-        "last": last.time,
-        "n_taps": len(material.rows),
-        "as_of": material.outlook.status.time.astimezone(),
-        "label": machine.spindle.label if machine.spindle else "",
-        "first_screen": make_summary(material),
-        "tap_id": tap.id,
-        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(last.conditions)],
+    """Return all that the template shows, from one analysis."""
+    data = collect_report_data(analysis, tool, direction, now)
+    groups, tap = [make(data) for make in sections], data.newest
+    return REPORT_FIELDS(data) | {
+        "groups": groups,
+        "has_plots": any(section.has_plot for group in groups for section in group),
+        "numbering": count(1),
+        "first": data.rows[0].time,
+        "n_taps": len(data.rows),
+        "as_of": data.outlook.status.time.astimezone(),
+        "first_screen": make_summary(data),
+        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(data.last.conditions)],
         "good": len(tap.accepted),
         "hits": len(tap.hits),
-        "software": material.analysis.history.software,
     }
 
 
 SPARK_WIDTH, SPARK_HEIGHT = 140, 32
-"""Size of a small course, in its own units."""
+"""Size of a small trend line, in units of the figure."""
 
 
 def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Path | None, now: datetime) -> Path:
@@ -96,7 +92,7 @@ def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Pa
 
 
 def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) -> str:
-    """HTML of a line a machine, in the order of the rows."""
+    """Return the HTML of a fleet, a line for each machine, in the order of the rows."""
     lights = [row["light"] for row in rows]
     counts = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
     numbers = NumberTable(FLEET_COLUMNS, [[_enum_value(row[column]) for column in FLEET_COLUMNS] for row in rows])
@@ -109,7 +105,7 @@ def _enum_value(value: Any) -> Any:
 
 
 def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A machine as the template takes it."""
+    """Return a machine as the template takes it."""
     left, last = row["days_left"], row["last_tap"]
     due = (
         "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
@@ -135,7 +131,7 @@ def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def programs_text(words: Mapping[str, str]) -> str:
-    """The programs that may not be run, by the word on them, and how many are stable."""
+    """Return the programs that may not be run, by verdict, and how many are stable."""
     named: dict[str, list[str]] = {}
     for program, word in words.items():
         named.setdefault(word, []).append(program)
@@ -145,7 +141,7 @@ def programs_text(words: Mapping[str, str]) -> str:
 
 
 def spark_points(points: Sequence[tuple[float, float]]) -> str:
-    """The course of a series (days, %) as the points of a small polyline; empty below two points."""
+    """Return a trend (days, %) as points of a small polyline; empty below two points."""
     if len(points) < 2:
         return ""
     days, percents = zip(*points, strict=True)

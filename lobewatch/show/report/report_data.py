@@ -25,14 +25,14 @@ from lobewatch.show.report.lobe_history import LobeDiagram, LobeHistory, compute
 from lobewatch.tool import Assembly
 
 BAND_LOW_FACTOR, BAND_HIGH_FACTOR = 0.6, 1.4
-"""Ends of the frequencies shown over those of the usable band; chosen."""
+"""Ends of the frequency range shown, over those of the usable band; chosen."""
 MODE_LOW_FACTOR = 0.3
-"""Least of them over the lowest mode: further down a response drowns its modes, for acceleration is divided by w^2."""
+"""Lower end of the range over the lowest mode: below it, division by omega^2 amplifies noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReportData:
-    """A machine and one of its series, with all that their report says; what several sections need is made once."""
+    """Data of a machine and one of its series, computed once for all sections of a report."""
 
     analysis: Analysis
     """Answers from the files of the machine."""
@@ -43,13 +43,13 @@ class ReportData:
     newest: TapTest
     """Newest tap test of the series."""
     outlook: MachineForecast
-    """Outlook of the machine."""
+    """Forecast for the machine."""
     programs: Sequence[ProgramAdvice]
-    """Programs of the machine, with all that is said of them."""
+    """Programs of the machine with verdict and advice."""
 
     @property
     def machine(self) -> Machine:
-        """machine.toml."""
+        """Settings of machine.toml."""
         return self.analysis.machine
 
     @property
@@ -59,26 +59,26 @@ class ReportData:
 
     @property
     def series(self) -> SeriesStatus:
-        """How the series stands."""
+        """Status of the series."""
         return self.outlook.series(self.last.tool, self.last.direction)
 
     @cached_property
     def assembly(self) -> Assembly:
-        """The tool of the series as tapped."""
+        """Tool of the series as tapped."""
         return self.analysis.assembly(self.last.tool)
 
     @cached_property
     def excluded_rows(self) -> Sequence[HistoryRow]:
-        """Rows of the tap tests of the series that do not count."""
+        """Rows of excluded tap tests of the series."""
         return measure_excluded_taps(self.analysis.folder, self.analysis.files.excluded, self.rows)
 
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:
-        """Lobes of the first cut of the tool, with the programs on them; None where it has none."""
+        """Lobes of the first cut of the tool, with its programs; None where it has none."""
         return make_lobe_diagram(self.analysis, self.assembly, self.programs)
 
     def response_band(self, frf: Frf) -> tuple[float, float]:
-        """Frequencies that are shown of a response (Hz)."""
+        """Return the frequency range (Hz) in which a response is shown."""
         ends = float(frf.frequency[0]), float(frf.frequency[-1])
         low, high = self.machine.mode.band_hz or frf.usable_band or ends
         lowest = min((frequency for frequency, *_ in self.last.modes), default=0.0)
@@ -86,7 +86,7 @@ class ReportData:
 
     @cached_property
     def lobe_history(self) -> LobeHistory | None:
-        """Lobes of the first cut of the tool over the series; None where fewer than two tap tests show it."""
+        """Lobes of the first cut of the tool over time; None below two tap tests."""
         cut = next(iter(self.machine.cuts(self.assembly.tool)), None)
         if cut is None:
             return None
@@ -95,7 +95,7 @@ class ReportData:
 
 
 def collect_report_data(analysis: Analysis, tool: str, direction: str, now: datetime | None) -> ReportData:
-    """All for one series; ValueError where it holds no tap test. now: None for the clock's."""
+    """Collect the data of one series; raise ValueError where it has no tap test. now: None for the current time."""
     rows, entries = analysis.history.series(tool, direction), {entry.id: entry for entry in analysis.taps}
     if not rows:
         raise ValueError(f"{analysis.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
@@ -107,28 +107,28 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
 
 
 EXCLUDED_VALUE_RANGE = 0.15
-"""Relative distance from all that counts up to which a value that does not count is drawn."""
+"""Largest relative distance from the values that count at which an excluded value is drawn."""
 MIN_TAPS_FOR_VALUE = 2
-"""Tap tests with a value from which on it has a course."""
+"""Smallest number of tap tests with a value that make a trend."""
 
 
 class SeriesValue(NamedTuple):
-    """A value of the tap tests of a series that is shown over time."""
+    """Value of the tap tests of a series that is shown over time."""
 
     field: str
-    """Name of the field of a row."""
+    """Field of a history row."""
     heading: str
     """Heading of its section."""
     unit: str
-    """Unit that it is shown in."""
+    """Unit shown."""
     scale: float
-    """Size of that unit (SI)."""
+    """Size of this unit (SI)."""
     text: str
-    """Sentence on how to read it."""
+    """Note on reading the figure."""
 
     @property
     def label(self) -> str:
-        """Name of the ordinate."""
+        """Label of the axis."""
         return f"{self.heading.lower()} ({self.unit})"
 
 
@@ -139,41 +139,41 @@ BEARING_VALUE = SeriesValue(
 
 
 class ValueTrend(NamedTuple):
-    """What is drawn of a value."""
+    """Trend of one value of a series."""
 
     value: SeriesValue
-    """Which it is."""
+    """Value that is shown."""
     estimates: Sequence[tuple[datetime, Estimate]]
-    """Tap tests that know it, at least FEWEST."""
+    """Times and estimates of the tap tests, at least MIN_TAPS_FOR_VALUE."""
     excluded: Sequence[tuple[datetime, float]]
-    """Tap tests that do not count, in the unit shown."""
+    """Times and values of excluded tap tests, in the unit shown."""
     marks: TrendMarks
-    """Marks beside the course."""
+    """Marks next to the trend."""
     limits: LimitsTable | None
-    """Limits of its fall; None where it has none."""
+    """Limits of its drop; None where it has none."""
     curve: TrendCurve | None
-    """Line that is fitted to it and goes on; None where there is none."""
+    """Fitted line and forecast; None where there is none."""
 
     def figure(self, size: tuple[float, float] = TREND_FIGURE_SIZE) -> Figure:
-        """The picture, of this size (inches)."""
+        """Plot the trend in a figure of this size (inches)."""
         values, stds = np.array([estimate for _, estimate in self.estimates]).T / self.value.scale
         times = [time for time, _ in self.estimates]
         return plot_trend(times, values, stds, self.value.label, self.limits, self.marks, self.curve, size)
 
 
-def make_value_trend(material: ReportData, value: SeriesValue) -> ValueTrend | None:
-    """What is drawn of a value of the series; None where too few tap tests know it."""
-    rows = material.rows
+def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
+    """Return the trend of a value of the series; None where too few tap tests have the value."""
+    rows = data.rows
     estimates = [(row.time, getattr(row, value.field)) for row in rows if getattr(row, value.field).is_known]
     if len(estimates) < MIN_TAPS_FOR_VALUE:
         return None
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
-    events = [(event.time, event.text) for event in material.analysis.files.events if event.time >= since]
+    events = [(event.time, event.text) for event in data.analysis.files.events if event.time >= since]
     numbers = [estimate.value / value.scale for _, estimate in estimates]
     near = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
-    aside = [(row.time, getattr(row, value.field).value / value.scale) for row in material.excluded_rows]
+    aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
     marks = TrendMarks(events, [(time, number) for time, number in aside if near[0] <= number <= near[1]])
-    is_followed, trend = value is FREQUENCY_VALUE, material.series.trend
-    limits = material.machine.limits if is_followed else None
+    is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
+    limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None
     return ValueTrend(value, estimates, aside, marks, limits, course)

@@ -10,22 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobewatch.arrays import Floats
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.trend_figures import TrendCurve
-
-Floats = NDArray[np.float64]
+from lobewatch.show.terminal.option_names import with_option_names
 
 MAX_RESPONSE_LINES = 1500
-"""Lines of a response that are given, at most."""
+"""Largest number of lines of a response or a diagram."""
 
 
 class NumberTable(NamedTuple):
-    """A table."""
+    """Table of numbers behind a figure or table."""
 
     heads: Sequence[str]
     """Headings of the columns, with units."""
@@ -34,7 +33,7 @@ class NumberTable(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The table as JSON that can stand within a page; what is not finite is null."""
+        """Table as JSON that can be embedded in HTML, with null for infinite and NaN."""
         lines = [[_json_value(value) for value in line] for line in self.lines]
         exact = json.dumps({"heads": list(self.heads), "lines": lines}, ensure_ascii=False, separators=(",", ":"))
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")
@@ -44,46 +43,41 @@ def tabulate_value(
     unit: str,
     scale: float,
     estimates: Iterable[tuple[datetime, Estimate]],
-    aside: Iterable[tuple[datetime, float]],
-    course: TrendCurve | None,
+    excluded: Iterable[tuple[datetime, float]],
+    curve: TrendCurve | None,
 ) -> NumberTable:
-    """A value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
+    """Tabulate a value over time: tests, excluded tests, the fitted line, and the 80 % band of the forecast.
 
-    scale: of the unit; the values of `estimates` alone are in SI.
+    The values of `estimates` are in SI, `scale` is the size of the unit shown; the others are in this unit.
     """
     lines: list[list[Any]] = [
         ["test", _day_text(time), estimate.value / scale, estimate.std / scale, "", ""] for time, estimate in estimates
     ]
-    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in aside]
-    if course is not None:
-        past = course.days.size - course.days_ahead.size
-        lines += [
-            ["fitted", _day_text(date_of_days(day)), value, "", "", ""]
-            for day, value in zip(course.days[:past].tolist(), course.line[:past].tolist(), strict=True)
-        ]
-        ahead = np.column_stack([course.days_ahead, course.line[past:], course.low, course.high])[::10]
-        lines += [
-            ["forecast", _day_text(date_of_days(day)), value, "", low, high] for day, value, low, high in ahead.tolist()
-        ]
+    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in excluded]
+    if curve is not None:
+        days = [_day_text(date_of_days(day)) for day in curve.days.tolist()]
+        past = curve.days.size - curve.days_ahead.size
+        fitted = zip(days[:past], curve.line[:past].tolist(), strict=True)
+        lines += [["fitted", day, value, "", "", ""] for day, value in fitted]
+        ahead = np.column_stack([curve.line[past:], curve.low, curve.high]).tolist()
+        band = list(zip(days[past:], ahead, strict=True))[::10]
+        lines += [["forecast", day, value, "", low, high] for day, (value, low, high) in band]
     return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
 
 
 def tabulate_lobes(speed_rpm: Floats, depths: Mapping[str, Floats]) -> NumberTable:
-    """Lines over speed (n,), depths in m by what each is called."""
+    """Tabulate limiting depths (m, by name) over speed."""
     heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
-    step = math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)
-    return NumberTable(
-        heads, np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])[::step].tolist()
-    )
+    columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])
+    return NumberTable(heads, columns[:: math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)].tolist())
 
 
 def tabulate_response(frf: Frf) -> NumberTable:
-    """A frequency response in its band; no more lines than one can see."""
-    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
+    """Tabulate a frequency response and its coherence, in no more lines than a figure can show."""
     coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
-    columns = (frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence)
-    lines = np.column_stack([column[::step] for column in columns])
-    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], lines.tolist())
+    columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
+    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
+    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
 
 
 def _day_text(time: datetime) -> str:
@@ -91,29 +85,29 @@ def _day_text(time: datetime) -> str:
 
 
 def _json_value(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    return float(f"{value:.5g}") if math.isfinite(value) else None
+    if isinstance(value, float):
+        return float(f"{value:.5g}") if math.isfinite(value) else None
+    return with_option_names(value) if isinstance(value, str) else value
 
 
 class Paragraph(NamedTuple):
-    """A sentence or a few."""
+    """Paragraph of text."""
 
     text: str
-    """Text; nothing is shown where it is empty."""
+    """Text; an empty one is not shown."""
     is_small: bool = False
-    """Whether it stands in small letters, as what is to be known beside."""
+    """Whether it is shown in small letters, as a note."""
 
 
 class BulletList(NamedTuple):
-    """A list of lines."""
+    """Bullet list."""
 
     lines: Sequence[str]
-    """Text of each."""
+    """Text of each item."""
 
 
 class TableCell(NamedTuple):
-    """A cell with the colour of a verdict or light."""
+    """Cell with the paint of a verdict or status."""
 
     text: str
     """Text of the cell."""
@@ -122,36 +116,36 @@ class TableCell(NamedTuple):
 
 
 class DataTable(NamedTuple):
-    """A table."""
+    """Table."""
 
     heads: Sequence[str]
     """Headings of the columns, with units."""
     rows: Sequence[Sequence[str | TableCell]]
     """Cells of each row."""
     kind: str = ""
-    """Classes of the style sheet: "words" for text to the left."""
+    """Classes of the style sheet: "words" aligns text to the left."""
     if_empty: str = ""
-    """Text in place of the rows where there are none."""
+    """Text instead of rows where there are none."""
     numbers: NumberTable | None = None
-    """The table with all digits, to be saved as CSV."""
+    """Table with all digits, to be saved as CSV."""
     key: str = ""
     """Name of the numbers in the page."""
 
 
 class Drawing(NamedTuple):
-    """A picture."""
+    """Figure."""
 
     svg: str
     """The <svg> element."""
     numbers: NumberTable | None = None
-    """Numbers of the picture, to be saved as CSV."""
+    """Numbers of the figure, to be saved as CSV."""
 
 
 class Fragment(NamedTuple):
-    """A piece of the page with a template of its own."""
+    """Part of the page with a template of its own."""
 
     template: str
-    """File beside report.html."""
+    """Template file in this folder."""
     content: Mapping[str, Any]
     """Values that the template shows."""
 
@@ -160,18 +154,18 @@ SectionPart = Paragraph | BulletList | DataTable | Drawing | Fragment
 
 
 class Section(NamedTuple):
-    """A heading with what stands below it, each part on lines of its own."""
+    """Heading with the parts below it."""
 
     heading: str
     """Heading; empty for none."""
     parts: Sequence[SectionPart]
-    """Parts below the heading, from above."""
+    """Parts below the heading, from the top."""
     is_framed: bool = True
-    """Whether a line end stands before and after it in the file; without any meaning on the page."""
+    """Whether blank lines surround it in the file, without any effect on the page."""
     has_plot: bool = False
-    """Whether the page must bring the script that plots."""
+    """Whether the page needs the plot script."""
 
 
 def make_figure_section(heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Section:
-    """A picture below what is to be known to read it; numbers: what is drawn."""
+    """Make a section of a figure below a note on reading it; numbers: data of the figure."""
     return Section(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])

@@ -25,18 +25,18 @@ from lobewatch.verdicts import Stability
 
 UNKNOWN_FATE = ProgramForecast(NO_FORECAST, NO_FORECAST)
 MAX_SUMMARY_REASONS = 3
-"""Reasons, and series, on the first screen; the others stand below it."""
+"""Largest number of reasons and of series in the summary."""
 TABLE_REASON_CODES = (
     *("frequency-alarm", "frequency-warn", "decay"),
     *("program-not-stable", "program-doubtful", "program-unknown"),
     "overdue",
 )
-"""Reasons that stand on the first screen as a series, a program or a date, unless they are the first."""
+"""Codes of reasons that the tables of the summary show, unless they are the worst."""
 
 
-def make_summary(material: ReportData) -> dict[str, Any]:
-    """What the first screen shows, as the template takes it."""
-    standing, limits = material.outlook.status, material.machine.limits
+def make_summary(data: ReportData) -> dict[str, Any]:
+    """Make the summary as the template takes it."""
+    standing, limits = data.outlook.status, data.machine.limits
     worst = standing.series[0]
     return {
         **_status_content(standing),
@@ -45,15 +45,15 @@ def make_summary(material: ReportData) -> dict[str, Any]:
         else None,
         "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
         "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
-        "programs": [_program_content(program, material) for program in material.programs],
-        "no_dates": no_dates_text(material.outlook),
-        "tap": _next_tap_text(standing, material.machine),
-        "pictures": list(draw_summary_figures(material)),
+        "programs": [_program_content(program, data) for program in data.programs],
+        "no_dates": no_dates_text(data.outlook),
+        "tap": _next_tap_text(standing, data.machine),
+        "pictures": list(draw_summary_figures(data)),
     }
 
 
 def _status_content(standing: MachineStatus) -> dict[str, Any]:
-    """The light in words, the reasons, the next step."""
+    """Return the status in words, the reasons and the next step."""
     first, others = _pick_reasons(standing)
     shown = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD][
         : MAX_SUMMARY_REASONS - 1
@@ -68,7 +68,7 @@ def _status_content(standing: MachineStatus) -> dict[str, Any]:
 
 
 def _pick_reasons(standing: MachineStatus) -> tuple[list[Remark], list[Remark]]:
-    """The worst, of the series that fell most; those beside it that nothing else of the first screen shows."""
+    """Return the worst reason, of the series with the largest drop, and those that the summary shows nowhere else."""
     plain, order = set(standing.reasons), {series.name: place for place, series in enumerate(standing.series)}
     alike = [remark for remark in standing.remarks if remark.code == standing.remarks[0].code]
     first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
@@ -81,7 +81,7 @@ def _has_changed(series: SeriesStatus) -> bool:
 
 
 def _series_content(series: SeriesStatus) -> dict[str, str]:
-    """Name, change, course and rate; of an only test, that it is the first."""
+    """Return name, change, trend and rate of a series."""
     if series.is_baseline:
         return {"name": series.name, "change": "first test", "course": "nothing to compare it with yet"}
     trend = series.trend
@@ -90,8 +90,8 @@ def _series_content(series: SeriesStatus) -> dict[str, str]:
     return {"name": series.name, "change": change_text(series), "course": "; ".join(course) or since}
 
 
-def _program_content(program: ProgramAdvice, material: ReportData) -> dict[str, str]:
-    name, word, outlook = program.verdict.program.name, program.verdict.stability, material.outlook
+def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]:
+    name, word, outlook = program.verdict.program.name, program.verdict.stability, data.outlook
     return {
         "name": name,
         "kind": VERDICT_STYLES[word].css_class,
@@ -110,7 +110,7 @@ def _until_text(word: Stability, fate: ProgramForecast, now: datetime) -> str:
 
 
 def alternative_text(program: ProgramAdvice) -> str:
-    """Speed and depth to go to, in a few words."""
+    """Return the recommended speed and depth in a few words."""
     assembly, settings = program.verdict.assembly, (program.advice.best, program.advice.deepest_here)
     if program.verdict.stability is Stability.STABLE:
         return "as it is"
@@ -131,25 +131,25 @@ def _next_tap_text(standing: MachineStatus, machine: Machine) -> str:
 
 
 class SummaryFigure(NamedTuple):
-    """A small picture."""
+    """Small figure of the summary."""
 
     caption: str
-    """What it shows."""
+    """Caption of the figure."""
     svg: str
     """The <svg> element."""
 
 
-def draw_summary_figures(material: ReportData) -> Iterator[SummaryFigure]:
-    """Course of the frequency, or the response of an only tap test; lobes where there are any."""
-    points, diagram = make_value_trend(material, FREQUENCY_VALUE), material.lobe_diagram
+def draw_summary_figures(data: ReportData) -> Iterator[SummaryFigure]:
+    """Draw the trend of the frequency, or the response of a single tap test, and the lobes where there are any."""
+    points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.curve is not None else ""
-        caption = f"Natural frequency in {material.last.direction} (Hz){ahead}"
+        caption = f"Natural frequency in {data.last.direction} (Hz){ahead}"
         figure = points.figure(SMALL_FIGURE_SIZE)
         figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
         yield SummaryFigure(caption, render_svg(figure))
-    elif (frf := material.newest.frf) is not None:
-        figure = plot_frf(None, frf, material.response_band(frf), SMALL_FIGURE_SIZE)
+    elif (frf := data.newest.frf) is not None:
+        figure = plot_frf(None, frf, data.response_band(frf), SMALL_FIGURE_SIZE)
         yield SummaryFigure("Receptance at the tool tip", render_svg(figure))
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""

@@ -11,6 +11,7 @@ from typing import Any
 
 from acquisition import Channel, TapTest
 from lobewatch.history import HistoryRow
+from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import MaintenanceEvent
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measurement.estimate import Estimate
@@ -27,26 +28,20 @@ from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.show.trend import change_since_start_text, rate_text
 
 TAP_TABLE_HEADS = (
-    "time",
-    "tool",
-    "direction",
-    "f_n (Hz)",
-    "zeta (%)",
-    "K (N/um)",
-    "bearing stiffness (N/um)",
-    "temperature (degC)",
+    *("time", "tool", "direction", "f_n (Hz)", "zeta (%)", "K (N/um)"),
+    *("bearing stiffness (N/um)", "temperature (degC)"),
 )
-"""Headings of the tap tests as numbers."""
+"""Headings of the numbers of tap tests."""
 TAP_VALUE_FORMATS = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
-"""Format and size of the unit of f_n, zeta, K and the stiffness of a bearing."""
+"""Format and size of the unit of f_n, zeta, K and the bearing stiffness."""
 COUNTING_TEXT = "Those that count, the newest first"
 """Words for what a list holds."""
 
 
-def make_series(material: ReportData) -> list[Section]:
-    """A line for each, the one that fell most first."""
+def make_series(data: ReportData) -> list[Section]:
+    """Make a table of the series, the largest drop first."""
     heads = ["tool", "direction", "light", "points", "newest", "change", "rate"]
-    rows = [_series_row(series) for series in material.outlook.status.series]
+    rows = [_series_row(series) for series in data.outlook.status.series]
     return [Section("Tools and directions", [DataTable(heads, rows, "words")], is_framed=False)]
 
 
@@ -65,15 +60,15 @@ def _series_row(series: SeriesStatus) -> list[str | TableCell]:
     ]
 
 
-def make_events(material: ReportData) -> list[Section]:
-    """A line for each event of the machine, each word on an alarm, each test that does not count, oldest first."""
-    files = material.analysis.files
+def make_events(data: ReportData) -> list[Section]:
+    """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
+    files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
     lines = [(event.time, event_day_text(event)) for event in files.events]
     lines += [
         (word.time, f"{word.time.astimezone():%Y-%m-%d}: {word.alarm_id} {word}") for word in files.acknowledgements
     ]
-    lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in material.excluded_rows]
+    lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in data.excluded_rows]
     if not lines:
         return []
     heading = "What was done, and tests that do not count"
@@ -81,7 +76,7 @@ def make_events(material: ReportData) -> list[Section]:
 
 
 def event_day_text(event: MaintenanceEvent) -> str:
-    """Day and text of an event."""
+    """Return day and text of an event."""
     return f"{event.time.astimezone():%Y-%m-%d}: {event.text}{' (new baseline)' if event.new_baseline else ''}"
 
 
@@ -90,29 +85,23 @@ def _excluded_line(row: HistoryRow, reason: str) -> str:
     return f"{row.time.astimezone():%Y-%m-%d}: tap test excluded ({reason}){value}"
 
 
-def make_test_cuts(material: ReportData) -> list[Section]:
-    """Date, what was cut, speed, depth, what it sounded like, who heard it."""
-    rows = [
-        [
-            f"{cut.at.astimezone():%Y-%m-%d %H:%M}",
-            cut.program or REFERENCE_CUT,
-            cut.tool,
-            f"{cut.speed_rpm:.0f}",
-            f"{1e3 * cut.depth:.4g}",
-            cut_result_text(cut),
-            cut.by,
-        ]
-        for cut in reversed(material.analysis.cuts)
-    ]
+def make_test_cuts(data: ReportData) -> list[Section]:
+    """Make the table of test cuts, the newest first."""
+    rows = [_cut_row(cut) for cut in reversed(data.analysis.cuts)]
     if not rows:
         return []
     table = DataTable(["when", "cut", "tool", "rpm", "mm", "heard", "by"], rows, "words")
     return [Section("Test cuts", [Paragraph(f"{COUNTING_TEXT}, as they were heard.", is_small=True), table])]
 
 
-def make_tap_tests(material: ReportData) -> list[Section]:
-    """Date, tool, direction, values, words of then; the same as numbers, oldest first."""
-    history = material.analysis.history.current
+def _cut_row(cut: CutEntry) -> list[str]:
+    time, name = f"{cut.at.astimezone():%Y-%m-%d %H:%M}", cut.program or REFERENCE_CUT
+    return [time, name, cut.tool, f"{cut.speed_rpm:.0f}", f"{1e3 * cut.depth:.4g}", cut_result_text(cut), cut.by]
+
+
+def make_tap_tests(data: ReportData) -> list[Section]:
+    """Make the table of tap tests, the newest first, and their numbers, the oldest first."""
+    history = data.analysis.history.current
     heads = ["when", "tool", "in", "frequency (Hz)", "damping (%)", "stiffness (N/µm)", "bearings (N/µm)", "said of it"]
     numbers = NumberTable(TAP_TABLE_HEADS, [_tap_values(row) for row in history])
     table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers, key="taps")
@@ -143,15 +132,16 @@ FAILURE_MODE = (
     "loss of stiffness of bearings, joints and clamping, seen as a fall of the natural frequency that is followed at "
     "the tool tip, spindle standing"
 )
-"""Failure mode."""
+"""Failure mode that is monitored."""
 NOT_DETECTED: Sequence[str] = (
     "damage that leaves the stiffness as it is: pitting, cage, lubrication, seals, unbalance, motor, drawbar below its "
     "clamping force",
     "what heat and speed do to the preload while the spindle turns",
     "what has happened since the newest tap test",
 )
-"""What no tap test shows."""
+"""Damage that no tap test detects."""
 TOO_FEW_CLAMPINGS = f"no alarm by scatter below {MIN_MONITORED_POINTS} clampings"
+"""Confidence of the alarm of a short series."""
 ALARM_CONFIDENCE = (
     "alarm: two clampings running, each with a chance of 1 in 2000 of being scatter alone; of 100 healthy series 5 "
     "raise one in 60 clampings"
@@ -161,39 +151,38 @@ DATE_CONFIDENCE = "dates: 80 % ranges, if the machine is used as before"
 """Confidence of the forecast."""
 
 
-def make_provenance(material: ReportData) -> list[Section]:
-    """The last section, with room for a signature."""
-    points = 0 if material.series.trend is None else len(material.series.trend.points)
+def make_provenance(data: ReportData) -> list[Section]:
+    """Make the last section: what was measured with what, how sure it is, and room for a signature."""
+    points = 0 if data.series.trend is None else len(data.series.trend.points)
+    confidence = ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS
+    tap = data.newest
     rows = [
-        ("machine", material.machine.machine.name),
-        ("folder", material.analysis.folder.path.resolve().name),
-        ("tool, direction", material.series.name),
-        ("newest tap test", f"{material.last.time.astimezone():%Y-%m-%d %H:%M}"),
-        ("hammer held by", material.newest.circumstances.operator or "not said"),
-        ("device", material.newest.circumstances.device or "not known: a recorded file"),
-        *_sensors(material.newest),
+        ("machine", data.machine.machine.name),
+        ("folder", data.analysis.folder.path.resolve().name),
+        ("tool, direction", data.series.name),
+        ("newest tap test", f"{data.last.time.astimezone():%Y-%m-%d %H:%M}"),
+        ("hammer held by", tap.circumstances.operator or "not said"),
+        ("device", tap.circumstances.device or "not known: a recorded file"),
+        *((SENSOR_NAMES[channel.quantity], _sensor_text(channel)) for channel in _channels(tap)),
         ("failure mode watched", FAILURE_MODE),
-        (
-            "confidence",
-            f"{ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS}; {DATE_CONFIDENCE}",
-        ),
-        *[("alarm", _alarm_text(alarm)) for alarm in material.outlook.status.alarms],
+        ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
+        *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
         ("name, date, signature", ""),
     ]
     unseen = Paragraph("It does not see:"), BulletList(NOT_DETECTED)
     return [Section("For whoever signs", [DataTable(["what", "is"], rows, "words"), *unseen])]
 
 
+SENSOR_NAMES = {"force": "hammer", "acceleration": "accelerometer"}
+
+
+def _channels(tap: TapTest) -> Sequence[Channel]:
+    return tap.hits[0].channels or () if tap.hits else ()
+
+
 def _alarm_text(alarm: Alarm) -> str:
     word = alarm.acknowledgement or "not acknowledged"
     return f"{alarm.about}: {alarm.code}, raised {alarm.triggered_at.astimezone():%Y-%m-%d}, {word}; name: {alarm.id}"
-
-
-def _sensors(tap: TapTest) -> list[tuple[str, str]]:
-    """A row for each sensor of a live test."""
-    channels = tap.hits[0].channels if tap.hits else None
-    names = {"force": "hammer", "acceleration": "accelerometer"}
-    return [(names[channel.quantity], _sensor_text(channel)) for channel in channels or ()]
 
 
 def _sensor_text(channel: Channel) -> str:

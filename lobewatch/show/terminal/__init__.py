@@ -1,1 +1,1 @@
-"""The terminal: tables, notes and progress, keys, the operator's screen in characters."""
+"""Print to the terminal, and run the screen of a tap test in it."""

@@ -12,7 +12,8 @@ import os
 import re
 import sys
 import webbrowser
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import starmap
 from typing import Annotated, Any, Literal, Protocol
 
 import typer
@@ -30,49 +31,51 @@ from lobewatch.show.terminal.option_names import with_option_names
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
 REPLACEMENT_CHARACTER = "\ufffd"
-"""Character that is shown for a control character."""
+"""Character shown instead of a control character."""
 
 
 class SafeConsole(Console):
-    """A console that texts cannot steer: of all control characters in them, only newline and tab pass."""
+    """Console that texts cannot control: newline and tab are the only control characters that pass."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        """What is printed, piece by piece; the pieces that rich itself steers the terminal with are marked as such."""
+        """Render without control characters, except those that rich itself writes."""
         for piece in super().render(renderable, options):
             yield piece if piece.control else piece._replace(text=make_printable(piece.text))
 
 
 class SafeTable(Table):
-    """A table whose rows cannot be broken: newline and tab do not pass either."""
+    """Table whose rows cannot be broken: newline and tab do not pass, either."""
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
-        """One row."""
+        """Add a row."""
         super().add_row(*(_one_line(cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
     @property
     def min_table_width(self) -> int:
-        """Characters a line, so that columns that cannot be broken are whole and the others hold a word; 0: any."""
+        """Smallest width (characters) that leaves a word for each column that wraps; 0 for any width."""
         breaking = sum(not column.no_wrap for column in self.columns)
         wholes = (_max_cell_width([column.header, *column.cells]) for column in self.columns if column.no_wrap)
         return sum(wholes) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
 
 
 MIN_COLUMN_WIDTH = 10
-"""Characters that a column that can be broken has at least."""
+"""Smallest width of a column that wraps (characters)."""
 COLUMN_GAP = 2
-"""Between columns."""
+"""Gap between columns (characters)."""
 notes = SafeConsole(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Console for progress and remarks."""
 results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
-"""Console for results, wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
+"""Console for results, wide enough for every table: a narrow terminal may wrap lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
-    """One JSON object (numbers that are not finite become null), or the texts and tables."""
+    """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
-        exact = CONTROL_CHARACTERS.sub(
-            _escape_control, json.dumps(_json_value(payload), allow_nan=False, indent=2, ensure_ascii=False)
-        )
+        import msgspec  # only JSON output waits for it
+
+        plain = _json_value(msgspec.to_builtins(payload, enc_hook=_to_list))
+        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
+        exact = CONTROL_CHARACTERS.sub(_escape_control, exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
         else:
@@ -81,19 +84,41 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
     for text in texts:
         if isinstance(text, str):
             results.file.write(f"{make_printable(text)}\n")
-            continue
-        least = text.min_table_width if isinstance(text, SafeTable) else 0
-        results.print(text, width=max(Console().width, least) if least else None)
+        else:
+            width = text.min_table_width if isinstance(text, SafeTable) else 0
+            results.print(text, width=max(Console().width, width) if width else None)
 
 
-def new_table(*headings: str) -> Table:
-    """An empty table; a heading that begins with "<" names a column of text, with "~" one that may be broken."""
-    rows = SafeTable(box=None, pad_edge=False, header_style="bold")
+def new_table(*headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
+    """Return a table; a heading that begins with "<" names a column of text, with "~" one that may be wrapped."""
+    table = SafeTable(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        breaks = heading.startswith("~")
-        justify: Literal["left", "right"] = "left" if breaks or heading.startswith("<") else "right"
-        rows.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not breaks, overflow="fold")
-    return rows
+        wraps = heading.startswith("~")
+        justify: Literal["left", "right"] = "left" if wraps or heading.startswith("<") else "right"
+        table.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not wraps, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def align_columns(rows: Sequence[Sequence[str]], numbers: Container[int] = ()) -> list[str]:
+    """Return a line of text for each row, its cells as wide as their columns; numbers: columns to align right."""
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+
+    def align(column: int, cell: str) -> str:
+        gap = " " * (widths[column] - cell_len(cell))
+        return gap + cell if column in numbers else cell + gap
+
+    return ["  ".join(starmap(align, enumerate(row))).rstrip() for row in rows]
+
+
+def count_noun(count: int, noun: str) -> str:
+    """Return a number and its noun, in the plural above one.
+
+    >>> count_noun(1, "cut"), count_noun(3, "cut")
+    ('1 cut', '3 cuts')
+    """
+    return f"{count} {noun}{'s' if count > 1 else ''}"
 
 
 def _max_cell_width(cells: Iterable[RenderableType]) -> int:
@@ -106,14 +131,14 @@ def _one_line(cell: str) -> str:
 
 
 def make_printable(text: str) -> str:
-    """Replace control characters except newline and tab, and library names by their options."""
+    """Replace control characters except newline and tab, and name options instead of library fields."""
     return CONTROL_CHARACTERS.sub(
         lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
     )
 
 
 def _escape_control(match: re.Match[str]) -> str:
-    """A control character as JSON writes it inside of text; a newline stands between its lines only."""
+    """Escape a control character as in JSON; newlines occur only between lines."""
     return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
 
 
@@ -124,18 +149,15 @@ def _json_value(value: Any) -> Any:
         return [_json_value(entry) for entry in value]
     if isinstance(value, str):
         return with_option_names(value)
-    if hasattr(value, "tolist"):
-        return _json_value(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def remark_json(remark: Remark) -> dict[str, str]:
-    """One remark."""
-    return {"code": remark.code, "about": remark.about, "text": remark.text, "cure": remark.cure}
+def _to_list(array: Any) -> Any:
+    return array.tolist()
 
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
-    """A line each; those that say the same of several things once."""
+    """Return a line for each remark, the same remark on several things as one."""
     return [f"note: {remark}" for remark in merge_remarks(remarks)]
 
 
@@ -146,20 +168,25 @@ def print_remarks(remarks: Iterable[Remark]) -> None:
 
 
 FORMULA_START = re.compile(r"(?![+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z)[=+\-@\t\r]")
-"""Beginning of a text that a spreadsheet takes for a formula; of a number never. As in report.js."""
+"""Beginning of a text that a spreadsheet reads as a formula, never of a number; as in report.js."""
 
 
 def format_csv(lines: Iterable[Sequence[Any]]) -> str:
-    """A table, its headings first; None is an empty cell."""
+    """Return a CSV table, its headings first."""
     return "".join(",".join(map(format_csv_cell, line)) + "\n" for line in lines)
 
 
 def format_csv_cell(value: Any) -> str:
-    """One cell; before a text that would be a formula stands an apostrophe, which keeps it a text."""
-    text = "" if value is None else str(value)
+    """Return one cell, empty for None; an apostrophe keeps a text that would be a formula a text."""
+    text = "" if value is None else with_option_names(str(value))
     if isinstance(value, str) and FORMULA_START.match(text):
         text = f"'{text}"
     return '"{}"'.format(text.replace('"', '""')) if re.search('[",\r\n]', text) else text
+
+
+def blank_nonfinite(value: Any) -> Any:
+    """Return an empty text for NaN and infinity, other values as they are."""
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
 Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
@@ -172,22 +199,22 @@ WatchToken = Annotated[
 
 
 class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
-    """Answers while its context lasts."""
+    """Server of a screen that answers within its context."""
 
     @property
     def url(self) -> str:
-        """For those who may alter something."""
+        """Address with full access."""
         ...
 
     @property
     def watch_url(self) -> str:
-        """For those who may only watch."""
+        """Address with read-only access."""
         ...
 
 
 @contextlib.contextmanager
 def serve_screen(server: ScreenServer) -> Iterator[None]:
-    """Let a screen answer, and print its address."""
+    """Run a screen server, and print its address."""
     with server:
         show_address(server.url, server.watch_url)
         yield

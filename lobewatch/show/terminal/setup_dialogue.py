@@ -12,7 +12,7 @@ from lobewatch.show.terminal.output import notes
 
 
 def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> MachineDraft:
-    """A draft with the answers of options, by the names of the questions; ValueError that names the option."""
+    """Answer questions by options; raise ValueError that names the option."""
     for question in SETUP_QUESTIONS:
         if question.name in answers:
             draft = _answer_by_option(draft, question, answers)
@@ -27,10 +27,7 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
 
 
 def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
-    """A draft with what a person answers to each question; answers: those of options, which are not asked.
-
-    EOFError where nobody answers any more.
-    """
+    """Ask a person the questions that `answers` of options do not cover; raise EOFError where nobody answers."""
     if questions == SETUP_QUESTIONS:
         _print_notes(
             "Enter takes what stands in [brackets], - leaves something open; nothing is written before the end."
@@ -55,7 +52,7 @@ def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Map
 
 
 def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDraft:
-    """Put one question until its answer is one."""
+    """Ask one question until its answer is valid."""
     _print_notes(
         f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}", f"    for example: {question.example}"
     )

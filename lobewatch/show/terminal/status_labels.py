@@ -12,14 +12,14 @@ STATUS_LABELS = {
 }
 EARLY_ALARM_LABEL = "✗ EARLY ALARM"
 STATUS_CSS_CLASSES = {StatusLevel.GOOD: "ok", StatusLevel.ALARM: "bad"}
-"""Class of a light in the style sheet; the others are doubtful."""
+"""Class of a status in the style sheet, "doubt" for the others."""
 
 
 def status_label(light: StatusLevel, is_early: bool = False) -> str:
-    """The light with its symbol."""
+    """Return the status with its symbol."""
     return EARLY_ALARM_LABEL if is_early else STATUS_LABELS[light]
 
 
 def status_css_class(light: StatusLevel, is_early: bool = False) -> str:
-    """Class of the light in the style sheet."""
+    """Return the class of a status in the style sheet."""
     return "early" if is_early else STATUS_CSS_CLASSES.get(light, "doubt")

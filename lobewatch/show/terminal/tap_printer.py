@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import threading
-from types import TracebackType
 from typing import Protocol, Self
 
 from rich.console import Console
 from rich.markup import escape
 
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.state import ListedHit, TapState, TapStep
 
 PRINT_INTERVAL = 0.05
-"""Between two looks at the test (s)."""
+"""Time between two looks at the test (s)."""
 
 
 class RunningTest(Protocol):
-    """A live tap test; all of it may be used from any thread."""
+    """Live tap test, usable from any thread."""
 
     @property
     def state(self) -> TapState:
-        """The newest picture of it."""
+        """Newest state of the test."""
         ...
 
     def undo(self) -> None:
-        """Take the last good hit back."""
+        """Undo the last good hit."""
         ...
 
     def stop(self) -> None:
@@ -32,29 +32,25 @@ class RunningTest(Protocol):
         ...
 
     def choose(self, key: str, tool: str = "") -> None:
-        """Say what comes after a test, by the key of a choice of its state."""
+        """Choose what follows a test, by the key of one of the choices in its state."""
         ...
 
 
 class TapPrinter:
-    """Prints from a thread of its own between __enter__ and __exit__; the test never waits for it."""
+    """Thread that prints a tap test within its context; the test never waits for it."""
 
     def __init__(self, session: RunningTest, console: Console) -> None:
-        """Nothing is printed yet."""
         self._session, self._console = session, console
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="tap printer", daemon=True)
         self._before = session.state
-        self._told = 0
+        self._n_printed = 0
 
     def __enter__(self) -> Self:
-        """Begin to print."""
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Print what is left."""
         self._ended.set()
         self._thread.join()
@@ -68,7 +64,7 @@ class TapPrinter:
         """Print what is new in a state."""
         before, self._before = self._before, state
         if state.title != before.title:
-            self._told = 0
+            self._n_printed = 0
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
         for check in state.checks:
@@ -84,18 +80,18 @@ class TapPrinter:
         self._print_hits(state)
 
     def _print_hits(self, state: TapState) -> None:
-        for hit in state.hits[self._told :]:
+        for hit in state.hits[self._n_printed :]:
             if hit.earlier:
                 continue
             good = sum(not earlier.flags for earlier in state.hits[: hit.number])
             self._console.print(f"{good:3d} / {state.wanted}  {hit_markup(hit)}  ({hit.peak})")
-        self._told = len(state.hits)
+        self._n_printed = len(state.hits)
 
 
 def hit_markup(hit: ListedHit) -> str:
-    """Symbol, words and cure, with colours."""
+    """Return symbol, words and remedy of a hit, with colors."""
     if hit.undone:
         return "[bold]↶ UNDONE[/]"
     if not hit.flags:
         return "[bold green]✓ GOOD[/]"
-    return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(hit.reason)}"
+    return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(with_option_names(hit.reason))}"

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from types import TracebackType
 from typing import Any, Self
 
 from rich.align import Align
@@ -19,25 +18,25 @@ from rich.panel import Panel
 from rich.text import Text
 
 from dsm import format_rounded
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import SafeConsole
 from lobewatch.show.terminal.tap_printer import RunningTest, hit_markup
 from lobewatch.tap.state import Outcome, TapState, TapStep
 
 PAGE_UP_CODES = ("\x1b[5~", "\xe0I", "\0I")
-"""Page Up as terminals and as Windows send it: presenters and foot switches do."""
+"""Page Up as terminals and Windows send it, by presenters and foot switches."""
 SPECIAL_KEY_CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
-"""Arrows and the like."""
+"""Codes of arrows and other special keys."""
 
 
 class KeyReader:
-    """Keys pressed between __enter__ and __exit__; none where standard input is no terminal."""
+    """Reader of single keys within its context; reads nothing where standard input is no terminal."""
 
     def __init__(self) -> None:
-        """Nothing is changed yet."""
         self._before: list[Any] | None = None
 
     def __enter__(self) -> Self:
-        """Let single keys through; Ctrl-C stays what it is."""
+        """Switch the terminal to single keys; Ctrl-C keeps its meaning."""
         if sys.platform != "win32" and sys.stdin.isatty():
             import termios
             import tty
@@ -46,10 +45,8 @@ class KeyReader:
             tty.setcbreak(sys.stdin, termios.TCSADRAIN)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """The terminal as it was."""
+    def __exit__(self, *_: object) -> None:
+        """Restore the terminal."""
         if sys.platform != "win32" and self._before is not None:
             import termios
 
@@ -57,7 +54,7 @@ class KeyReader:
             self._before = None
 
     def read(self) -> str:
-        """The keys that wait, in lower case; empty where there are none."""
+        """Read the waiting keys in lower case; empty where there are none."""
         if sys.platform == "win32":
             import msvcrt
 
@@ -75,20 +72,20 @@ class KeyReader:
 
 
 def normalize_keys(typed: str) -> str:
-    """What was typed in lower case, Page Up as "u"; other keys that send more than one character count for nothing."""
+    """Return typed keys in lower case, Page Up as "u", without other special keys."""
     for page_up in PAGE_UP_CODES:
         typed = typed.replace(page_up, "u")
     return SPECIAL_KEY_CODES.sub("", typed).lower()
 
 
 KEY_POLL_INTERVAL = 0.05
-"""Between two looks at keys and state (s)."""
+"""Time between two looks at keys and state (s)."""
 MAX_SHOWN_HITS = 6
-"""Newest hits that are listed."""
+"""Largest number of newest hits that are listed."""
 BELL_PAUSE = 0.2
-"""Between two bells (s)."""
+"""Time between two bells (s)."""
 KEY_REPEAT_TIME = 0.7
-"""Undo keys that follow each other faster (s) are one that is held down: it counts once."""
+"""Longest time between undo keys (s) that is one key held down, which counts once."""
 STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.CHECKING: ("…", "black on #56b4e9"),
     TapStep.TAP: ("▼", "black on #56b4e9"),
@@ -100,9 +97,9 @@ STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.DONE: ("■", "black on #2bb48d"),
     TapStep.FAILED: ("✗", "black on #ee8238"),
 }
-"""Symbol and colours of each word, told apart by colour-blind people too."""
+"""Symbol and style of each step, distinct for color-blind people."""
 BELL_COUNTS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
-"""Number of bells."""
+"""Number of bells of each step."""
 STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
     "warn": ("!", "black on #f0e442"),
@@ -110,14 +107,14 @@ STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "unknown": ("?", "black on #dddddd"),
 }
 CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
-"""Key that stands for each choice."""
+"""Key of each choice."""
 
 
 class TerminalScreen:
-    """Shows a test between __enter__ and __exit__ and hands its keys on; the test never waits for it."""
+    """Thread that shows a tap test and reads keys within its context; the test never waits for it."""
 
     def __init__(self, session: RunningTest, console: Console | None = None) -> None:
-        """Nothing is shown yet; console None: standard error."""
+        """Set the console, by default standard error."""
         self._session = session
         self._console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
@@ -134,17 +131,14 @@ class TerminalScreen:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Leave the last picture; the terminal as it was."""
+    def __exit__(self, *_: object) -> None:
+        """Leave the last state on the screen, and restore the terminal."""
         self._ended.set()
         self._thread.join()
         self._live.stop()
-        self._keys.__exit__(kind, error, trace)
+        self._keys.__exit__()
 
     def _watch(self) -> None:
-        """Keys and bells."""
         before = self._session.state
         while not self._ended.wait(KEY_POLL_INTERVAL):
             for key in self._keys.read():
@@ -154,7 +148,7 @@ class TerminalScreen:
             before = state
 
     def handle_key(self, key: str) -> None:
-        """Do what a key stands for; while the sensor is moved, Enter and undo stand for the first choice."""
+        """Handle a key; while the sensor is moved, Enter and undo select the first choice."""
         state = self._session.state
         if state.choices and key != "m":
             if state.word is TapStep.MOVE and key in "\nu":
@@ -173,15 +167,15 @@ class TerminalScreen:
             self._muted = not self._muted
 
     def _choose(self, key: str) -> None:
-        """Hand a choice on, with the name of the next tool."""
+        """Pass a choice on, with the name of the next tool."""
         tool = self._ask_tool() if key == "tool" else ""
         with contextlib.suppress(ValueError):  # no name, or a page was quicker
             self._session.choose(key, tool)
 
     def _ask_tool(self) -> str:
-        """A line that is typed, the screen standing still meanwhile."""
+        """Read a line while the screen stands still."""
         self._live.stop()
-        self._keys.__exit__(None, None, None)
+        self._keys.__exit__()
         self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")
         try:
             return sys.stdin.readline().strip()
@@ -190,7 +184,7 @@ class TerminalScreen:
             self._live.start()
 
     def ring_bells(self, before: TapState, state: TapState) -> None:
-        """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
+        """Ring the bells of a new step or hit once, even if the step of a hit arrives before the hit itself."""
         word, hit = state.word != before.word, len(state.hits) > len(before.hits)
         is_due = word or (hit and not self._ahead_of_hit)
         if word or hit:
@@ -204,7 +198,7 @@ class TerminalScreen:
 
 
 def render_state(state: TapState, muted: bool) -> RenderableType:
-    """One state of a test, as it stands on the terminal."""
+    """Return one state of a test as it is shown."""
     keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
     return Group(*_state_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
 
@@ -212,52 +206,44 @@ def render_state(state: TapState, muted: bool) -> RenderableType:
 def _state_lines(state: TapState) -> Iterator[RenderableType]:
     yield Text(" - ".join(filter(None, (state.title, state.device))), "bold")
     if state.resumed:
-        yield Text(state.resumed)
+        yield Text(with_option_names(state.resumed))
     yield _banner(state)
-    yield Text(state.reason or " ", "bold")
+    yield Text(with_option_names(state.reason) or " ", "bold")
     if state.outcome is not None:
         yield from _outcome_lines(state.outcome)
         return
     yield Text(_level_line(state))
     for check in (check for check in state.checks if not (state.hits and check.passed)):
-        yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
+        yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {with_option_names(check.text)}")
     for hit in state.hits[-MAX_SHOWN_HITS:]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak:>8}  {hit_markup(hit)}")
 
 
 def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
-    """What was measured, the programs, and last the light with the next step."""
-    yield Text(" ".join(outcome.texts))
+    """Return what was measured, the programs, and the status with the next step."""
+    yield Text(with_option_names(" ".join(outcome.texts)))
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
     symbol, style = STATUS_STYLES[outcome.status]
     early = "EARLY " if outcome.is_early else ""
-    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), f"  next: {outcome.next_step}")
+    next_step = f"  next: {with_option_names(outcome.next_step)}"
+    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), next_step)
 
 
 def _banner(state: TapState) -> RenderableType:
-    """The full-width word."""
     symbol, style = STEP_STYLES[state.word]
     trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
     text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 
-def _levels_text(force: float, response: float) -> str:
-    return f"force {format_rounded(force, digits=2)} N rms, {_response_text(response)}"
-
-
-def _response_text(response: float) -> str:
-    return f"response {format_rounded(response, digits=2)} m/s^2 rms"
-
-
 def _level_line(state: TapState) -> str:
-    """Levels, and how far the mean has come."""
+    """Return the levels of the sensors, and how far the mean has settled."""
     texts = []
     if state.levels is not None:
-        force, response = state.levels
-        texts.append(_response_text(response) if force is None else _levels_text(force, response))
+        force, response = (level and format_rounded(level, digits=2) for level in state.levels)
+        texts.append(("" if force is None else f"force {force} N rms, ") + f"response {response} m/s^2 rms")
     if state.mean_change is not None:
-        moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
-        texts.append(f"{moves}; it has settled" if state.settled else moves)
+        text = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
+        texts.append(f"{text}; it has settled" if state.settled else text)
     return "   ".join(texts) or " "

@@ -1,4 +1,4 @@
-"""Bands, boxes, marks and words in the pictures of lobes."""
+"""Test bands, boxes, marks and labels of lobe figures."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from lobewatch.show.figures.drawing import LabelPlacer, new_axes
 from lobewatch.show.figures.lobe_figures import plot_lobes
 from lobewatch.verdicts import Setting, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import LimitBand
+
+pytestmark = pytest.mark.quick
 
 
 def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:

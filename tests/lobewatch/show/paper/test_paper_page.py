@@ -1,4 +1,4 @@
-"""docs/paper.md is what `lobewatch paper --out docs` writes: words, numbers with their units, figures."""
+"""Test that docs/paper.md is what `lobewatch paper --out docs` writes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PALE = 4.0
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """Folder, and what the command printed on a terminal of 80 characters."""
+    """Return the folder, and the output on a terminal of 80 characters."""
     folder = tmp_path_factory.mktemp("out") / "paper"
     done = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["paper", "--out", str(folder)])
     assert done.exit_code == 0, done.output
@@ -51,7 +51,7 @@ def test_the_figure_is_the_one_in_docs(written: tuple[Path, str], name: str) -> 
 
 
 def pixels(path: Path) -> NDArray[np.float64]:
-    """Colours of a picture, 0 to 255, three dots each way taken as one."""
+    """Return the pixels of a figure, 0 to 255, at a third of its resolution."""
     with Image.open(path) as picture:
         return np.asarray(picture.convert("RGB").reduce(3), dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""Tables of verdicts: the four words, and no number that is cut, however narrow the terminal."""
+"""Test tables of verdicts: the four words, and no number cut off in a narrow terminal."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ from lobewatch.show.programs.verdicts import (
 )
 from lobewatch.show.terminal.output import SafeConsole, emit
 from lobewatch.verdicts import Stability, Verdict
+
+pytestmark = pytest.mark.quick
 
 
 def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> ProgramTable:

@@ -1,4 +1,4 @@
-"""The report: its first screen, the numbers that go with it, the page of all machines, one light everywhere."""
+"""Test the report: its summary, its numbers, the page of a fleet, and one status everywhere."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.report.page import GAUGE_WIDTH, make_gauge, render_page
 from lobewatch.show.report.report import render_fleet, render_report, spark_points
 from lobewatch.show.report.report_data import collect_report_data
+from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -30,7 +31,7 @@ def run(*arguments: object) -> Result:
 
 
 def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
-    """Of the figure with this button."""
+    """Return the numbers of the figure with this button."""
     button = re.search(rf'data-numbers="([^"]+)" data-name="{name}"', html)
     assert button is not None, name
     block = re.search(rf'id="{button[1]}">(.*?)</script>', html, re.DOTALL)
@@ -42,7 +43,7 @@ def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
 
 @pytest.fixture
 def worn(shop: Shop) -> Shop:
-    """One program, two directions that fall by 0.3 % every 15 days, ten times, and stand at -3.0 %."""
+    """Return a machine whose frequency drops in both directions by 0.3 % every 15 days, ten times."""
     shop.run(("A <1>", 12900, 1.5))
     for i in range(11):
         shop.tap_both(15 * i, 1 - 0.003 * i + 0.0003 * (-1) ** i)
@@ -55,7 +56,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     html = render_report(logbook, "reference", "x", now)
     first = first_screen(html)
     standing = logbook.status(now)
-    light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.light]
+    light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.status]
     for words in (
         light,
         "falling since 2026-01-",
@@ -65,7 +66,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
         "Tap next by 2026-07-14",
     ):
         assert words in first, words
-    assert standing.next_step in unescape(first)
+    assert with_option_names(standing.next_step) in unescape(first)
     assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
     assert first.count("<figure>") == 2
     heads, lines = numbers(html, "natural-frequency")
@@ -86,12 +87,12 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
 
 
 def first_screen(html: str) -> str:
-    """What stands above the first heading of a section; any space is a plain one."""
+    """Return the part above the first section, with plain spaces."""
     return html[html.index('<div class="first">') : html.index("<h2")].replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
-    """Of x and y, alike in all: one reason, a line each with its change; what is in the tables is no reason again."""
+    """Test that x and y share one reason, and that reasons do not repeat the tables."""
     shop.run(("A", 12900, 1.5), ("B", 8700, 0.4))
     for i in range(12):
         shop.tap_both(15 * i, math.exp(-0.01 * i + 0.0003 * (-1) ** i))
@@ -125,7 +126,7 @@ def test_a_gauge_tells_a_small_fall_from_a_large_one() -> None:
 
 
 def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
-    """No picture without a line in it, no change from nothing, no date that nobody can tell."""
+    """Test that a single test has no trend, no change and no date."""
     shop.tap(0, 1713.0)
     html = render_report(shop.logbook, "reference", "x")
     for words in ("history too short", "Until when", "-0 %", "0.00 %", "until when", "<h2>Natural frequency", "gauge("):
@@ -140,7 +141,7 @@ def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
 
 
 def test_a_response_is_shown_from_below_its_lowest_mode_on(shop: Shop) -> None:
-    """Lower down what an accelerometer says is divided by next to nothing, and a picture of it has no modes."""
+    """Test the lower end: below it, division by omega^2 hides the modes."""
     shop.edit("band_hz = [1200, 2200]", "")
     shop.tap(0, 1713.0)
     material = shop.logbook.query(collect_report_data, "reference", "x", None)
@@ -185,7 +186,7 @@ def test_a_name_cannot_end_the_style_sheet() -> None:
 
 
 def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
-    """Of dashboard, report and page of all machines, for a machine tapped at random."""
+    """Return the status in dashboard, report and fleet report for a machine tapped at random."""
     random = np.random.default_rng(seed)
     machine = type(shop)(path / "m")
     machine.put("")

@@ -1,4 +1,4 @@
-"""Sections of the report: a new one is one function; what several need is made once; what is damaged is left out."""
+"""Test report sections: each is one function, shared data is computed once, damaged tests are left out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Shop = Any
 
 
 def hours(material: ReportData) -> list[Section]:
-    """Hours at which the tests were made: all kinds of parts."""
+    """Make a section with all kinds of parts."""
     taken = [float(row.time.hour) for row in material.rows]
     figure, (axes,) = new_axes(1, (4.0, 2.0))
     axes.hist(np.array(taken))

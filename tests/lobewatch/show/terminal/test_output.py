@@ -1,4 +1,4 @@
-"""What is printed: no text steers the terminal, and JSON is exact."""
+"""Test printed results: no text controls the terminal, and JSON is exact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The address of a page: printed always, opened only where somebody sits at a screen."""
+"""Test the address of a page: always printed, opened only on a desktop."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import sys
 import pytest
 
 from lobewatch.show.terminal.output import show_address
+
+pytestmark = pytest.mark.quick
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

@@ -1,4 +1,4 @@
-"""The terminal screen and the lines for a log: words, symbols, keys, bells, colours that may be off."""
+"""Test the terminal screen and the lines for a log: words, symbols, keys and bells."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STATE = TapState(
 
 
 class Session:
-    """A test that somebody else moves on, and that counts what it is asked for."""
+    """Tap test that is moved on from outside, and counts its calls."""
 
     def __init__(self, state: TapState = STATE) -> None:
         self.state = state
@@ -139,7 +139,7 @@ def test_colours_go_without_and_the_words_stay() -> None:
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A keyboard: what is written to it arrives at standard input."""
+    """Return a keyboard whose text arrives at standard input."""
     pty = pytest.importorskip("pty")
     keyboard, end = pty.openpty()
     with os.fdopen(end, "r") as stdin:

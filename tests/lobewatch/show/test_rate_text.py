@@ -1,4 +1,4 @@
-"""The rate as people read it: within its interval, and no zero with a sign of a fall."""
+"""Test the rate in words: within its interval, and no negative zero."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import pytest
 
 from lobewatch.monitoring.forecast import Rate
 from lobewatch.show.trend import rate_text
+
+pytestmark = pytest.mark.quick
 
 
 @pytest.mark.parametrize(

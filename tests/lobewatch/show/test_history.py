@@ -1,4 +1,4 @@
-"""Short names of tap tests in `history`: an end of the identity that no other has."""
+"""Test short names of tap tests: an end of the identity that no other has."""
 
 from __future__ import annotations
 

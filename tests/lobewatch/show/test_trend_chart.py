@@ -1,4 +1,4 @@
-"""The chart of characters: points and fitted line over all dates, falls downwards."""
+"""Test the chart of characters: points and fitted line over all dates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Test cuts in the diagram of a cut: which belong there, where they stand, and that the report has them."""
+"""Test which test cuts a lobe diagram shows, where, and that the report lists them."""
 
 from __future__ import annotations
 

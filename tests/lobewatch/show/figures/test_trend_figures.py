@@ -1,4 +1,4 @@
-"""Figures: what is drawn stands where the numbers say."""
+"""Test that figures draw their data at the right places."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def drawn(name: str, speed_rpm: float, depth_mm: float) -> Verdict:
 
 
 def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a_phone() -> None:
-    """report.css enlarges them; programs without room for their name keep their mark."""
+    """Test labels that report.css enlarges: programs without room for a name keep their mark."""
     speed = np.linspace(3000.0, 24000.0, 50)
     names = ["A: slot at 12 600 rpm", "B: slot at 6 200 rpm", "C: slot at 16 000 rpm"]
     places = [(12600.0, 2.5), (6200.0, 0.8), (16000.0, 0.5)]

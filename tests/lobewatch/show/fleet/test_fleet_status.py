@@ -1,4 +1,4 @@
-"""All machines as text: when each is due, and how far it has fallen."""
+"""Test the fleet as text: due dates and frequency drops."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import pytest
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.fleet.fleet_status import fleet_rows, fleet_text
 from lobewatch.show.report.report import render_fleet
+
+pytestmark = pytest.mark.quick
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""

@@ -1,4 +1,4 @@
-"""Tables with commas: each cell is what was put in, and none is a formula to a spreadsheet."""
+"""Test CSV: each cell is read back, and none is a formula in a spreadsheet."""
 
 from __future__ import annotations
 

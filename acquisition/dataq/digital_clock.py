@@ -36,7 +36,9 @@ class DigitalClock:
         """How many of these scans come before the next that is missing, and how many are missing there (0: none).
 
         high: the input in consecutive scans, shape (n,), n >= 1. The place is that of the next edge, at most a period
-        late; the number is the smallest that fits, right but for whole periods. DeviceError where there is no wave.
+        late; the number is the smallest that fits, right but for whole periods and two scans. A wave that jumps up at
+        the gap may do so within UNEVEN scans of a regular edge; up to UNEVEN scans more are then not counted.
+        DeviceError where there is no wave.
         """
         before = np.concatenate(([self._high], high[:-1]))
         for at in map(int, np.flatnonzero(high & ~before)):

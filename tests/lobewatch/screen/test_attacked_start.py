@@ -60,7 +60,7 @@ def ask(server: WebThread, method: str, path: str, body: bytes = b"", **changed:
     """Status and answer for a request as the page makes it; headers can be changed, or left out by None."""
     host = server.origin.removeprefix("http://")
     headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {TOKEN}"} | changed
-    connection = http.client.HTTPConnection(host, timeout=30)
+    connection = http.client.HTTPConnection(host, timeout=60)
     with contextlib.closing(connection):
         connection.putrequest(method, path, skip_host=True)
         for name, value in ({"Content-Length": str(len(body))} | headers).items():
@@ -76,7 +76,7 @@ def ask(server: WebThread, method: str, path: str, body: bytes = b"", **changed:
 
 def connected(server: WebThread) -> socket.socket:
     """A connection on which nothing is sent yet."""
-    return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=10)
+    return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=60)
 
 
 def head(server: WebThread) -> bytes:

@@ -42,7 +42,8 @@ class DigitalClock:
         """Return how many scans precede the next gap, and how many are missing there (0: none).
 
         The place is that of the next edge, at most a period late. The number is the smallest that fits, right except
-        for whole periods. DeviceError if there is no wave.
+        for whole periods and two scans. If the wave jumps up at the gap within CLOCK_PERIOD_TOLERANCE scans of a
+        regular edge, up to that many scans more are not counted. DeviceError if there is no wave.
 
         Parameters
         ----------

@@ -158,7 +158,9 @@ def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) 
     from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    emulated = emulate_machine(driver=find_driver(name), direction=options.direction, axes_angle=options.askew, **shared)
+    emulated = emulate_machine(
+        driver=find_driver(name), direction=options.direction, axes_angle=options.askew, **shared
+    )
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
     return Emulation(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
     from lobewatch.tap.cut_recording import CutState
-    from lobewatch.tap.evaluated_hits import StatePublisher
+    from lobewatch.tap.state import StatePublisher
 
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])

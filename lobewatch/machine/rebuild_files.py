@@ -25,7 +25,7 @@ DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
 LOST_ENTRIES_HINT = (
     "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
-    "(folder_updates.add_event, machine.folder_updates.exclude_entry, MachineFolder.accept, folder_updates.store_cut)"
+    "(folder_updates.add_event, exclude_entry, MachineFolder.accept, folder_updates.store_cut)"
 )
 """Advice on entries that no copy of the journal has."""
 

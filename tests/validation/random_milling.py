@@ -21,7 +21,7 @@ FEED_ANGLE: dict[Literal["x", "y"], float] = {"x": 0.0, "y": math.pi / 2}
 class RandomMilling:
     """A machine and all of a program but its depth. SI units; modes are (frequency Hz, damping ratio, stiffness N/m).
 
-    For `lobes`: Cut(teeth, immersion, direction, tangential, radial, helix_lag), and `modes(stream_states)` as Mode(*mode).
+    For `lobes`: Cut(teeth, immersion, direction, tangential, radial, helix_lag), and `modes(feed)` as Mode(*mode).
     """
 
     x: Modes

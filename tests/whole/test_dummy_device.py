@@ -61,7 +61,7 @@ def emulated(*options: str) -> Iterator[str]:
             yield json.loads(served)["port"]
         finally:
             process.terminate()
-            _, err = process.communicate(timeout=20)
+            _, err = process.communicate(timeout=100)
             assert (process.returncode, "Traceback" in err) == (130, False), err
 
 

@@ -26,7 +26,7 @@ finally:
 def imported(code: str, *arguments: str, cwd: Path, exit_code: int = 0) -> set[str]:
     """Modules that are there after some code."""
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], cwd=cwd, capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code, *arguments], cwd=cwd, capture_output=True, text=True, timeout=110, check=False
     )
     assert done.returncode == exit_code, done.stderr
     return set(done.stderr.split())

@@ -126,16 +126,16 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
         ),
         Contradiction.CHATTERS: (
             f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
-            "cut it again, or take it out with machine.folder_updates.exclude_entry; tap again if it stays",
+            "cut it again, or take it out with folder_updates.exclude_entry; tap again if it stays",
         ),
         Contradiction.STABLE: (
             f"stable {at}, {wrong}: a slip, another depth or speed than told?",
-            "cut it again, or take it out with machine.folder_updates.exclude_entry",
+            "cut it again, or take it out with folder_updates.exclude_entry",
         ),
         Contradiction.POWER: (
             f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
             "another depth, worn edges?",
-            "read it again, or take the cut whose power was misread out with machine.folder_updates.exclude_entry; "
+            "read it again, or take the cut whose power was misread out with folder_updates.exclude_entry; "
             "its word counts",
         ),
     }[contradicting.contradiction]

@@ -6,12 +6,19 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from acquisition import DeviceError
-from acquisition.dataq.stream import CLOCK_TRAINING_PERIODS, HELD_BACK_BYTES, CodeBlock, ScanDecoder
+from acquisition.dataq.stream import (
+    CLOCK_BIT,
+    CLOCK_PERIOD_TOLERANCE,
+    CLOCK_TRAINING_PERIODS,
+    HELD_BACK_BYTES,
+    CodeBlock,
+    ScanDecoder,
+)
 
 N = 4000
 
@@ -46,6 +53,10 @@ def test_an_even_wave_is_no_loss(period: float, start: float, cuts: list[int]) -
     assert np.array_equal(codes, words[: N - -(-HELD_BACK_BYTES // 6), :2].T)
 
 
+EDGE_ERROR = 1 + 2 / CLOCK_TRAINING_PERIODS
+"""Error of an interval between two edges (scans): one scan for each edge and for the measured period."""
+
+
 @settings(max_examples=150, deadline=None)
 @given(
     period=st.floats(8.0, 99.0),
@@ -54,22 +65,28 @@ def test_an_even_wave_is_no_loss(period: float, start: float, cuts: list[int]) -
     inside=st.integers(0, 5),
     cuts=st.lists(st.integers(0, 6 * (N - 96)), max_size=10),
 )
+@example(period=51.4296875, packets=6, at=2452, inside=0, cuts=[])  # jumps up at the cut, where an edge is due
+@example(period=17.543, packets=9, at=2252, inside=2, cuts=[])  # so does the edge after it
+@example(period=30.5, packets=6, at=2338, inside=4, cuts=[])  # three scans beyond whole periods, in two parts
+@example(period=10.24, packets=6, at=2413, inside=2, cuts=[])
 def test_whole_scans_that_are_lost_are_told_with_their_number(
     period: float, packets: int, at: int, inside: int, cuts: list[int]
 ) -> None:
     """Lose three packets of 64 bytes, 32 scans of 6 bytes. A jump of the wave at the cut separates two parts."""
     lost = 32 * packets // 3
     beyond = min(lost % period, -lost % period)
-    stream = scans(period).tobytes()
-    cut = 6 * at + inside
+    words = scans(period)
+    stream, high = words.tobytes(), words[:, 2] & CLOCK_BIT != 0
+    cut, jumps_up = 6 * at + inside, bool(high[at + lost] and not high[at - 1])
     found = gaps(decoded(stream[:cut] + stream[cut + 6 * lost :], cuts))
     if beyond < 1:  # as good as whole periods
         return
     if not found:
-        assert beyond <= 2.5
+        assert beyond <= (1 + jumps_up) * CLOCK_PERIOD_TOLERANCE + EDGE_ERROR
         return
     assert all(at <= place <= at + 2 * period + 2 for place, _ in found)
-    assert abs((sum(number for _, number in found) - lost + period / 2) % period - period / 2) <= 2
+    error = abs((sum(number for _, number in found) - lost + period / 2) % period - period / 2)
+    assert error <= EDGE_ERROR + 0.5 * len(found) + jumps_up * CLOCK_PERIOD_TOLERANCE
 
 
 def test_bytes_that_are_lost_are_told_once() -> None:

@@ -20,7 +20,7 @@ RATE = 25600.0
 def run(arguments: list[object], *plugins: Path) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, plugins))}
     command = [sys.executable, "-m", "lobewatch.cli", *map(str, arguments)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=110)
 
 
 def rows(columns: np.ndarray) -> str:
@@ -97,7 +97,7 @@ def test_a_broken_package_is_named_and_disables_nothing(hit: Path, tmp_path: Pat
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(broken), str(PLUGIN)])}
     command = [sys.executable, "-c", script, str(hit), str(strange)]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=60)
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=110)
     count, message = said.stdout.splitlines()
     assert count == "1"
     assert "of no format that is known here; export it as one of these: recording of the dummy (.dum), tap" in message

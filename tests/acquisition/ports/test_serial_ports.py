@@ -78,7 +78,7 @@ def test_a_sleeping_consumer_never_blocks_the_reader_and_loses_nothing_below_the
     sent = bytes(range(256)) * 4096
     writer = threading.Thread(target=write_all, args=(cable.master, sent))
     writer.start()
-    writer.join(timeout=20)  # a pseudo-terminal holds some kB: that all was written, the reader has read
+    writer.join(timeout=60)  # a pseudo-terminal holds some kB: that all was written, the reader has read
     assert not writer.is_alive()
     assert read_until(link, len(sent)) == sent
     assert link.overruns == 0
@@ -91,7 +91,7 @@ def test_beyond_the_limit_the_oldest_is_thrown_away_and_counted(
     sent = os.urandom(950_000)
     writer = threading.Thread(target=write_all, args=(cable.master, sent))
     writer.start()
-    writer.join(timeout=20)
+    writer.join(timeout=60)
     assert not writer.is_alive()
     os.write(cable.master, b"the end")
     kept = b""

@@ -79,7 +79,7 @@ def test_a_whole_tap_test_through_the_bridge(machines: tuple[MachineFolder, Mach
                 tap = session.run()
             finally:
                 bridge.terminate()
-                _, err = bridge.communicate(timeout=20)
+                _, err = bridge.communicate(timeout=100)
     assert (bridge.returncode, "Traceback" in err) == (130, False), err
     assert "DI-4108 on " in err
     assert tap.circumstances.device.startswith("DI-4108, serial number")

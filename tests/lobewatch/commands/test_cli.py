@@ -418,7 +418,7 @@ def test_the_emulator_command_serves_a_port_and_ends_quietly(
         assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
         assert run("tap", "trial", "--port", served["port"]).code == 0
         process.send_signal(ended_by)
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=100)
     assert process.returncode == 130
     assert "Traceback" not in err
     run("init", "plain")

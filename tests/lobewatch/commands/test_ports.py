@@ -304,7 +304,7 @@ def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFold
         assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
         assert "dataq: DI-4108" in run("ports", "--port", served["port"]).out
         process.terminate()
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=100)
     assert process.returncode == 130
     assert "Traceback" not in err
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 
 from acquisition import Description
 from lobewatch import Logbook
@@ -20,6 +19,7 @@ from lobewatch.logbook.replay_preview import preview_replay
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.measurement.share_work import WorkerPool, Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit
+from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 
 SAID = Description(date_pattern="%Y-%m-%d")
 CLUSTER = Workers(scheduler="tcp://bad:1")

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster, Security
-from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 from typer.testing import CliRunner
 
 from acquisition import DataError, Description
@@ -25,6 +24,7 @@ from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.measurement.share_work import Workers, scheduler_remarks, share_work
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from tests.lobewatch.authority import certify
+from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 
 PAGE = (Path(__file__).parents[3] / "docs" / "performance-replay.md").read_text("utf-8")
 SAID = Description(date_pattern="%Y-%m-%d")

@@ -70,7 +70,7 @@ def serving(handler: type[socketserver.BaseRequestHandler]) -> Iterator[tuple[in
 
 def post(port: int, alerts: list[dict[str, Any]]) -> None:
     """Say what Prometheus would; ConnectionError for as long as nobody listens."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("POST", "/api/v2/alerts", json.dumps(alerts), {"Content-Type": "application/json"})
         assert connection.getresponse().status == 200

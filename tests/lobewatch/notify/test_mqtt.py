@@ -57,7 +57,7 @@ def test_what_a_killed_broker_was_not_told_goes_with_the_next_command(mill: Path
     told = run("exclude", mill, MachineFolder(mill).taps()[-1].id, "--reason", "another tool")
     assert told.exit_code == 0
     assert "nobody was told by MQTT" in told.stderr
-    assert time.monotonic() - begun < 20
+    assert time.monotonic() - begun < 90
     assert json.loads((mill / "unsent.json").read_text())["topic"] == "hall/1/m/standing"
     mosquitto.start()
     assert run("event", mill.parent / "n", "oiled").exit_code == 0

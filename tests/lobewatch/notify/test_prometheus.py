@@ -96,7 +96,7 @@ def wait_for_alerts(port: int) -> list[dict[str, Any]]:
     for _ in range(300):
         with (
             suppress(OSError, ValueError, http.client.HTTPException),
-            closing(http.client.HTTPConnection("127.0.0.1", port, timeout=5)) as connection,
+            closing(http.client.HTTPConnection("127.0.0.1", port, timeout=60)) as connection,
         ):
             connection.request("GET", "/api/v1/alerts")
             with connection.getresponse() as answer:

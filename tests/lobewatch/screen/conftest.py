@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
+from selenium.common.exceptions import JavascriptException, NoSuchElementException, StaleElementReferenceException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -34,6 +35,20 @@ AudioContext.prototype.createOscillator = function () {
   return tone;
 };
 """
+KEEP_TEXTS = """
+window.texts = {};
+new MutationObserver(() => {
+  for (const id of ["text", "reason", "stop-text", "toast", "unit"]) {
+    const kept = (window.texts[id] ??= []), text = document.getElementById(id)?.textContent;
+    if (text && text !== kept.at(-1)) kept.push(text);
+  }
+}).observe(document, { childList: true, characterData: true, subtree: true });
+"""
+"""Keeps every text of these parts: some are there for a moment, which a slow computer may miss."""
+IS_READY = "document.readyState === 'complete' && location.href !== 'about:blank'"
+AFTER_LAYOUT = "const ready = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => ready()))"
+PATIENCE = 60.0
+"""Time after which a page is given up (s): far more than it needs on any computer."""
 AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
 Session = Any
 """ScriptedSession of tests/conftest.py."""
@@ -49,10 +64,12 @@ class Browser:
         options.binary_location = CHROMIUM or ""
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-        self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNT_TONES})
+        self.driver.set_script_timeout(PATIENCE)
+        for script in (COUNT_TONES, KEEP_TEXTS):
+            self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": script})
 
     def open(self, url: str, size: tuple[int, int] = (1280, 800), scheme: str = "light") -> None:
-        """Open a page in a window of this size, with an empty profile."""
+        """Open a page in a window of this size, with an empty profile, and wait until it is loaded and laid out."""
         self.prefer(scheme)
         self.driver.execute_cdp_cmd(
             "Storage.clearDataForOrigin", {"origin": url.partition("/#")[0], "storageTypes": "all"}
@@ -62,25 +79,49 @@ class Browser:
         self.log("browser")
         self.log("performance")
         self.driver.get(url)
+        self.wait_until_ready(size)
+
+    def reload(self) -> None:
+        """Load the page again, and wait until it is laid out."""
+        self.driver.refresh()
+        self.wait_until_ready()
+
+    def wait_until_ready(self, size: tuple[int, int] | None = None) -> None:
+        """Wait until the page is loaded with its scripts, has this size, and is laid out."""
+        self.wait(lambda: self.ask(IS_READY))
+        self.wait(lambda: size is None or self.ask("[innerWidth, innerHeight]") == list(size))
+        self.driver.execute_async_script(AFTER_LAYOUT)
 
     def resize(self, size: tuple[int, int]) -> None:
+        """Give the window this size, and wait until the page is laid out in it."""
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        self.wait(lambda: self.ask("[innerWidth, innerHeight]") == list(size))
+        self.driver.execute_async_script(AFTER_LAYOUT)
 
     def prefer(self, scheme: str, media: str = "") -> None:
         """Set the color scheme ("light" or "dark") and the medium ("print")."""
         wish = {"name": "prefers-color-scheme", "value": scheme}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": [wish]})
+        state = f"[matchMedia('(prefers-color-scheme: {scheme})').matches, matchMedia('print').matches]"
+        self.wait(lambda: self.ask(state) == [True, media == "print"])
+        self.driver.execute_async_script(AFTER_LAYOUT)
 
     def part(self, name: str) -> WebElement:
         return self.driver.find_element(By.ID, name)
 
     def wait(self, what: Callable[[], object]) -> None:
-        WebDriverWait(self.driver, 20, 0.02).until(lambda _: what())
+        """Wait until this is true; a part that is replaced meanwhile is looked at again."""
+        changing = (JavascriptException, NoSuchElementException, StaleElementReferenceException)
+        WebDriverWait(self.driver, PATIENCE, 0.02, changing).until(lambda _: what())
 
     def see(self, name: str, text: str) -> None:
         """Wait until a part of the page shows this text."""
         self.wait(lambda: text in self.part(name).text)
+
+    def saw(self, name: str, text: str) -> None:
+        """Wait until a part of the page has shown this text since it was loaded, if only for a moment."""
+        self.wait(lambda: any(text in shown for shown in self.ask("window.texts")[name]))
 
     def press(self, *keys: str) -> None:
         ActionChains(self.driver).send_keys(*keys).perform()

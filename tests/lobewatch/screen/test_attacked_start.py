@@ -59,7 +59,7 @@ def ask(server: WebServerThread, method: str, path: str, body: bytes = b"", **ch
     """Status and answer for a request as the page makes it; headers can be changed, or left out by None."""
     host = server.origin.removeprefix("http://")
     headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {TOKEN}"} | changed
-    connection = http.client.HTTPConnection(host, timeout=30)
+    connection = http.client.HTTPConnection(host, timeout=60)
     with contextlib.closing(connection):
         connection.putrequest(method, path, skip_host=True)
         for name, value in ({"Content-Length": str(len(body))} | headers).items():
@@ -75,7 +75,7 @@ def ask(server: WebServerThread, method: str, path: str, body: bytes = b"", **ch
 
 def connected(server: WebServerThread) -> socket.socket:
     """Open a connection without sending anything."""
-    return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=10)
+    return socket.create_connection(("127.0.0.1", int(server.origin.rpartition(":")[2])), timeout=60)
 
 
 def head(server: WebServerThread) -> bytes:

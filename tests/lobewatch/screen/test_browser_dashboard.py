@@ -24,6 +24,7 @@ Browser = Any
 BAR = """const { backgroundSize, backgroundPosition } = getComputedStyle(arguments[0], "::after");
 return [backgroundSize, backgroundPosition];"""
 """Widths and places of what the bar below a light is made of: the line of the alarm, the fall, what is below them."""
+EXTENT = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
 LINES = [4.0 * line for line in range(1, 1000)]
 
 
@@ -75,7 +76,7 @@ def test_twelve_machines_fit_one_desktop_screen(browser: Browser, dashboard: Das
     browser.open(dashboard.url, (1280, 657))
     browser.wait(lambda: len(keys(browser)) == 12)
     assert keys(browser)[-1] in ("well", "worn")
-    assert browser.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [1280, 657]
+    browser.wait(lambda: browser.ask(EXTENT) == [1280, 657])
     for key in keys(browser):
         for part in ("light", "about", "actions"):
             box = row(browser, key).find_element(By.CLASS_NAME, part).rect
@@ -132,7 +133,7 @@ def test_a_click_shows_one_light_or_those_to_be_tapped(browser: Browser, dashboa
     assert "worn" not in keys(browser)
     browser.part("filter-alarm").click()
     browser.see("none", "No machine of this kind.")
-    browser.driver.refresh()
+    browser.reload()
     browser.wait(lambda: browser.part("filter-alarm").get_attribute("aria-pressed") == "true")
     browser.part("filter-all").click()
     browser.wait(lambda: len(keys(browser)) == 12)

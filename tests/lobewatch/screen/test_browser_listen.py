@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lobewatch.tap import cut_recording
 
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
@@ -31,6 +32,8 @@ CAPITALS = """(() => { const pen = document.createElement('canvas').getContext('
 const { fontWeight, fontSize, fontFamily } = getComputedStyle(document.getElementById('text'));
 pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
 return pen.measureText('H').actualBoundingBoxAscent; })()"""
+LONG = 100.0
+"""Time after which the page is not waited for any more (s)."""
 TOKEN = "a-token-of-the-test"
 
 
@@ -93,6 +96,13 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
     setting = find_cut_setting(folder.machine, PROGRAM, SPEED, depth_mm)
     emulated = emulate_cut(folder, find_driver("taps"), setting, passage=PASSAGE)
     told: list[str] = []
+    is_open, hear = threading.Event(), cut_recording.acquire_cut
+
+    def hear_when_open(*given: Any) -> Any:
+        is_open.wait(LONG)
+        return hear(*given)
+
+    monkeypatch.setattr(cut_recording, "acquire_cut", hear_when_open)
     with emulated.device as device:
         said = ["--program", PROGRAM, "--speed", SPEED, "--depth", depth_mm, "--port", device.port, "--screen"]
         command = ["lobewatch", "listen", folder.path, *said, "--token", TOKEN]
@@ -103,20 +113,22 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
             browser.wait(lambda: address(collected(told, capsys)))
             browser.open(address("".join(told)), SIZES[0])
             browser.see("title", PROGRAM)
-            browser.see("unit", "left")
-            browser.see("reason", "now begin the cut")
-            assert browser.part("text").text == "LISTENING"
+            is_open.set()
+            browser.saw("text", "LISTENING")
+            browser.saw("unit", "left")
+            browser.saw("reason", "now begin the cut")
             browser.wait(lambda: browser.part("level-now").text not in ("", "-"))
-            browser.see("text", "CUTTING")
-            browser.see("unit", "of cut")
+            browser.saw("text", "CUTTING")
+            browser.saw("unit", "of cut")
             browser.see("text", text)
         finally:
+            is_open.set()
             listening.join()
     (cut,) = Logbook.open(folder.path).cuts
     assert cut.word == kind
     browser.see("device", "lobewatch has ended; this is its last picture")
-    assert f"saved as {cut.id}" in browser.part("device").text
-    assert f"{cut.speed_rpm:.0f} rpm" in browser.part("figures").text
+    browser.see("device", f"saved as {cut.id}")
+    browser.see("figures", f"{cut.speed_rpm:.0f} rpm")
     if cut.chatter_frequency_hz is not None:
         assert browser.part("figure").text == f"{cut.chatter_frequency_hz:.0f} Hz"
     assert browser.part("next").text.startswith("Next: ")

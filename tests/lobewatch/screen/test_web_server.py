@@ -36,7 +36,7 @@ def ask(server: WebServerThread, method: str, path: str, body: str = "", **chang
     """Status, content and headers for a request as the page makes it; headers can be changed, or left out by None."""
     host = server.origin.removeprefix("http://")
     headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {server.token}"} | changed
-    connection = http.client.HTTPConnection(host, timeout=10)
+    connection = http.client.HTTPConnection(host, timeout=60)
     connection.putrequest(method, path, skip_host=True)
     for name, value in headers.items():
         if value is not None:
@@ -73,7 +73,7 @@ def follow(server: WebServerThread, talk: Received, path: str = "/feed", token: 
 
 async def next_state(feed: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
     while True:
-        message = await feed.receive(timeout=10)
+        message = await feed.receive(timeout=60)
         if message.type is aiohttp.WSMsgType.TEXT and message.data != "{}":
             return dict(json.loads(message.data))
         assert message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY)
@@ -146,7 +146,7 @@ def test_nothing_is_looked_at_while_nothing_changes(session: Session) -> None:
     async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
         kinds.append((await next_state(feed))["kind"])
         for _ in range(2):
-            assert await feed.receive_str(timeout=10) == "{}"
+            assert await feed.receive_str(timeout=60) == "{}"
         assert watched.looks <= 10
         await asyncio.to_thread(session.show, TapStep.WAIT)
         kinds.append((await next_state(feed))["kind"])
@@ -241,7 +241,7 @@ def test_what_is_no_request_is_answered_with_400_and_nothing_in_the_terminal(
     with ScreenServer(session, token=TOKEN) as server:
         host, port = server.origin.removeprefix("http://").split(":")
         for nonsense in (b"\x00\xff\x00\r\n\r\n", b"GET / HTTP/1.1\r\nBad Header\r\n\r\n"):
-            with socket.create_connection((host, int(port)), timeout=10) as raw:
+            with socket.create_connection((host, int(port)), timeout=60) as raw:
                 raw.sendall(nonsense)
                 assert raw.recv(4096).split(b" ")[1] == b"400"
     assert capfd.readouterr() == ("", "")
@@ -262,7 +262,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
         assert (first["kind"], first["word"], first["good"], first["wanted"]) == ("checking", "CHECKING", 0, 10)
         assert [one["passed"] for one in first["checks"]] == [True, True, True, False]
         session.hit(HitFlags.DOUBLE_HIT | HitFlags.TOO_SOFT, "Second peak.")
-        curves = await feed.receive(timeout=10)
+        curves = await feed.receive(timeout=60)
         assert curves.type is aiohttp.WSMsgType.BINARY
         shown = await next_state(feed)
         assert (shown["kind"], shown["word"], shown["reason"]) == ("refused", "DOUBLE HIT, TOO SOFT", "Second peak.")
@@ -270,7 +270,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
         assert (hit["number"], hit["good"], hit["verdict"]) == (1, False, "double hit, too soft")
         assert (hit["peak"], hit["undone"]) == ("312 N", False)
         session.show(TapStep.TAP, levels=(float("nan"), 2.0))
-        again = await feed.receive(timeout=10)
+        again = await feed.receive(timeout=60)
         assert again.type is aiohttp.WSMsgType.TEXT
         assert json.loads(again.data)["levels"] == [None, 2.0]
 
@@ -285,7 +285,7 @@ def test_the_curves_arrive_as_they_were(session: Session) -> None:
     found: dict[str, Any] = {}
 
     async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
-        data = (await feed.receive(timeout=10)).data
+        data = (await feed.receive(timeout=60)).data
         (size,) = struct.unpack_from("<I", data)
         header = json.loads(data[4 : 4 + size])
         assert (4 + size) % 4 == 0
@@ -319,7 +319,7 @@ def test_a_page_that_talks_back_is_hung_up(session: Session) -> None:
     async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
         await next_state(feed)
         await feed.send_str("undo")
-        assert (await feed.receive(timeout=10)).type is aiohttp.WSMsgType.CLOSE
+        assert (await feed.receive(timeout=60)).type is aiohttp.WSMsgType.CLOSE
 
     with ScreenServer(session, token=TOKEN) as server:
         follow(server, talk)
@@ -365,7 +365,7 @@ def test_at_the_end_the_last_state_is_sent_and_the_feed_closed_as_such(session: 
         leaving = asyncio.create_task(asyncio.to_thread(server.__exit__, None, None, None))
         shown = await next_state(feed)
         assert (shown["word"], shown["outcome"]["light"]) == ("DONE", "warn")
-        assert (await feed.receive(timeout=10)).type is aiohttp.WSMsgType.CLOSE
+        assert (await feed.receive(timeout=60)).type is aiohttp.WSMsgType.CLOSE
         assert feed.close_code == aiohttp.WSCloseCode.GOING_AWAY
         await leaving
 

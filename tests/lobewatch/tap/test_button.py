@@ -72,7 +72,8 @@ def test_what_the_button_did_before_the_stream_counts_for_nothing(
     def pressed_when_connected() -> TapsSource:
         source = TapsSource(device.port)
         device.send_event(PRESS)
-        time.sleep(0.2)  # the emulator looks after its button every 0.05 s
+        while device._pending_events:  # noqa: SLF001  (it is told before the next command is read)
+            time.sleep(0.01)
         return source
 
     with TapsEmulator(tapper(2), channels, RATE, realtime=False) as device:

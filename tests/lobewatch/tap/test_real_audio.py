@@ -43,7 +43,7 @@ def cable(tmp_path: Path) -> Iterator[dict[str, str]]:
     command = ["pulseaudio", "-n", "--daemonize=no", "--exit-idle-time=-1", "--load=module-native-protocol-unix"]
     with subprocess.Popen([*command, f"--load={sink}"], env=environment, stderr=subprocess.DEVNULL) as server:
         try:
-            for _ in range(100):
+            for _ in range(600):
                 if subprocess.run(["pactl", "info"], env=environment, capture_output=True, check=False).returncode == 0:
                     break
                 time.sleep(0.1)

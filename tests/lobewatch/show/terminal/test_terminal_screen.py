@@ -158,7 +158,7 @@ def test_keys_reach_the_test(terminal: int, key: bytes, asked: str) -> None:
     session = Session()
     with screen_of(session)[0]:
         os.write(terminal, key)
-        assert session.called.wait(5)
+        assert session.called.wait(60)
     assert session.asked == [asked]
 
 

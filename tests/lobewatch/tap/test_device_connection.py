@@ -125,7 +125,9 @@ def test_a_device_with_another_sensor_does_not_go_on_with_the_test(
         (simulated(tapper(), channels, unplugged=lambda: session.state.good == 2), simulated(tapper(2), other))
     )
     session: TapSession = session_of(folder, lambda: next(devices))
-    with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with plan_session.resume=False"):
+    with pytest.raises(
+        ValueError, match=r"another length, sample rate or sensor; begin anew with plan_session\.resume=False"
+    ):
         session.run()
 
 

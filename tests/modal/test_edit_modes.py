@@ -121,11 +121,14 @@ def test_what_cannot_be_done_is_refused_with_what_is_there(said: dict[str, tuple
 @pytest.mark.parametrize(
     ("said", "words"),
     [
-        ({"add": ("298,5",)}, "--add 298,5: give the frequency in Hz, as in 298.5; write decimals with a point"),
-        ({"add": ("",)}, "--add : give the frequency"),
+        (
+            {"add": ("298,5",)},
+            "ModeEdits.add 298,5: give the frequency in Hz, as in 298.5; write decimals with a point",
+        ),
+        ({"add": ("",)}, "ModeEdits.add : give the frequency"),
         ({"drop": ("0",)}, "drop 0: is no frequency > 0"),
         ({"drop": ("nan",)}, "drop nan: is no frequency > 0"),
-        ({"fix": ("1500",)}, "--fix 1500: give the frequency in Hz and the damping ratio, as in 1500:0.03"),
+        ({"fix": ("1500",)}, "ModeEdits.fix 1500: give the frequency in Hz and the damping ratio, as in 1500:0.03"),
         ({"fix": ("1500:3",)}, "fix 1500:3: the damping ratio is not between 0 and 1; 3 % is 0.03"),
         ({"add": ("298", "298.0")}, "298 Hz: add twice"),
         ({"add": ("298",), "drop": ("298",)}, "298 Hz: add and drop"),

@@ -35,7 +35,7 @@ from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import BusyError
 from lobewatch.machine.folder_files import compute_change_mark
-from lobewatch.machine.journal.entries import FleetScatter
+from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS

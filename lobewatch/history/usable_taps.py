@@ -8,8 +8,9 @@ from datetime import UTC, datetime
 from acquisition import DataError, Remark
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder_contents import FolderContents
+from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter, MaintenanceEvent
+from lobewatch.machine.journal.entries import MaintenanceEvent
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.tool.tap_series import TapOrder, TapPlace
 

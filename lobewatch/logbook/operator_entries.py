@@ -11,7 +11,8 @@ import msgspec
 from acquisition import check_name
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.store_recordings import group_by_message
-from lobewatch.machine.journal.entries import Acknowledgement, find_excludable_entry
+from lobewatch.machine.journal.alarm_entries import Acknowledgement
+from lobewatch.machine.journal.entries import find_excludable_entry
 from lobewatch.measurement import FileModes, fit_file_modes
 from lobewatch.monitoring.alarm import Alarm, select_alarms
 from modal import ModeEdits

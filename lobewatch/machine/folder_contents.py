@@ -12,6 +12,7 @@ from pathlib import Path
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
+from lobewatch.machine.journal import alarm_entries
 from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
@@ -40,9 +41,9 @@ class FolderContents:
     """Number of lines of the journal."""
     cuts: tuple[CutEntry, ...] = ()
     """Test cuts, oldest first, excluded ones included."""
-    acknowledgements: tuple[journal_entries.Acknowledgement, ...] = ()
+    acknowledgements: tuple[alarm_entries.Acknowledgement, ...] = ()
     """Acknowledgements of alarms, oldest first."""
-    fleet_scatters: tuple[journal_entries.FleetScatter, ...] = ()
+    fleet_scatters: tuple[alarm_entries.FleetScatter, ...] = ()
     """Scatter of the other machines of the fleet, oldest first."""
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
@@ -88,8 +89,8 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = read_committed_cuts(reading)
-    acknowledged = journal_entries.read_acknowledgements(reading.other_entries)
-    scatters = journal_entries.read_fleet_scatters(reading.other_entries)
+    acknowledged = alarm_entries.read_acknowledgements(reading.other_entries)
+    scatters = alarm_entries.read_fleet_scatters(reading.other_entries)
     usable, unusable, damage, count = tuple(taps), _sort_by_time(lost), tuple(remarks), len(reading.lines)
     return FolderContents(usable, unusable, damage, events, count, cuts, acknowledged, scatters)
 

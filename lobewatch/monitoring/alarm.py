@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from acquisition import Remark
-from lobewatch.machine.journal.entries import Acknowledgement, format_alarm_id
+from lobewatch.machine.journal.alarm_entries import Acknowledgement, format_alarm_id
 
 
 class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "triggered_at": "raised"}):

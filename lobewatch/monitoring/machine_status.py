@@ -15,7 +15,7 @@ from pathlib import Path
 from acquisition import CROSS_TAP, Remark
 from lobewatch.history.history import History, HistoryRow
 from lobewatch.machine import LimitsTable, Machine
-from lobewatch.machine.journal.entries import Acknowledgement, FleetScatter
+from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
 from lobewatch.monitoring import status_rules as rules

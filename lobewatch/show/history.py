@@ -15,8 +15,9 @@ from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
 from lobewatch.machine.folder_updates import find_contradicting_cuts
+from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.entries import Acknowledgement, MaintenanceEvent
+from lobewatch.machine.journal.entries import MaintenanceEvent
 from lobewatch.show.programs.materials import power_text
 from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import align_columns, blank_nonfinite, format_csv

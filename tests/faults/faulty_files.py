@@ -47,7 +47,8 @@ class FaultyFiles:
 
     def __init__(self, root: Path, at: int = -1, fault: str = "") -> None:
         """at: number of the call that the fault befalls, from 0; a full disk stays full until room that was
-        held on it is given up."""
+        held on it is given up.
+        """
         self.calls: list[Call] = []
         """All that were made, oldest first."""
         self._root, self._at, self._fault, self._count = f"{root}/", at, fault, 0

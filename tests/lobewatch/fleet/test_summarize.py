@@ -81,9 +81,9 @@ def test_what_others_have_made_is_not_made_again(mills: Path, shop: Shop, monkey
     forget(mills)
     made_here = lobewatch.fleet.summarize_folder
 
-    def counted(path: Path, when: Any) -> Any:
+    def counted(path: Path, when: Any, *texts: Any) -> Any:
         asked.append(path.name)
-        return made_here(path, when)
+        return made_here(path, when, *texts)
 
     monkeypatch.setattr("lobewatch.fleet.summarize_folder", counted)
     plant = Fleet(find_machines(mills))
@@ -134,9 +134,9 @@ def test_summaries_that_grow_old_together_are_renewed_a_few_at_a_look(
     before = {standing.key: standing.summary for standing in plant.assess_machines(now)}
     made_here = lobewatch.fleet.summarize_folder
 
-    def counted(path: Path, when: Any) -> Any:
+    def counted(path: Path, when: Any, *texts: Any) -> Any:
         asked.append(path.name)
-        return made_here(path, when)
+        return made_here(path, when, *texts)
 
     monkeypatch.setattr("lobewatch.fleet.summarize_folder", counted)
     monkeypatch.setattr("lobewatch.fleet.fleet.MAX_RENEWALS_PER_POLL", 1)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lobewatch.tap import cut_recording
 
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
@@ -18,6 +17,7 @@ from lobewatch.cli import main
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tap import cut_recording
 from lobewatch.tap.emulated_cut import emulate_cut
 
 Browser = Any

@@ -54,4 +54,4 @@ def test_every_place_to_look_is_there() -> None:
     table = PAGE.partition("## Where to look")[2].partition("## Rooms")[0]
     places = re.findall(r"`([a-z_]+/[\w/.]*)`", table)
     assert len(places) > 60
-    assert [place for place in places if not (ROOT / place).exists()] == []
+    assert [place for place in places if "NAME" not in place and not (ROOT / place).exists()] == []

@@ -105,7 +105,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     mine, never = shop.logbook, Logbook(other)
     at = day(shop, 61)
     assert mine.status(at) == never.status(at) != before
-    columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "rulings", "remarks")
+    columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "verdicts", "remarks")
     for row, same in zip(mine.history.rows, never.history.rows, strict=True):
         assert [getattr(row, name) for name in columns] == [getattr(same, name) for name in columns]
     drawn = r'<div class="pictures">.*?</div>'  # hollow

@@ -154,7 +154,7 @@ def test_only_who_was_asked_to_write_waits(
         waited.append(patience)
         return held(lock, patience)
 
-    monkeypatch.setattr(FolderLock, "held", asked)
+    monkeypatch.setattr(FolderLock, "hold", asked)
     name, *options = command
     assert run(name, shop.path, *options).code == 0
     assert waited[0] == patience

@@ -19,6 +19,7 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.verify_files import verify
+from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -42,7 +43,10 @@ def recording(path: Path, chatter: float | None = None, seconds: float = 1.2) ->
 
 
 def run(shop: Shop, *arguments: object) -> Result:
-    return CliRunner().invoke(app, ["listen", str(shop.path), *map(str, arguments)])
+    result = CliRunner().invoke(app, ["listen", str(shop.path), *map(str, arguments)])
+    if isinstance(result.exception, ValueError | OSError):
+        result.exception.args = (with_option_names(str(result.exception)),)
+    return result
 
 
 def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) -> None:

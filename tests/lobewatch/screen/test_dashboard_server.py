@@ -257,7 +257,7 @@ def test_a_page_that_has_watched_a_test_to_its_end_sees_the_next(
 ) -> None:
     """Also where START is pressed before the thread of the failed test has ended."""
     machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
-    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(0.3))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server._release_memory", lambda: time.sleep(0.3))
 
     async def titles(server: DashboardServer) -> list[str]:
         found: list[str] = []

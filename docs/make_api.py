@@ -16,7 +16,7 @@ import pdoc.render
 
 ROOMS = ("decay", "history", "logbook", "machine", "measuring", "plant", "tool", "verdicts")
 MODULES = ("acquisition", "modal", "dsm", "lobes", "lobewatch", *(f"lobewatch.{room}" for room in ROOMS))
-"""What has a page: the packages, and the rooms of lobewatch whose names are given by an `__init__.pyi`."""
+"""Modules with a page: the packages, and the folders of lobewatch whose names an `__init__.pyi` gives."""
 
 
 TEMPLATES = Path(__file__).with_name("templates")
@@ -51,7 +51,7 @@ def _without_indentation(html: str) -> str:
 
 
 def _resolved(name: str) -> Any:
-    """A package whose lazy names are all there."""
+    """Import a package and load all its lazy names."""
     module = import_module(name)
     for public in module.__all__:
         setattr(module, public, getattr(module, public))
@@ -59,7 +59,7 @@ def _resolved(name: str) -> Any:
 
 
 def _with_constants(module: pdoc.doc.Module) -> pdoc.doc.Module:
-    """A package whose constants have the docstrings that stand where they are bound."""
+    """Copy to the constants of a package the docstrings from the modules that bind them."""
     rooms = [room for name, room in sorted(sys.modules.items()) if name.startswith(module.modulename)]
     for constant in module.variables:
         value = vars(module.obj)[constant.name]

@@ -33,7 +33,7 @@ def wrong(rounds: list[Round]) -> list[Round]:
 
 
 def killed(path: Path, how: str, rounds: int, seed: int) -> list[Round]:
-    """Rounds of the real command on an emulated device that streams."""
+    """Return rounds of the real command on an emulated streaming device."""
     signal = HammeredStructure(BEAM, RATE, np.random.default_rng(seed), Hammering())
     with TapsEmulator(signal, CHANNELS, RATE, realtime=False) as device:
         return rounds_of("tap_kills.py", path, device.port, how, rounds, seed)

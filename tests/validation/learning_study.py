@@ -86,7 +86,7 @@ class ForeignTruth:
         self.drive = ShownPower(CUT, self.tangential, np.random.default_rng((35, self.seed, self.number)))
 
     def _before(self) -> Posterior:
-        """What is known before the first cut."""
+        """Return the posterior before the first cut."""
         x, y = ([Mode(*mode) for mode in modes] for modes in self.tapped)
         count = len(x) + len(y)
         exact = {"tap": np.zeros((count, 4))}
@@ -109,7 +109,7 @@ class ForeignTruth:
         return None if suggestion is None else (suggestion.speed_rpm, suggestion.depth)
 
     def milling(self, speed_rpm: float, depth: float) -> MillingCut:
-        """A test cut as it is made."""
+        """Return the true milling cut."""
         x, y = (Structure(*np.array(modes).T) for modes in (self.x, self.y))
         return MillingCut(
             TEETH, 0.0, math.pi, self.tangential, self.radial, depth, FEED, speed_rpm, x, y, runout=self.runout

@@ -20,7 +20,7 @@ PERIODS, LATE = 240, 120
 
 
 def simulated(speed_rpm: float, share: float) -> tuple[Case, PlainCut]:
-    """A slot at a share of its limit, and what happens when it has settled."""
+    """Simulate a slot at a share of its limit; return its settled motion."""
     limit = float(slot_limits(X, Y, KT, KR, np.array([0.999, 1.0, 1.001]) * speed_rpm)[1])
     case = Case(X, Y, 0.0, 4, 1.0, "down", KT, KR, 0.0, speed_rpm, share * limit)
     return case, PlainCut(*(record[-LATE:] for record in plain_cut(case, 200, PERIODS)))

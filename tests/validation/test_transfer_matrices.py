@@ -73,7 +73,7 @@ def _along(spindle: Spindle, frequency: float, position: float) -> tuple[mpmath.
 
 
 def _parts(spindle: Spindle, place: mpf, w2: mpf) -> mpmath.matrix:
-    """What bearings, masses and joints at one place do; none of them meet there."""
+    """Return the transfer matrix of bearings, masses and joints at one place, where at most one is."""
     matrix = mpmath.eye(4)
     for bearing in spindle.bearings:
         if bearing.position == place:

@@ -38,7 +38,7 @@ def random_modes(rng: np.random.Generator, frequency: float, number: int) -> lis
 
 
 def beside_the_limit(rng: np.random.Generator) -> list[DelayedCase]:
-    """A random cut just below and just above its limit; none where it has no limit."""
+    """Return a random cut just below and just above its limit; an empty list without a limit."""
     pitch = random_pitch(rng)
     immersion, lag = float(rng.choice([0.05, 0.1, 0.25, 0.5, 0.75, 1.0])), float(rng.choice([0, 0, 72.2]))
     direction: Literal["up", "down"] = "up" if rng.random() < 0.5 else "down"

@@ -66,7 +66,7 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
 
 
 def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTable]:
-    """The programs that are recommended in place of one."""
+    """Yield the programs recommended in place of one."""
     advice = advise(evaluate_program(table, assembly(milling), MACHINE), MACHINE)
     for setting in dict.fromkeys(filter(None, (advice.best, advice.deepest_here))):
         yield program(milling, setting.depth_mm, setting.speed_rpm)
@@ -117,7 +117,7 @@ def limit_mm(milling: RandomMilling) -> float:
 
 
 def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = None) -> ProgramTable:
-    """The cut as it would stand in machine.toml."""
+    """Return the cut as written in machine.toml."""
     return ProgramTable(
         name="drawn",
         teeth=milling.teeth,
@@ -134,7 +134,7 @@ def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = N
 
 
 def assembly(milling: RandomMilling, directions: tuple[str, ...] = ("x", "y")) -> Assembly:
-    """The machine as tap tests without errors would show it."""
+    """Return the machine as tap tests without errors would show it."""
     x, y = _modes(milling)
     if directions == ("x",):
         y = x

@@ -140,7 +140,7 @@ def merge_remarks(remarks: Iterable[Remark]) -> list[Remark]:
     Examples
     --------
     >>> remarks = [Remark("small", program, "it is small") for program in ("A", "B")]
-    >>> [(remark.code, remark.about) for remark in joined(remarks)]
+    >>> [(remark.code, remark.about) for remark in merge_remarks(remarks)]
     [('small', 'A, B')]
     """
     about: dict[Remark, list[str]] = {}

@@ -32,7 +32,7 @@ class Conditions:
     Examples
     --------
     >>> usual = Conditions(stick_out_mm=42.0, state="cold")
-    >>> Conditions(temperature_c=35.0, state="warm").over(usual).known
+    >>> Conditions(temperature_c=35.0, state="warm").with_defaults(usual).specified
     {'temperature_c': 35.0, 'stick_out_mm': 42.0, 'state': 'warm'}
     """
 

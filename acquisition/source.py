@@ -114,7 +114,7 @@ class Device(Source, Protocol):
 
     @property
     def loss_detection(self) -> str:
-        """How lost scans are detected, in two words; empty where none can be lost."""
+        """Method of detecting lost scans, in two words; empty if none can be lost."""
 
     @property
     def events(self) -> deque[Event]:

@@ -93,7 +93,7 @@ UNKNOWN_CONDITIONS = Conditions()
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Who tested what, when and where.
+    """Operator, machine, tool, direction and time of a tap test.
 
     Examples
     --------
@@ -161,7 +161,7 @@ class TapTest:
     id: str
     """UTC time to the microsecond, machine, tool, direction and four random hex digits."""
     circumstances: Circumstances
-    """Who tested what, when and where."""
+    """Operator, machine, tool, direction and time."""
     frf: Frf | None
     """Averaged FRF; None where no force was measured."""
     hits: tuple[Hit, ...] = ()

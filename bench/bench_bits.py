@@ -33,7 +33,7 @@ class Converter(NamedTuple):
     name: str
     bits: int
     full_scale: tuple[float, float] = (5.0, 5.0)
-    """Of force and acceleration (V)."""
+    """Full scale of force and acceleration (V)."""
     effective: float | None = None
     """Bits that its own noise leaves; None: no noise of its own."""
 

@@ -1,4 +1,4 @@
-"""How the house is divided: rooms and what they reach, circles, sizes, words.
+"""Report the structure of the code: folders and their imports, cycles, sizes, names.
 
     python bench/rooms.py [--root FOLDER] [--verbose]
 

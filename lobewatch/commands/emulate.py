@@ -1,4 +1,4 @@
-"""lobewatch emulate: one command for each driver with an emulator."""
+"""Command `lobewatch emulate`: emulate a device, with a subcommand for each driver."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
+"""Forecast when a falling series reaches a level, by a weighted mixture of trend shapes.
 
 Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
 averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No

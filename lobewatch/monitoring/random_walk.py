@@ -1,4 +1,4 @@
-"""Fits of a line whose level or rate is a random walk.
+"""Fit lines whose level or rate is a random walk.
 
 Generalised least squares with restricted likelihood (Patterson & Thompson 1971); how much wanders is not fitted but
 averaged over. The second is the smoothing spline of Wahba (1978).

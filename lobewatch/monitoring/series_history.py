@@ -1,4 +1,4 @@
-"""One series of tap tests and what follows from its rows: where each value started, and how it has changed since.
+"""History of one series of tap tests: start, trend and change of each monitored value.
 
 Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """

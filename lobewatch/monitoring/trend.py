@@ -1,4 +1,4 @@
-"""The trend of one value of a series: its points, alarm, where they started and where they go."""
+"""Trend of one value of a series: points, start, alarm and forecast."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Show replays of recorded files, previews of them, and rebuilds, with their progress."""
+"""Show replays, replay previews and rebuilds, with their progress."""
 
 from __future__ import annotations
 

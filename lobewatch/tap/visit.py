@@ -1,4 +1,4 @@
-"""Visit to a machine: tap tests in x, in y, then as the operator chooses, run by one thread."""
+"""Visit to a machine: tap tests in x, in y, then as the operator chooses."""
 
 from __future__ import annotations
 

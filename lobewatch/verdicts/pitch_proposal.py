@@ -1,4 +1,4 @@
-"""Unequal pitches for one cut at one speed: what they gain over equal ones, over all that is not known.
+"""Unequal pitches for one cut at one speed, and their gain over equal pitch with its uncertainty.
 
 The closed form of the best difference between neighbours says which patterns are checked; zero-order approximation
 after Altintas, Engin & Budak, over few samples, says how deep they may go; the multipliers of the same samples say

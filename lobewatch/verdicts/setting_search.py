@@ -1,4 +1,4 @@
-"""The one search for settings that would be called stable, with something of margin: advice, pockets, recommendations.
+"""Search for stable settings with margin: advice, pockets, recommendations.
 
 Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few samples how deep
 (`CriticalSamples`). What is recommended has been evaluated like any program: `run_monte_carlo` finds it stable

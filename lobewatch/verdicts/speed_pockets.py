@@ -1,4 +1,4 @@
-"""Where the pockets between the lobes are when only natural frequency and damping are known: speeds without depths.
+"""Speeds of stable pockets without depths, if only natural frequency and damping are known.
 
 A stiffness stretches all limits alike and moves none of them along the speeds, as long as one mode decides.
 """

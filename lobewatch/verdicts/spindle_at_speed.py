@@ -1,4 +1,4 @@
-"""What test cuts have shown of the spindle as it turns, beside the tool as tapped: verdicts rest on both."""
+"""Spindle at speed as learned from test cuts, used in verdicts with the tool as tapped."""
 
 from __future__ import annotations
 

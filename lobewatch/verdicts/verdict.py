@@ -1,4 +1,4 @@
-"""The verdict on a cutting program: the one place that says whether it is stable, how surely, and how far."""
+"""Verdict on a cutting program: stability, limits, chatter risk and frequency margins."""
 
 from __future__ import annotations
 

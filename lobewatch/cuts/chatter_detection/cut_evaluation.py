@@ -1,4 +1,4 @@
-"""Evaluate recorded cuts: stable, chatter, flip, or the reason why it cannot be told.
+"""Evaluate recorded cuts: stable, chatter, flip, or a reason for no verdict.
 
 The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
 (docs/cuts.md, How often it is right).

@@ -1,4 +1,4 @@
-"""What was learned of the rotating spindle: samples from the prior, weighted by how well they explain its cuts."""
+"""Posterior of the rotating spindle: samples from the prior, weighted by the test cuts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Suggest the next test cut."""
+"""Suggest the next test cut by its expected gain and risk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speeds and depths that machine and tool bear in a cut: nothing outside of them is recommended."""
+"""Range of speeds and depths that machine and tool allow, the bounds of recommendations."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from acquisition.text_boards import FrameFormat, OutputFormat
 from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
-"""How an accelerometer is fixed."""
+"""Mounting of an accelerometer."""
 SENSOR_MASS_STD_RATIO = 0.02
 """Relative standard error of the sensor mass from a data sheet or a scale; chosen."""
 CABLE_MASS_SHARE, CABLE_MASS_STD_RATIO = 0.5, 0.25

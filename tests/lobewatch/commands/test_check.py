@@ -16,7 +16,7 @@ from lobewatch.verdicts.program_case import cutting_conditions_of
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:

@@ -22,7 +22,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.show.fleet.export_files import round_significant
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:

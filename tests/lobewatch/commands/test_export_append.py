@@ -19,7 +19,7 @@ from acquisition import DataError
 from lobewatch.cli import app
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 KILLED = """
 import os, sys, typer.testing
 from lobewatch.cli import app

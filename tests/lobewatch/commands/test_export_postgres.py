@@ -25,7 +25,7 @@ from lobewatch.cli import app
 from lobewatch.show.fleet import export_postgres as table_postgres
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Server = Any
 """PostgreSQL of conftest.py."""
 SECRET = "quite-secret"

@@ -21,7 +21,7 @@ from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.verify_files import verify
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 RATE, TURN = 25600.0, 12077.0 / 60
 
 

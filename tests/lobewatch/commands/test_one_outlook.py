@@ -22,7 +22,7 @@ from lobewatch.notify.publish_status import make_message_content
 from lobewatch.screen.dashboard_server import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Rows = dict[str, dict[str, Any]]
 """What `status` says, by machine."""
 MACHINES = 50

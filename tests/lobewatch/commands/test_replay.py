@@ -18,7 +18,7 @@ from lobewatch.cli import app
 from lobewatch.logbook.recordings.store_recordings import store_recordings
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 F = np.arange(4.0, 4000.0, 4.0)
 
 

@@ -18,7 +18,7 @@ from lobewatch.fleet.summarize import learn_scatter, summarize_machine
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Run = Callable[..., Any]
 FREQUENCY = 1713.0
 

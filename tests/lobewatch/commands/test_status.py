@@ -16,7 +16,7 @@ from typer.testing import CliRunner, Result
 from lobewatch.cli import app
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:

@@ -19,7 +19,7 @@ from lobewatch.monitoring.status_rules import StatusLevel
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def codes(shop: Shop, days: float) -> set[str]:

@@ -20,7 +20,7 @@ from lobewatch.cli import main
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SPARSE = 200_000_000_000
 PATIENCE = 60
 """Time for one command on one machine (s): a hang is told from a busy computer."""

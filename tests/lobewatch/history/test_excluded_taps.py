@@ -14,7 +14,7 @@ from lobewatch.machine.folder_updates import exclude_entry
 from modal import Mode, synthesize_frf
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 LINES = np.arange(4.0, 4000.0, 4.0)
 
 

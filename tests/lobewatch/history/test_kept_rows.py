@@ -19,7 +19,7 @@ from lobewatch.measurement import Measurement, measure
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 OLDER = "lobewatch 0.0.1"
 
 

@@ -18,7 +18,7 @@ from lobewatch.tap.session import build_outcome
 from lobewatch.verdicts import Stability
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def flip(path: Path) -> None:

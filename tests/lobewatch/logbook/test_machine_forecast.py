@@ -26,7 +26,7 @@ from lobewatch.verdicts import Stability
 from lobewatch.verdicts.frequency_drop import find_critical_drop, find_tolerable_drop, model_softening
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:

@@ -23,7 +23,7 @@ from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.verify_files import verify
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
 CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 

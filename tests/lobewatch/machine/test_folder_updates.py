@@ -28,7 +28,7 @@ from lobewatch.show.history import untapped_remarks
 from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
 CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 

@@ -22,7 +22,7 @@ from lobewatch.cli import app
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 PROMETHEUS, PROMTOOL = shutil.which("prometheus"), shutil.which("promtool")
 pytestmark = pytest.mark.skipif(
     not (PROMETHEUS and PROMTOOL) and "CI" not in os.environ, reason="prometheus is not installed"

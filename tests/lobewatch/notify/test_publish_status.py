@@ -13,7 +13,7 @@ import pytest
 from tests.lobewatch.notify.conftest import Mosquitto, received, run
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from lobewatch.show.terminal.output import format_csv
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 DEMO = Path(__file__).parents[2] / "data" / "demo"
 STYLE = files("lobewatch.show.report") / "static" / "report.css"
 MARKS = ("0, 158, 115", "160, 0, 0")

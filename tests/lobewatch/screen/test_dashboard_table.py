@@ -18,7 +18,7 @@ from lobewatch.screen import dashboard_table as board
 from tests.lobewatch.screen.test_dashboard_server import ask
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture(autouse=True)

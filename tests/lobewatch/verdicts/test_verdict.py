@@ -15,7 +15,7 @@ from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softeni
 from lobewatch.verdicts.program_case import build_program
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 TWIN = """
 [[tool]]
 name = "twin"

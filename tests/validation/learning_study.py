@@ -57,11 +57,11 @@ class ForeignTruth:
     seed: int = 7
     """Seed of the truths: 7 for those that rules were chosen on, another for those they are measured on."""
     reads_power: bool = False
-    """Whether the power of each cut is read."""
+    """True if the power of each cut is read."""
     cuts: list[CutEvidence] = field(default_factory=list)
     """Test cuts as they were written down."""
     truly_stable: list[bool] = field(default_factory=list)
-    """Whether each was stable."""
+    """True stability of each cut."""
 
     def __post_init__(self) -> None:
         draw = self.random = np.random.default_rng((34, self.seed, self.number))
@@ -131,7 +131,7 @@ class ForeignTruth:
 
     @property
     def knows_force(self) -> bool:
-        """Whether the 95 % interval of Kt holds the truth."""
+        """True if the 95 % interval of Kt contains the truth."""
         interval = self.learnt.intervals["tangential"]
         return interval.low <= self.tangential / TANGENTIAL <= interval.high
 

@@ -43,7 +43,7 @@ def test_the_power_of_a_stable_cut_says_its_kt(speed_rpm: float) -> None:
 
 @pytest.mark.parametrize("speed_rpm", SPEEDS)
 def test_chips_of_a_cut_that_chatters_are_those_of_its_feed_and_its_edges_rub_less(speed_rpm: float) -> None:
-    """What is removed is removed once, whatever the tool does: without edges its power is the same."""
+    """Chips are removed once, whatever the tool motion: without edge forces the power is the same."""
     case, cut = simulated(speed_rpm, 1.5)
     assert np.min(cut.touching) < 2
     assert kt_by_power(case, cut, 0.0) == pytest.approx(1.0, abs=0.01)

@@ -251,7 +251,7 @@ def random_spindle(draw: np.random.Generator) -> Spindle:
 
 
 def refused_and_missed(number: int, checked: int, seed: int) -> tuple[int, int]:
-    """How many of `number` spindles are refused, and how many of the first `checked` have modes too few or too many.
+    """Return how many of `number` spindles are rejected, and how many of the first `checked` have wrong modes.
 
     The determinant changes its sign at each mode and nowhere else: signs half-way between modes alternate.
     """

@@ -18,7 +18,7 @@ DEEPEST = 0.03
 
 
 def random_pitch(rng: np.random.Generator) -> tuple[int, ...]:
-    """Of two to five teeth, in whole degrees, up to 40 % off the even pitch; some of four repeat after two."""
+    """Return pitches of two to five teeth in whole degrees, up to 40 % unequal; some of four repeat after two."""
     teeth = int(rng.integers(2, 6))
     even = 360 // teeth
     while True:
@@ -82,7 +82,7 @@ def test_limits_of_300_random_cutters_are_those_of_a_simulation() -> None:
 
 @pytest.mark.parametrize(("speed", "limit"), [(5000.0, 0.408624e-3), (9000.0, 3.009210e-3), (20000.0, 1.417506e-3)])
 def test_the_simulation_finds_limits_of_exact_floquet_theory(speed: float, limit: float) -> None:
-    """Of the slot in tests/data/milling_stability/stability_boundary_reference.csv, one direction."""
+    """Slot of tests/data/milling_stability/stability_boundary_reference.csv, one direction."""
     mode = (922.0, 0.011, 0.03993 * (2 * math.pi * 922) ** 2, 0.0)
     cases = [
         DelayedCase((mode,), (180, 180), 1.0, "down", 6e8, 2e8, 0.0, speed, limit * side)

@@ -1,4 +1,4 @@
-"""What becomes of cuts that were called stable: random machines and programs, true systems drawn inside the doubt.
+"""Outcome of cuts that were called stable, on random machines with true systems within the uncertainty.
 
 Truths are drawn here, by the table of docs/lobes.md, and judged by the simulation in the time domain: neither shares
 code with what made the verdicts.
@@ -99,13 +99,13 @@ def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
 
 
 def chattering(truths: list[Case]) -> int:
-    """How many chatter; a case that is not settled counts."""
+    """Return how many cases chatter; one that has not settled counts."""
     simulated = milling_simulation.judge(truths)
     return int(np.sum(simulated.chatters | (simulated.doubt >= np.abs(simulated.growth))))
 
 
 def upper_limit(number: int, of: int) -> float:
-    """Of a share, one-sided, 95 %. Source: Clopper & Pearson 1934."""
+    """Return the one-sided 95 % upper limit of a share. Source: Clopper & Pearson 1934."""
     return float(beta.ppf(0.95, number + 1, of - number)) if number < of else 1.0
 
 

@@ -1,4 +1,4 @@
-"""What the demo and the commands on it come to, word by word and number by number: as it was when last looked at.
+"""Output of the demo and of the commands on it, compared word by word with the last reviewed output.
 
 A change that is meant shows here: the new text lies in the folder that the failure names, to be read and copied.
 """
@@ -63,7 +63,7 @@ QUESTIONS = {
 }
 """Commands by the name of what they print, in this order."""
 TEXTS = [name for name, command in QUESTIONS.items() if "--json" not in command and not command.startswith("report")]
-"""Those whose answers are text for people."""
+"""Names of the answers that are text for people."""
 MEANT = {
     "DEMO": "lobewatch-demo",
     "LONG": "long end mill",

@@ -1,4 +1,4 @@
-"""What is said with a tap test, and what other machines tell, in the standing of a machine."""
+"""Conditions of tap tests and data of other machines in the status of a machine."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ Shop = Any
 
 
 def codes(shop: Shop, days: float) -> set[str]:
-    """Of the reasons at a time."""
+    """Return the codes of the reasons at a time."""
     ((_, _, _, dated),) = Fleet({"m": shop.path}).assess_machines(shop.start + timedelta(days=days))
     return {one.code for one in dated.remarks}
 

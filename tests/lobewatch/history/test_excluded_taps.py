@@ -1,4 +1,4 @@
-"""What excluded tap tests say: in rows of their own, followed from what was known before them."""
+"""Rows of excluded tap tests, followed from the tests before them."""
 
 from __future__ import annotations
 

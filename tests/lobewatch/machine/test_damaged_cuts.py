@@ -102,7 +102,7 @@ def test_six_hundred_damaged_recordings_are_named_and_mended(heard: Path, tmp_pa
 
 
 def test_a_damaged_recording_alters_nothing_that_is_said(heard: Path) -> None:
-    """What was heard stands in the journal."""
+    """The evaluation is stored in the journal."""
 
     def said() -> list[tuple[int, str]]:
         commands = (["history", "--json"], ["check", "--json"], ["suggest", "--program", "A", "--json"])

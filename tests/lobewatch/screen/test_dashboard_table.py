@@ -1,4 +1,4 @@
-"""What a page of many machines is sent: all of it once, then what has changed."""
+"""Updates of the dashboard table: all machines first, then changes only."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Conditions:
     state: str = ""
     """State of the machine in a word or two: "warm", "gearbox low"."""
     reclamped: bool = False
-    """Whether the tool was reclamped for the test; False where unknown."""
+    """True if the tool was reclamped for the test; False if unknown."""
     note: str = ""
     """Free note."""
     hours: float | None = None

@@ -115,7 +115,7 @@ class Comb:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the speed is known by it."""
+        """True if the comb determines the speed."""
         return self.score > CLEAR
 
 
@@ -245,7 +245,7 @@ def _speed_word(heard: CutEvaluation, comb: Comb) -> str:
 
 
 def _is_on_harmonic(heard: CutEvaluation, turn: float) -> bool:
-    """Whether chatter is said at a multiple of a turn (Hz)."""
+    """Return whether chatter was detected at a multiple of a turn (Hz)."""
     if heard.chatter is None or heard.verdict != "chatter":
         return False
     return bool(fold_frequency(heard.chatter.frequency, turn) < ON_HARMONIC * turn)

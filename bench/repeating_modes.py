@@ -49,7 +49,7 @@ def readings(folder: Path, begin: str) -> tuple[list[Reading], list[Reading]]:
 
 
 def repeats(frequency: float, structure: list[Reading]) -> bool:
-    """Whether a mode (Hz) repeats."""
+    """Return whether a mode (Hz) repeats."""
     has = [any(abs(other / frequency - 1) < NEAR for other, _ in reading.modes) for reading in structure]
     return float(np.mean(has)) >= OFTEN
 

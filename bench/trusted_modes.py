@@ -46,7 +46,7 @@ def nearest(modes: list[Mode], mode: Mode) -> Mode | None:
 
 
 def agreements(hits: Hits) -> Iterator[NDArray[np.bool_]]:
-    """Whether f and zeta of each pair of trusted modes agree within the root sum of squares of their intervals."""
+    """Yield for each pair of trusted modes whether f and zeta agree within the joint uncertainty of their intervals."""
     trusted = [[mode for mode in sensor if assess_trust(mode) is Trust.TRUSTED] for sensor in hits]
     for some, others in combinations(trusted, 2):
         for mode in some:

@@ -79,7 +79,7 @@ class StabilisationChart:
 
     @property
     def stable(self) -> Flags:
-        """Whether the order below has the same pole, shape (k,)."""
+        """True for each pole that the order below has, too, shape (k,)."""
         return self.previous >= 0
 
 

@@ -203,7 +203,7 @@ class RunningMean:
 
     @property
     def has_converged(self) -> bool:
-        """Whether more hits would hardly change the peak.
+        """True if more hits would hardly change the peak.
 
         There are at least MIN_CONVERGED_HITS hits, and the rms of the random error sqrt((1 - g2) / (2 n g2)) over the
         lines near the highest peak is below MAX_CONVERGED_ERROR.

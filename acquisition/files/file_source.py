@@ -35,7 +35,7 @@ class FileSource(ClosedOnExit):
     """
 
     follows_clock = False
-    """Whether its scans follow the clock; they come at no measurable rate."""
+    """False, as scans come at no measurable rate."""
     loss_detection = ""
     """Method of detecting lost scans; empty as none can be lost."""
     fault = ""

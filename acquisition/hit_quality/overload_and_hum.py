@@ -35,7 +35,7 @@ class Overload:
     samples: int
     """Number of samples at that level."""
     inferred: bool
-    """Whether the shape of the signal shows it instead of codes at the rail of the converter."""
+    """True if the shape of the signal shows it instead of codes at the rail of the converter."""
 
 
 def find_overload(hit: Hit, index: int) -> Overload | None:

@@ -166,12 +166,12 @@ class HitSearch:
 
     @property
     def recording(self) -> bool:
-        """Whether a hit is being recorded."""
+        """True if a hit is being recorded."""
         return self._crossing is not None
 
     @property
     def armed(self) -> bool:
-        """Whether the next hit would be recorded."""
+        """True if the next hit would be recorded."""
         return self._crossing is None and self._rested and self._quiet_count >= self._trigger.pre_trigger
 
     def feed(self, block: Block) -> Iterator[Hit]:

@@ -290,7 +290,7 @@ class MachineRebuild(NamedTuple):
     n_taps: int
     """Number of tap tests in the new history."""
     is_saved: bool
-    """Whether the new history is on disk."""
+    """True if the new history is on disk."""
     remarks: Sequence[Remark]
     """Remarks on the machine after the rebuild."""
 

@@ -43,7 +43,7 @@ class OperatorRequests:
 
     @property
     def stopping(self) -> bool:
-        """Whether the test is to end."""
+        """True if the test is to end."""
         return self._stopping.is_set()
 
     def take_undo(self) -> bool:

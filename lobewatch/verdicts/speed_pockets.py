@@ -45,7 +45,7 @@ class SpeedPocket:
     """Limit there over the lowest limit in the speed range (-), at most `MAX_POCKET_GAIN`."""
 
     def contains(self, speed_rpm: float) -> bool:
-        """Whether a speed (rpm) lies in its window."""
+        """Return whether a speed (rpm) is in its window."""
         return self.window_rpm[0] <= speed_rpm <= self.window_rpm[1]
 
 

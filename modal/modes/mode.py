@@ -128,7 +128,7 @@ class Mode:
 
     @property
     def has_stiffness(self) -> bool:
-        """Whether K is known: whether the force was measured."""
+        """True if K is known, that is, if the force was measured."""
         return not np.isnan(self.stiffness)
 
     @property

@@ -42,7 +42,7 @@ class JournalReading:
     torn: bytes = b""
     """Rest of a line in journal.jsonl after a crash."""
     is_clean: bool = False
-    """Whether both files contain exactly these lines."""
+    """True if both files contain exactly these lines."""
 
     @cached_property
     def entries(self) -> list[JournalEntry]:

@@ -55,7 +55,7 @@ class CutRange:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no speed is allowed."""
+        """True if no speed is allowed."""
         return self.low_rpm > self.high_rpm
 
     @property

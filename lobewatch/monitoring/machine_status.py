@@ -294,7 +294,7 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
-    """Build the alarm of a program that is not stable, triggered by the first of the tap tests that all say so."""
+    """Build the alarm of a program that is not stable, triggered by the first of the consecutive tests that show it."""
     first = rows[-1]
     for row in reversed(rows):
         ruling = (row.verdicts or {}).get(remark.about)

@@ -19,7 +19,7 @@ class TapStep(enum.StrEnum):
     TAP = "TAP"
     """Armed: the next hit is awaited."""
     WAIT = "WAIT"
-    """The structure still rings, or a record is being taken."""
+    """The structure still vibrates, or a record is being taken."""
     GOOD = "GOOD"
     """The last hit was accepted."""
     REFUSED = "REFUSED"

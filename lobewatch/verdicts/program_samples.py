@@ -215,7 +215,7 @@ def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = N
 
 
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
-    """Vary the samples by plausible differences between a spindle at rest and one that cuts."""
+    """Vary the samples by plausible differences between a spindle at rest and a cutting one."""
     rows, random = samples.rows, np.random.default_rng(seed)
     frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
 

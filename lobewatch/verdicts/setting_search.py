@@ -190,7 +190,7 @@ class SettingSearch:
                 depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
-        """Return whether a speed (rpm) lies in none of the pockets taken."""
+        """Return whether a speed (rpm) is in none of the pockets taken."""
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
     def _climb(self, speed: float, depths: DepthsBySpeed, confirmed: SharesBySpeed, visited: set[float]) -> float:

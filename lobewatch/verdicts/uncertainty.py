@@ -50,7 +50,7 @@ class LearnedSamples:
     stiffness: Floats
     """Modal stiffnesses over their mean, shape (r, n)."""
     phase_change: Floats
-    """Phases less those of the middle (rad), shape (r, n)."""
+    """Phases relative to the mean phases (rad), shape (r, n)."""
     tangential: Floats
     """Kt over its mean, shape (r,)."""
     ratio: Floats

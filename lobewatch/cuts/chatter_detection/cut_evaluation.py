@@ -87,7 +87,7 @@ class CutEvaluation:
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
     distant_rpm: float = np.nan
-    """Distant speed from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
+    """Speed far from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
     tone: float = np.nan
     """Frequency of an unexplained tone (Hz); NaN unless that is the reason."""
     axis: int = 0
@@ -186,7 +186,7 @@ def _find_speed(
 
 
 def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
-    """Evaluate the speed only, where there is no air or it sounds like the cut."""
+    """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
     if turning is None:

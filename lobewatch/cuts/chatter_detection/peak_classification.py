@@ -161,7 +161,7 @@ def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bo
 def classify_peaks(
     peaks: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
-    """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
+    """Classify peaks by origin; spindle harmonics above half the sample rate are folded.
 
     unsteady: by how much the speed varies, relative: harmonics are this much wider.
     """

@@ -48,7 +48,7 @@ class CutGrid:
     """True median limit over that by the zero-order approximation at each speed, shape (s,)."""
 
     def contains(self, speed: float) -> bool:
-        """Return whether a speed (rpm) lies within the grid, with the tolerance of a recorded speed."""
+        """Return whether a speed (rpm) is within the grid, with the tolerance of a recorded speed."""
         return bool(self.speeds[0] * (1 - SPEED_GRID_STEP) <= speed <= self.speeds[-1] * (1 + SPEED_GRID_STEP))
 
     def build_evidence(self, speed: float, depth: float, word: CutVerdict = "stable") -> CutEvidence:

@@ -212,7 +212,7 @@ def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], lea
 
 
 def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> Indices:
-    """Draw indices by weight, systematically: each as often as its weight says, give or take one."""
+    """Draw indices systematically by weight, each in proportion to its weight within one."""
     at = (np.arange(count) + random.uniform()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), at), weights.size - 1)
 

@@ -37,7 +37,7 @@ class SpindleAtSpeed:
     radial: float = math.nan
     """Cutting coefficient Kr in the learned median (N/mm2)."""
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
-    """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential" and others)."""
+    """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential", ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """95 % intervals with the cuts, by the same names."""
 

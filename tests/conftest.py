@@ -83,7 +83,7 @@ def true_receptance(structure: Structure) -> Callable[[NDArray[np.float64]], NDA
 
 
 class ScriptedSession:
-    """A live tap test without device and clock: the test says what it shows next."""
+    """Live tap test without device and clock, whose steps the test scripts."""
 
     def __init__(self) -> None:
         self.state = TapState(1, TapStep.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")

@@ -16,7 +16,7 @@ WAYS = ("nothing more", "names too", "deletions too")
 
 
 class Disk:
-    """A folder as it stands, and what of it would survive."""
+    """Model of a folder on disk and of the files that survive a power cut."""
 
     def __init__(self, folder: Path) -> None:
         """Start with a folder whose contents survive."""

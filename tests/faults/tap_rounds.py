@@ -61,7 +61,7 @@ class Told:
     error: str = ""
     """Its last words."""
     calls: list[Call] = field(default_factory=list)
-    """File calls, where it lived to tell them; what was announced stands between."""
+    """Recorded file calls, with announcements between them."""
 
 
 def machine(path: Path, hits: int = HITS) -> None:

@@ -1,4 +1,4 @@
-"""Nothing that was announced is lost, whatever befalls a file call, the program, or the power: docs/reliability.md."""
+"""No loss of announced data after a failed file call, a killed program or a power cut: docs/reliability.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An STM32F103 as far as the firmware of the Blue Pill needs it, and a USB host beside it.
+"""Emulated STM32F103 as needed by the firmware of the Blue Pill, with a USB host.
 
 The Cortex-M3 is unicorn's. Its registers are modelled after RM0008 (STMicroelectronics): clocks (7.3), converters
 (11.12), the tick (PM0056, 4.5), and the USB device (23.4, 23.5), whose flags are cleared by 0, its states toggled by 1.

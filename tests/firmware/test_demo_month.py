@@ -1,4 +1,4 @@
-"""A month of the demo, tapped in x and y, on the Cortex-M3 of QEMU: what is found beside what was emulated."""
+"""One month of the demo, tapped in x and y on the Cortex-M3 of QEMU: results against the emulated truth."""
 
 from __future__ import annotations
 

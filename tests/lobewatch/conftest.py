@@ -41,7 +41,7 @@ depth_mm = {depth:g}
 
 
 class Shop:
-    """The example machine in a folder "m", tapped by whoever likes."""
+    """Example machine in a folder "m", with tap tests on demand."""
 
     start = START
 

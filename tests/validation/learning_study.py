@@ -1,4 +1,4 @@
-"""Test cuts on spindles that are not of the prior of the learning, judged by a simulation in time.
+"""Test cuts on spindles unlike the learning prior, evaluated by time-domain simulation.
 
 Truths are drawn by other rules than those of `lobewatch.cuts.learning.prior_samples`; words and frequencies come from
 `acquisition.emulation.simulate_cuts` (chips, run-out, loss of contact), the optimum from the textbook form of the lobes

@@ -1,4 +1,4 @@
-"""`lobewatch check`: four words, their doubt, settings that are safe, exit codes."""
+"""`lobewatch check`: verdicts, uncertainty, safe settings, exit codes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch export --to: a real PostgreSQL, also one that goes away."""
+"""`lobewatch export --to`: a real PostgreSQL server, also when it disconnects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machines as they ought not to be: what stands of them, and that none costs the others anything."""
+"""Defective machines: what remains readable, without effect on the other machines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Folders that somebody has made to hang or to break what looks at them, beside a good one."""
+"""Hostile folders that could hang or crash a reader, next to a good one."""
 
 from __future__ import annotations
 

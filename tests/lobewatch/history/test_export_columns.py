@@ -1,4 +1,4 @@
-"""The history as columns: limits and words of programs, and what nobody has asked yet."""
+"""Columns of the history: limits and verdicts of programs, and values not computed yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A history of an older version is worked out anew, and what cannot be is kept and said."""
+"""History of an older version: computed again, or kept with a remark."""
 
 from __future__ import annotations
 

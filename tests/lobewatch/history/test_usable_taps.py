@@ -1,4 +1,4 @@
-"""One bad tap does not block a machine: all is said from the rest, with a remark and the exit code of the rest."""
+"""One bad tap test does not block a machine: results from the rest, with a remark and their exit code."""
 
 from __future__ import annotations
 

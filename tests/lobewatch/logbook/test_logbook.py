@@ -1,4 +1,4 @@
-"""The logbook: every tap test analysed once, readers that disturb nobody, one verdict in every place."""
+"""Logbook: every tap test analyzed once, independent readers, one verdict everywhere."""
 
 from __future__ import annotations
 

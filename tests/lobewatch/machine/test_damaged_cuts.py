@@ -1,4 +1,4 @@
-"""Recordings of test cuts damaged in the folder of a machine: named, mended, and what was heard in them counts."""
+"""Damaged recordings of test cuts: reported and repaired, while their evaluation still counts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Test cuts as lines of the journal, their recordings beside the tap tests, and what damage does to them."""
+"""Test cuts as journal lines, their recordings in the folder, and the effects of damage."""
 
 from __future__ import annotations
 

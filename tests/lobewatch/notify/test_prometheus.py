@@ -1,4 +1,4 @@
-"""Standings for Prometheus: its own check of the text, and a real one that fires a rule."""
+"""Machine status for Prometheus: checked by promtool, and by a real server with a rule."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch serve: what it says of machines, and the tap test that its button starts."""
+"""`lobewatch serve`: machine data, and the tap test that its button starts."""
 
 from __future__ import annotations
 

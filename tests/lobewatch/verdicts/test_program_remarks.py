@@ -1,4 +1,4 @@
-"""Nothing that a tool does not bear is advised, by `check`, `lobes` or `suggest`; a program outside is remarked."""
+"""Tool limits in `check`, `lobes` and `suggest`: nothing beyond is recommended, programs beyond get a remark."""
 
 from __future__ import annotations
 

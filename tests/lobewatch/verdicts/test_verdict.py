@@ -1,4 +1,4 @@
-"""The verdict over its doubt: what widens it, what settles it, predicted tools beside tapped ones, decay left."""
+"""Verdict and its uncertainty: causes, remedies, predicted and tapped tools, frequency margin."""
 
 from __future__ import annotations
 

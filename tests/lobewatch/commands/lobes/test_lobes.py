@@ -1,4 +1,4 @@
-"""`lobewatch lobes`: methods, the band of the doubt, pictures."""
+"""`lobewatch lobes`: methods, uncertainty band, figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words on cuts made of sines: what turns with the spindle, what was there before, chatter, and what cannot be told."""
+"""Verdicts on cuts made of sines: spindle harmonics, air, chatter, and cases without a verdict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spindle, a slot and a doubt that the tests of the learning share."""
+"""Spindle, slot and uncertainty shared by the learning tests."""
 
 from __future__ import annotations
 

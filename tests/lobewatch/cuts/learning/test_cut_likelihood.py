@@ -1,4 +1,4 @@
-"""The likelihood of what was heard, in closed form where what each spindle would do is given."""
+"""Likelihood of recorded cuts, in closed form for given predictions."""
 
 from __future__ import annotations
 

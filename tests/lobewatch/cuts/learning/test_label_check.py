@@ -1,4 +1,4 @@
-"""Which cuts contradict what was learnt, at the edges of chance, and what is said of them."""
+"""Cuts that contradict the learned model, at the limits of chance, and their remarks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The prior in closed form: what a draw of one standard deviation is, and what its rows cut with."""
+"""Prior in closed form: samples at one standard deviation, and the rows of their cuts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The next test cut: one that can be set, more likely stable than not, and worth it; none where nothing is gained."""
+"""Next test cut: can be set, more likely stable than not, with a gain; none without a gain."""
 
 from __future__ import annotations
 

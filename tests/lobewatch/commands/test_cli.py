@@ -82,7 +82,7 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
 
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SHORT = """
 import time
 from filelock import FileLock

@@ -22,12 +22,12 @@ from lobewatch.machine.verify_files import verify
 from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 RATE, TURN = 25600.0, 12077.0 / 60
 
 
 def recording(path: Path, chatter: float | None = None, seconds: float = 1.2) -> Path:
-    """Of four teeth at 12 077 rpm, as MATLAB text: time and acceleration."""
+    """Write MATLAB text of a cut with four teeth at 12 077 rpm: time and acceleration."""
     random, n = np.random.default_rng(0), round((seconds + 0.8) * RATE)
     time, begin = np.arange(n) / RATE, round(0.5 * RATE)
     signal = random.normal(scale=0.05, size=n)

@@ -25,7 +25,7 @@ from lobewatch.measurement import Measurement, measure
 from lobewatch.show.report.report import render_report
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SPINDLE = "# The spindle of the example"
 SAFE = """
 [[program]]

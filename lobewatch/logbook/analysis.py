@@ -65,7 +65,7 @@ class Analysis:
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
         """Usable test cuts, oldest first."""
-        return tuple(cut for cut in self.files.cuts if cut.is_usable)
+        return tuple(cut for cut in self.files.contents.cuts if cut.is_usable)
 
     @property
     def history(self) -> History:
@@ -286,6 +286,6 @@ class Analysis:
             now or datetime.now(UTC),
             self.folder.path,
             files.remarks,
-            files.acknowledgements,
+            files.contents.acknowledgements,
             files.fleet_scatter,
         )

@@ -8,7 +8,10 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
+
+import msgspec
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
@@ -16,7 +19,7 @@ from lobewatch.machine.journal import alarm_entries
 from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
-from lobewatch.machine.journal.tap_entry import NO_MODE_EDITS, TapEntry, decode_tap_entries
+from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
@@ -48,7 +51,7 @@ class FolderContents:
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
         """Return the contents with a newly committed tap test."""
-        is_newest = not self.taps or _tap_time(self.taps[-1]) <= _tap_time(entry)
+        is_newest = not self.taps or self.taps[-1].created <= entry.created
         taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
         return replace(self, taps=taps, line_count=self.line_count + 1)
 
@@ -108,12 +111,12 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
     excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
     by_hand = journal_entries.read_mode_edits(reading.other_entries)
-    entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
-    for line in reading.other_entries:
-        if line["kind"] == "tap":
-            name = line["id"]
-            later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
-            entries[name] = TapEntry.from_line(line, *later)
+    old = (TapEntry.from_line(line) for line in reading.other_entries if line["kind"] == "tap")
+    entries = {entry.id: entry for entry in (*decode_tap_entries(reading.tap_lines), *old)}
+    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
+        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+        changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
+        entries[name] = msgspec.structs.replace(entries[name], **changes)
     return entries
 
 
@@ -200,8 +203,4 @@ def read_given_up_ids(reading: JournalReading) -> set[str]:
 
 
 def _sort_by_time(entries: Iterable[TapEntry]) -> tuple[TapEntry, ...]:
-    return tuple(sorted(entries, key=_tap_time))
-
-
-def _tap_time(entry: TapEntry) -> datetime:
-    return datetime.fromisoformat(entry.time)
+    return tuple(sorted(entries, key=attrgetter("created")))

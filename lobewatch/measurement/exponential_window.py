@@ -1,7 +1,4 @@
-"""Exponential windows on responses: correct, apply and detect them.
-
-record ends; modes without them.
-"""
+"""Exponential windows on responses: correct, apply and detect them."""
 
 from __future__ import annotations
 
@@ -91,10 +88,8 @@ class Window:
             raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
         hit_at = float(np.mean([find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
         if not hit_at >= self.start:
-            raise ValueError(
-                f"Window.start {self.start:g}: the window begins after the hit at {hit_at:.4g} s; "
-                "both count from the record's start"
-            )
+            problem = f"the window begins after the hit at {hit_at:.4g} s; both count from the record's start"
+            raise ValueError(f"Window.start {self.start:g}: {problem}")
         return hit_at - self.start
 
 
@@ -117,9 +112,8 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
             "exponential one with Window.time_constant, export the file anew where it is another"
         )
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
-        raise ValueError(
-            f"Window.time_constant {window.time_constant:g}: the file says {named:.4g} s; leave the option out"
-        )
+        option = f"Window.time_constant {window.time_constant:g}"
+        raise ValueError(f"{option}: the file says {named:.4g} s; leave the option out")
     return window
 
 
@@ -168,17 +162,11 @@ def remove_recorded_window(
     rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
     kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]
     wider = (widen_for_window(mode, time_constant, record) for mode in kept)
-    remarks = tuple(
-        _slow_decay_remark(mode, time_constant) for mode, is_mode in zip(modes, rings, strict=True) if not is_mode
-    )
-    return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
-
-
-def _slow_decay_remark(mode: Mode, time_constant: float) -> Remark:
     text = f"decays no faster than the window of {time_constant:.3g} s: no mode behind it, left out"
-    return Remark(
-        "slower-than-window", f"{mode.frequency:.0f} Hz", text, "a wrong Window.time_constant does that to all modes"
-    )
+    said = text, "a wrong Window.time_constant does that to all modes"
+    slow = [mode for mode, is_mode in zip(modes, rings, strict=True) if not is_mode]
+    remarks = tuple(Remark("slower-than-window", f"{mode.frequency:.0f} Hz", *said) for mode in slow)
+    return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
 
 
 def refit_ringing_modes(
@@ -195,7 +183,7 @@ def refit_ringing_modes(
     best, remarks = list[Mode](), list[Remark]()
     for mode in modes:
         same = _find_same_mode(mode, refitted) if _is_ringing(mode) else None
-        best.append(mode if same is None else same)
+        best.append(same or mode)
         if same is not None:
             remarks.append(own_window_remark(f"{same.frequency:.0f} Hz", tau, "a longer record needs none"))
     return tuple(best), tuple(remarks)
@@ -208,12 +196,9 @@ def _is_ringing(mode: Mode) -> bool:
 
 def _find_same_mode(mode: Mode, candidates: Sequence[Mode]) -> Mode | None:
     """Return the nearest candidate within a half-power half-width, or None."""
-
-    def distance(candidate: Mode) -> float:
-        return abs(candidate.frequency - mode.frequency)
-
-    near = [candidate for candidate in candidates if distance(candidate) < mode.damping_ratio * mode.frequency]
-    return min(near, key=distance, default=None)
+    nearest = min(candidates, key=lambda candidate: abs(candidate.frequency - mode.frequency), default=None)
+    is_near = nearest and abs(nearest.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+    return nearest if is_near else None
 
 
 def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterator[Remark]:
@@ -227,4 +212,6 @@ def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterato
     if tau is not None:
         lost = "damping is too large, and stiffness by what it had lost by the hit"
         text = f"{sign}, as under an exponential window of {tau:.2g} s: {lost}"
-        yield Remark("window-suspected", "", text, "look it up, and name it with --window, or export without")
+        yield Remark(
+            "window-suspected", "", text, "look it up, and name it with Window.time_constant, or export without"
+        )

@@ -99,7 +99,9 @@ def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, descripti
         ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing or not hits[0].has_force:
             raise
-        return _average_ringing_hits(ringing)
+        frf, windowed, tau = window_ringing_hits(ringing)
+        cure = "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
+        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),))
 
 
 def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
@@ -107,30 +109,20 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            raise ValueError(
-                f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}"
-            )
+            allowed = ", ".join(flags)
+            raise ValueError(f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {allowed}")
         accepted |= flags[code]
     return accepted
-
-
-def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
-    frf, windowed, tau = window_ringing_hits(hits)
-    remark = own_window_remark(
-        "", tau, "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
-    )
-    return FileFrf(frf, windowed, tau, (remark,))
 
 
 def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
     """Set the number of averages behind the coherence: as given, else as in the file, else inferred."""
     if averages is not None:
+        option = f"Description.averages {averages}"
         if averages < 1:
-            raise ValueError(f"Description.averages {averages}: give the number of hits averaged, 1 or more")
+            raise ValueError(f"{option}: give the number of hits averaged, 1 or more")
         if frf.coherence is None:
-            raise ValueError(
-                f"Description.averages {averages}: {path.name} has no coherence to use it with; leave it out"
-            )
+            raise ValueError(f"{option}: {path.name} has no coherence to use it with; leave it out")
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)

@@ -75,10 +75,7 @@ STIFFNESS_OFF_MODEL = RecordingQuestion(
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
 A real spindle is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
-MODE_QUESTIONS = (
-    *(FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW),
-    *(STIFFNESS_JUMP, STIFFNESS_OFF_MODEL),
-)
+MODE_QUESTIONS = (FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW, STIFFNESS_JUMP, STIFFNESS_OFF_MODEL)
 RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
@@ -158,10 +155,9 @@ def find_accepted_codes(remarks: Iterable[Remark]) -> frozenset[str]:
 def check_question_codes(codes: Iterable[str]) -> list[str]:
     """Return each code once; ValueError for an unknown one."""
     distinct = list(dict.fromkeys(codes))
-    for code in distinct:
-        if code not in RECORDING_QUESTIONS:
-            questions = ", ".join(RECORDING_QUESTIONS)
-            raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
+    for code in [code for code in distinct if code not in RECORDING_QUESTIONS]:
+        questions = ", ".join(RECORDING_QUESTIONS)
+        raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
     return distinct
 
 
@@ -227,7 +223,7 @@ def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable
     """Return the codes of the questions about the time of a test; now: time of its commit, None for a replay."""
     if now is None:
         return ()
-    newest = max((datetime.fromisoformat(tap.time) for tap in taps if not tap.excluded), default=None)
+    newest = max((tap.created for tap in taps if not tap.excluded), default=None)
     is_asked = {
         clock.CLOCK_BEHIND: newest is not None and (now < newest or created < newest - MAX_RESUME_AGE),
         clock.CLOCK_BEFORE_RELEASE: created < clock.FIRST_RELEASE,

@@ -128,8 +128,7 @@ def compute_model_frf(state: ModelState) -> Frf:
     Frf
         Receptance (m/N) at the tapped place, or at the tip of another tool.
     """
-    machine = state.machine
-    table = machine.spindle
+    machine, table = state.machine, state.machine.spindle
     if table is None:
         raise DataError("no model: add a [spindle] table")
     first = float(natural_frequencies(state.spindle, 1)[0])
@@ -210,13 +209,8 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
         ModelMode(float(frequency[n]), float(stiffness[n]), *(float(np.sum(part[n])) for part in parts))
         for n in range(count)
     )
-    return ModelSummary(
-        state,
-        modes,
-        static_stiffness(state.spindle),
-        first_critical_speed(state.spindle),
-        float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0]),
-    )
+    rigid = float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0])
+    return ModelSummary(state, modes, static_stiffness(state.spindle), first_critical_speed(state.spindle), rigid)
 
 
 @dataclass(frozen=True)
@@ -278,7 +272,8 @@ def calibrate_model(
     """
     spindle = machine.model(machine.tap.tool)
     stiffness: Calibration | StiffnessFit
-    if len(frequency) == 1 and _has_one_bearing_factor(spindle, group):
+    scales_joints = not {joint.group for joint in spindle.joints}.isdisjoint(group)
+    if len(frequency) == 1 and len(group) <= 1 and not scales_joints:
         number = mode[0] if mode else machine.mode.model_mode
         std, name = frequency_std[0] if frequency_std else None, group[0] if group else None
         stiffness = calibrate(spindle, frequency[0], std, number, name)
@@ -290,7 +285,3 @@ def calibrate_model(
     if damping_ratio is not None:
         dampers = calibrate_damping(stiffness.spindle, damping_ratio, mode=number, group=group[0] if group else None)
     return ModelCalibration(machine.spindle.label if machine.spindle else "", stiffness, dampers)
-
-
-def _has_one_bearing_factor(spindle: Spindle, group: Sequence[str]) -> bool:
-    return len(group) <= 1 and not {joint.group for joint in spindle.joints} & set(group)

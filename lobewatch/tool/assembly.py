@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -178,35 +178,32 @@ def assemble(
     moved = None if across is None else _frequency_change_since(across.time, series.get(newest.direction, ()))
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
-    directions = tuple(name for name in ("x", "y") if modes.get(name))
     signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
-    return Assembly(
-        tool=newest.tool,
-        time=newest.time,
-        tap_id=newest.tap_id,
-        x=modes.get("x") or modes.get("y"),
-        y=modes.get("y") or modes.get("x"),
-        directions=directions,
-        calibration=next((tap.calibration for tap in taps if tap.calibration is not None), None),
+    calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
+    direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
+    followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
+    open_questions = [(tap.tap_id, question) for tap in taps for question in find_open_questions(tap.remarks)]
+    assembly = make_assembly(newest.tool, newest.time, newest.tap_id, modes, calibration)
+    return replace(
+        assembly,
         taps={tap.direction: tap.tap_id for tap in taps},
         predicted=False,
-        remarks=(*newest.remarks, *_direction_remarks(newest, across, directions, moved), *about_cross),
+        remarks=(*newest.remarks, *_direction_remarks(newest, across, assembly.directions, moved), *about_cross),
         cross=signed,
-        series={direction: modes for direction, modes in series.items() if direction != CROSS_TAP},
-        unusable={
-            tap.direction: _unusable_reason(tap) for tap in taps if not tap.at_tip and tap.direction != CROSS_TAP
-        },
-        without_stiffness={
-            tap.direction: mode for tap in taps if (mode := tap.followed) and _lacks_stiffness(tap, mode)
-        },
-        questions=tuple(
-            label_question(tap.tap_id, asked) for tap in taps for asked in find_open_questions(tap.remarks)
-        ),
+        series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
+        unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
+        without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
+        questions=tuple(label_question(*question) for question in open_questions),
     )
 
 
-def _lacks_stiffness(tap: Measurement, mode: Mode) -> bool:
-    return tap.direction != CROSS_TAP and not mode.has_stiffness
+def make_assembly(
+    tool: str, time: datetime, tap_id: str, modes: Mapping[str, TipModes], calibration: Calibration | None
+) -> Assembly:
+    """Make the assembly of a predicted tool from its modes at the tip by direction."""
+    x, y = modes.get("x"), modes.get("y")
+    directions = tuple(name for name in ("x", "y") if modes.get(name))
+    return Assembly(tool, time, tap_id, x or y, y or x, directions, calibration, {}, True, ())
 
 
 def _unusable_reason(tap: Measurement) -> tuple[str, str]:

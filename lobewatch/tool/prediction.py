@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from dsm import Calibration, calibrate, modes_at
 from lobewatch.machine import Machine
 from lobewatch.measurement.spindle_model import build_model_state
 from lobewatch.measurement.tap_measurement import Measurement
-from lobewatch.tool.assembly import Assembly, untapped_remark
+from lobewatch.tool.assembly import Assembly, make_assembly, untapped_remark
 from lobewatch.tool.principal_directions import TipModes
 from modal import Mode
 
@@ -35,19 +36,10 @@ def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str)
     modes: dict[str, TipModes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
     ids = " and ".join(tap.tap_id for tap in newest)
     remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
-    directions = tuple(name for name in ("x", "y") if name in modes)
-    return Assembly(
-        tool=tool,
-        time=newest[0].time,
-        tap_id=f"prediction from {newest[0].tap_id}",
-        x=modes.get("x") or modes.get("y"),
-        y=modes.get("y") or modes.get("x"),
-        directions=directions,
-        calibration=predictions[newest[0].direction][1],
-        taps={},
-        predicted=True,
-        remarks=(remark, *([untapped_remark(tool, directions[0])] if len(directions) == 1 else [])),
-    )
+    name, calibration = f"prediction from {newest[0].tap_id}", predictions[newest[0].direction][1]
+    assembly = make_assembly(tool, newest[0].time, name, modes, calibration)
+    tapped = assembly.directions
+    return replace(assembly, remarks=(remark, *([untapped_remark(tool, tapped[0])] if len(tapped) == 1 else [])))
 
 
 def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:

@@ -77,8 +77,7 @@ def _to_utc(date: datetime) -> datetime:
 
 
 def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
-    times = [datetime.fromisoformat(tap.time) for tap in taps]
-    tapped = [time for time in times if begin <= time < begin + timedelta(days=1)]
+    tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
     if tapped:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
         raise ValueError(

@@ -19,10 +19,7 @@ NamedTable = TypeVar("NamedTable", bound=CutTable)
 
 SETTING_KEYS = ("speed_rpm", "depth_mm")
 """Keys of the setting of a program."""
-REQUIRED_CUT_KEYS = (
-    *SETTING_KEYS,
-    *("tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction"),
-)
+REQUIRED_CUT_KEYS = (*SETTING_KEYS, *("tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction"))
 """Keys of a [[program]] that a requested cut needs."""
 COEFFICIENT_KEYS = {"tangential_n_per_mm2", "radial_n_per_mm2"}
 """Keys that replace a material."""
@@ -79,10 +76,7 @@ def find_cut_setting(
     power_kw is the power shown in the cut less that in air. Raises ValueError for an unknown name or an invalid value.
     """
     table = find_by_name(machine.cut_tables, program)
-    for name, key, value, unit in (
-        ("speed", "speed_rpm", speed_rpm, "rpm"),
-        ("depth", "depth_mm", depth_mm, "mm"),
-    ):
+    for name, key, value, unit in (("speed", "speed_rpm", speed_rpm, "rpm"), ("depth", "depth_mm", depth_mm, "mm")):
         if value is not None and not _is_positive(value):
             raise ValueError(
                 f"ProgramTable.{key} {value:g}: is not above 0; give the {name} that was cut with, in {unit}"

@@ -61,17 +61,11 @@ class LockHolder(msgspec.Struct, frozen=True):
         return f"`{self.command}` (process {self.process}, since {self.since.astimezone():%H:%M})"
 
 
-class _ThreadState(threading.local):
-    """State of a thread."""
-
-    holds = False
-
-
 class FolderLock:
     """Lock of one folder; a thread may hold it several times over."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, _ThreadState()
+        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, threading.local()
 
     @contextlib.contextmanager
     def hold(self, patience: float) -> Iterator[None]:
@@ -79,7 +73,7 @@ class FolderLock:
 
         Raises OSError if the folder is missing, cannot be written, or its file system has no locks.
         """
-        if self._thread.holds:
+        if getattr(self._thread, "holds", False):
             yield
             return
         with contextlib.ExitStack() as stack:

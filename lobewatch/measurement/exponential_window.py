@@ -212,6 +212,5 @@ def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterato
     if tau is not None:
         lost = "damping is too large, and stiffness by what it had lost by the hit"
         text = f"{sign}, as under an exponential window of {tau:.2g} s: {lost}"
-        yield Remark(
-            "window-suspected", "", text, "look it up, and name it with Window.time_constant, or export without"
-        )
+        cure = "look it up, and name it with Window.time_constant, or export without"
+        yield Remark("window-suspected", "", text, cure)

@@ -75,9 +75,8 @@ class MountingTracker:
         self._hours = now
         if before is not None and now < before:
             text = f"running hours {now:g} h, {before:g} h before: forecasts of a series that it is in count in days"
-            yield Remark(
-                "hours-went-back", tap.tool, text, "exclude it and replay its file with the right Conditions.hours"
-            )
+            cure = "exclude it and replay its file with the right Conditions.hours"
+            yield Remark("hours-went-back", tap.tool, text, cure)
 
 
 def _differing_conditions(first: Conditions, second: Conditions) -> list[str]:

@@ -7,6 +7,7 @@ short, never longer.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import json
@@ -14,7 +15,9 @@ import os
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 
 import msgspec
@@ -61,8 +64,7 @@ class JournalReading:
 
 
 def _decode_lines(lines: Iterable[bytes]) -> list[JournalEntry]:
-    entries: list[JournalEntry] = msgspec.json.decode(b"[" + b",".join(lines) + b"]")
-    return entries
+    return msgspec.json.decode(b"[" + b",".join(lines) + b"]", type=list[JournalEntry])
 
 
 class Journal:
@@ -95,8 +97,7 @@ class Journal:
         """Append entries with one write and one fsync; they are committed on return.
 
         reading: fresh reading if nobody else can have written since. Raises DataError, and writes nothing, for a
-        damaged
-        journal.
+        damaged journal.
         """
         reading = reading or self.read()
         self.refuse_damage(reading)
@@ -104,15 +105,12 @@ class Journal:
             self._repair(reading)
         first = len(reading.lines) + 1
         batch = {BATCH_KEY: first} if len(entries) > 1 else {}
-        lines = [reading.lines[-1] if reading.lines else b""]
-        for number, entry in enumerate(entries, first):
-            lines.append(_encode_line(entry | batch, number, lines[-1]))
-        _append_lines(self.path, lines[1:])
+        last = reading.lines[-1] if reading.lines else b""
+        lines = _encode_lines((entry | batch for entry in entries), first, last)
+        _append_lines(self.path, lines)
         self.line_count = len(reading.lines) + len(entries)
-        try:
-            _append_lines(self.copy_path, lines[1:])
-        except OSError:  # it is committed; the copy is brought up at the next line
-            return
+        with contextlib.suppress(OSError):  # it is committed; the copy is brought up at the next line
+            _append_lines(self.copy_path, lines)
 
     def refuse_damage(self, reading: JournalReading | None = None) -> None:
         """Raise DataError if the journal is damaged."""
@@ -125,10 +123,7 @@ class Journal:
         for path in (self.path, self.copy_path):
             if path.exists():
                 _back_up_bytes(path, read_regular_file(path), "damaged")
-        lines: list[bytes] = []
-        for number, entry in enumerate(entries, 1):
-            lines.append(_encode_line(entry, number, lines[-1] if lines else b""))
-        content = b"".join(line + b"\n" for line in lines)
+        content = b"".join(line + b"\n" for line in _encode_lines(entries))
         atomic_write(self.path, content)
         atomic_write(self.copy_path, content)
 
@@ -202,20 +197,26 @@ def _are_one_batch(lines: Sequence[bytes]) -> bool:
     return len(written) < 2
 
 
-def _encode_line(entry: JournalEntry, number: int, last: bytes) -> bytes:
-    """Encode an entry without its line end; last: previous line, without its line end."""
-    fields = {name: value for name, value in entry.items() if name != "crc"}
-    fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
-    return json.dumps(fields | {"crc": compute_crc(fields)}).encode()
+def make_entry(kind: str, now: datetime | None = None, /, **fields: object) -> JournalEntry:
+    """Make an entry of a kind; now: time of writing, by default that of the clock."""
+    return {"kind": kind, **fields, "time": (now or datetime.now(UTC)).isoformat()}
 
 
-def _back_up_bytes(path: Path, content: bytes, why: str) -> Path:
+def _encode_lines(entries: Iterable[JournalEntry], first: int = 1, last: bytes = b"") -> list[bytes]:
+    """Encode entries without line ends; first: number of the first one; last: line before it, without its line end."""
+    lines = []
+    for number, entry in enumerate(entries, first):
+        fields = {name: value for name, value in entry.items() if name != "crc"}
+        fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
+        last = json.dumps(fields | {"crc": compute_crc(fields)}).encode()
+        lines.append(last)
+    return lines
+
+
+def _back_up_bytes(path: Path, content: bytes, why: str) -> None:
     """Write bytes to a new file PATH.1.REASON, PATH.2.REASON, ... before they are overwritten."""
-    number = 1
-    while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():
-        number += 1
-    atomic_write(aside, content)
-    return aside
+    asides = (path.with_name(f"{path.name}.{number}.{why}") for number in count(1))
+    atomic_write(next(aside for aside in asides if not aside.exists()), content)
 
 
 def journal_damage_remark(path: Path, fault: str) -> Remark:

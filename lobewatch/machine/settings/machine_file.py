@@ -7,6 +7,7 @@ import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -205,10 +206,9 @@ class Machine(toml_schema.TomlTable, frozen=True):
         table
             Cut or program.
         """
-        name = table.tool if isinstance(table, ProgramTable) else None
-        return self.tool_table(name)
+        return self.tool_table(table.tool) if isinstance(table, ProgramTable) else None
 
-    def tool_table(self, name: str | None) -> ToolTable | None:
+    def tool_table(self, name: str) -> ToolTable | None:
         """Return the [[tool]] of a name; None without one.
 
         Parameters
@@ -244,10 +244,8 @@ class Machine(toml_schema.TomlTable, frozen=True):
             if not tool.segments:
                 continue
             if tool.name == self.tap.tool:
-                raise ValueError(
-                    f"tool {i}: segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]; "
-                    "leave them out here, or give another name"
-                )
+                problem = f"segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]"
+                raise ValueError(f"tool {i}: {problem}; leave them out here, or give another name")
             if self.spindle is None or self.spindle.tool_length_mm is None:
                 part = f"the part of the shaft that is {self.tap.tool!r}"
                 raise ValueError(f"tool {i}: needs [spindle] tool_length_mm, {part}")
@@ -311,19 +309,12 @@ class Machine(toml_schema.TomlTable, frozen=True):
         tool
             Name of the tool.
         """
-        tables = {
-            name: table
-            for name, table in self.cut_tables.items()
-            if not isinstance(table, ProgramTable) or table.tool == tool
-        }
-        return {
-            name: tuple(
-                replace(cut, feed_angle=FEED_ANGLES[axis])
-                for cut in self.engaged_cuts(table)
-                for axis in table.feed_axes
-            )
-            for name, table in tables.items()
-        }
+        cuts = {}
+        for name, table in self.cut_tables.items():
+            if not isinstance(table, ProgramTable) or table.tool == tool:
+                directed = product(self.engaged_cuts(table), table.feed_axes)
+                cuts[name] = tuple(replace(cut, feed_angle=FEED_ANGLES[axis]) for cut, axis in directed)
+        return cuts
 
     @property
     def cut_names(self) -> list[str]:

@@ -148,11 +148,8 @@ def _check_same_tool(
 
 def _check_program_tool(program: ProgramTable, tool: ToolTable, place: str) -> Iterator[ImplausibleSetting]:
     """Yield values of a program that its [[tool]] contradicts."""
-    for key, tool_key in {
-        "teeth": "teeth",
-        "tool_diameter_mm": "diameter_mm",
-        "flute_length_mm": "flute_length_mm",
-    }.items():
+    for key in ("teeth", "tool_diameter_mm", "flute_length_mm"):
+        tool_key = key.removeprefix("tool_")
         value, tool_value = getattr(program, key), getattr(tool, tool_key)
         if None not in (value, tool_value) and value != tool_value:
             why = f"where {tool_key} of [[tool]] {tool.name!r} is {tool_value:g}: a radius, an inch, another tool?"

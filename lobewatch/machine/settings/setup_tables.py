@@ -103,9 +103,8 @@ class TapTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self.conditions(self.tool)
         if self.hammer == "none" and self.trigger_n is not None:
-            raise ValueError(
-                f'trigger_n={self.trigger_n:g} with hammer="none": no force triggers; leave it out, trial hits choose'
-            )
+            problem = 'with hammer="none": no force triggers; leave it out, trial hits choose'
+            raise ValueError(f"trigger_n={self.trigger_n:g} {problem}")
         if self.cable_mass_g and self.sensor_mass_g is None:
             raise ValueError(f"cable_mass_g={self.cable_mass_g:g} without sensor_mass_g; give both")
 
@@ -165,10 +164,10 @@ class SpeedTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         if not self.low_rpm < self.high_rpm:
-            around = (
-                f"of a spindle of one speed give what is around it, {0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
-            )
-            cure = around if self.low_rpm == self.high_rpm else "give the lowest, then the highest"
+            cure = "give the lowest, then the highest"
+            if self.low_rpm == self.high_rpm:
+                around = f"{0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
+                cure = f"of a spindle of one speed give what is around it, {around}"
             raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}; {cure}")
 
 

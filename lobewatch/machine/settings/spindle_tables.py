@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Sequence
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
@@ -124,24 +124,20 @@ class SpindleTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         length = sum(segment.length_mm for segment in self.segments)
-        kinds: dict[str, Sequence[BearingTable | MassTable | JointTable]] = {
-            "bearing": self.bearings,
-            "mass": self.masses,
-            "joint": self.joints,
-        }
+        kinds: dict[str, Sequence[Any]] = {"bearing": self.bearings, "mass": self.masses, "joint": self.joints}
         for kind, parts in kinds.items():
             for i, part in enumerate(parts, 1):
                 if part.position_mm > length:
-                    raise ValueError(
-                        f"{kind} {i}: position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
-                    )
+                    place = f"position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
+                    raise ValueError(f"{kind} {i}: {place}")
         first = min(bearing.position_mm for bearing in self.bearings)
         if self.tool_length_mm is not None and self.tool_length_mm > first:
-            raise ValueError(
-                f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing, at {first:g} mm; "
-                "give the length of the tool alone"
-            )
-        _check_model(self.build)
+            problem = f"reaches beyond the first bearing, at {first:g} mm; give the length of the tool alone"
+            raise ValueError(f"tool_length_mm={self.tool_length_mm:g} {problem}")
+        try:
+            self.build()
+        except ValueError as error:
+            raise ValueError(f"{error} (here in SI units)") from error
 
     def build(self) -> Spindle:
         """Build the spindle in SI units."""
@@ -166,14 +162,6 @@ def _to_metres(millimetres: float | None) -> float | None:
     return None if millimetres is None else millimetres / 1e3
 
 
-def _check_model(build: Callable[[], Spindle]) -> None:
-    """Refuse what dsm refuses, whose messages are in SI units."""
-    try:
-        build()
-    except ValueError as error:
-        raise ValueError(f"{error} (here in SI units)") from error
-
-
 class ToolTable(TomlTable, frozen=True):
     """Table [[tool]]; segments from the tip to the holder are for a tool that the model predicts."""
 
@@ -195,10 +183,8 @@ class ToolTable(TomlTable, frozen=True):
         for key in ("cutting_speed_m_min", "feed_per_tooth_mm"):
             value = getattr(self, key)
             if isinstance(value, tuple) and value[0] > value[1]:
-                low, high = value
-                raise ValueError(
-                    f"{key}=[{low:g}, {high:g}] does not rise; give [least, greatest], or the greatest alone"
-                )
+                cure = "give [least, greatest], or the greatest alone"
+                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] does not rise; {cure}")
         if self.masses and not self.segments:
             raise ValueError("masses without segments; give the shape of the tool too, or leave the masses out")
 

@@ -74,20 +74,16 @@ def _find_table_type(place: str, root: type[TomlTable]) -> type[TomlTable]:
     """Return the type of the table at a place like ".program[0]"."""
     table = root
     for key in re.findall(r"\.(\w+)", place):
-        table = next(
-            kind
-            for kind in _iterate_types(_find_field_type(table, key))
-            if isinstance(kind, type) and issubclass(kind, TomlTable)
-        )
+        kinds = (kind for kind in _iterate_types(_find_field_type(table, key)) if isinstance(kind, type))
+        table = next(kind for kind in kinds if issubclass(kind, TomlTable))
     return table
 
 
 def _list_choices(place: str, root: type[TomlTable]) -> list[str]:
     """Return the allowed words at a place like ".program[0].wear"."""
     parent, _, key = place.rpartition(".")
-    return [
-        kind for kind in _iterate_types(_find_field_type(_find_table_type(parent, root), key)) if isinstance(kind, str)
-    ]
+    kinds = _iterate_types(_find_field_type(_find_table_type(parent, root), key))
+    return [kind for kind in kinds if isinstance(kind, str)]
 
 
 def _find_field_type(table: type[TomlTable], key: str) -> object:

@@ -202,17 +202,9 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     per_rpm = math.pi * table.tool_diameter_mm / 1e3
     fastest = min(machine.speed.high_rpm, tool.max_speed_rpm)
     low, high = (0.0, math.inf) if speed is None else (speed.low / per_rpm, speed.high / per_rpm)
-    begin = low if low <= fastest else 0.0
-    return ToolLimits(
-        tool,
-        cut,
-        max(machine.speed.low_rpm, begin),
-        min(fastest, high),
-        speed,
-        feed,
-        _find_max_depth_mm(table, tool),
-        tuple(_find_missing_data(machine, table, tool, speed, feed)),
-    )
+    speeds = max(machine.speed.low_rpm, low if low <= fastest else 0.0), min(fastest, high)
+    missing = tuple(_find_missing_data(machine, table, tool, speed, feed))
+    return ToolLimits(tool, cut, *speeds, speed, feed, _find_max_depth_mm(table, tool), missing)
 
 
 def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:

@@ -33,8 +33,6 @@ MODEL_VALUE_UNITS = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"
 """Units of the values of the model."""
 ModeValues = tuple[float, float, float, float]
 """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of a mode."""
-WatchedEstimates = Sequence[tuple[float, float]]
-"""Monitored values with their standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +103,8 @@ class HistoryRow:
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
 
     @property
-    def watched(self) -> WatchedEstimates:
-        """Monitored values."""
+    def watched(self) -> Sequence[tuple[float, float]]:
+        """Monitored values with their standard errors."""
         return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
 
     @property

@@ -9,17 +9,8 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from acquisition import (
-    DataError,
-    Device,
-    DeviceError,
-    MeasuredRate,
-    Remark,
-    atomic_write,
-    check_rate,
-    measure_rate,
-    rate_remark,
-)
+import acquisition
+from acquisition import DataError, Device, DeviceError, MeasuredRate, Remark
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder import MachineFolder
 
@@ -95,7 +86,7 @@ def check_device_rate(
     if not has_clock(device):
         return device.sample_rate
     measured = find_stored_rate(folder, device) or _measure_rate(device, seconds, clock)
-    doubt = rate_remark(measured)
+    doubt = acquisition.rate_remark(measured)
     if doubt is not None and remarks is not None:
         remarks.append(doubt)
     return apply_measured_rate(folder, device, measured)
@@ -103,9 +94,9 @@ def check_device_rate(
 
 def _measure_rate(device: Device, seconds: float, clock: Callable[[], float]) -> MeasuredRate:
     """Measure until a rate is certain, and return the most certain one."""
-    tries = [measure_rate(device, seconds, clock)]
+    tries = [acquisition.measure_rate(device, seconds, clock)]
     while not tries[-1].is_accurate and len(tries) < MAX_RATE_MEASUREMENTS:
-        tries.append(measure_rate(device, seconds, clock))
+        tries.append(acquisition.measure_rate(device, seconds, clock))
     return min(tries, key=lambda measured: measured.std / measured.rate)
 
 
@@ -169,7 +160,7 @@ def apply_measured_rate(folder: MachineFolder, device: Device, measured: Measure
         If the measured rate differs from the nominal one and is not accepted.
     """
     try:
-        check_rate(measured, device.sample_rate)
+        acquisition.check_rate(measured, device.sample_rate)
         rate = device.sample_rate
     except DeviceError as error:
         if not measured.is_accurate:
@@ -212,4 +203,4 @@ def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -
     new = StoredDevice(identity.model, identity.serial, device.sample_rate, *numbers, now)
     new = msgspec.structs.replace(new, crc=new.computed_crc)
     content = msgspec.json.format(msgspec.json.encode([*kept, new]), indent=2)
-    atomic_write(folder.path / "daq.json", content + b"\n")
+    acquisition.atomic_write(folder.path / "daq.json", content + b"\n")

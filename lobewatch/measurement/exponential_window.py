@@ -8,18 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from acquisition import (
-    Frf,
-    Hit,
-    Remark,
-    apply_exponential_window,
-    correct_windowed_receptance,
-    estimate_frf,
-    find_hit_time,
-    infer_window,
-    measure_time_after_hit,
-    remove_sensor_mass,
-)
+import acquisition
+from acquisition import Frf, Hit, Remark
 from modal import Mode, Trust, assess_trust, common_decay_rate, fit_modes, remove_window, widen_for_window
 
 TIME_CONSTANT_TOLERANCE = 0.02
@@ -86,7 +76,9 @@ class Window:
             seconds = "the seconds from the record's start (the pre-trigger), 0 where the window begins at the hit"
             cure = f"add Window.hit_at with {seconds}"
             raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
-        hit_at = float(np.mean([find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
+        hit_at = (
+            float(np.mean([acquisition.find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
+        )
         if not hit_at >= self.start:
             problem = f"the window begins after the hit at {hit_at:.4g} s; both count from the record's start"
             raise ValueError(f"Window.start {self.start:g}: {problem}")
@@ -131,9 +123,9 @@ def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], floa
 
     The rest of the ringing at the end of the record acts as if cut off: K is wrong by about that share.
     """
-    tau = min(measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
-    windowed = tuple(apply_exponential_window(hit, tau) for hit in hits)
-    return correct_windowed_receptance(estimate_frf(windowed), tau), windowed, tau
+    tau = min(acquisition.measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
+    windowed = tuple(acquisition.apply_exponential_window(hit, tau) for hit in hits)
+    return acquisition.correct_windowed_receptance(acquisition.estimate_frf(windowed), tau), windowed, tau
 
 
 def own_window_remark(about: str, time_constant: float, cure: str) -> Remark:
@@ -179,7 +171,7 @@ def refit_ringing_modes(
     if not hits or not any(_is_ringing(mode) for mode in modes):
         return tuple(modes), ()
     frf, windowed, tau = window_ringing_hits(hits)
-    refitted = list(remove_own_window(fit_modes(remove_sensor_mass(frf, mass), band, windowed), tau))
+    refitted = list(remove_own_window(fit_modes(acquisition.remove_sensor_mass(frf, mass), band, windowed), tau))
     best, remarks = list[Mode](), list[Remark]()
     for mode in modes:
         same = _find_same_mode(mode, refitted) if _is_ringing(mode) else None
@@ -205,7 +197,7 @@ def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterato
     """Yield a remark on an undeclared exponential window, detected in the hits or else in equal decay rates."""
     trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
     if hits:
-        tau, sign = infer_window(hits), "the noise at the end of the records is lower than before the hits"
+        tau, sign = acquisition.infer_window(hits), "the noise at the end of the records is lower than before the hits"
     else:
         rate, sign = common_decay_rate(trusted), "all modes decay alike, damping falls as 1/f"
         tau = None if rate is None else 1 / rate

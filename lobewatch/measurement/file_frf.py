@@ -6,20 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition import (
-    DataError,
-    Description,
-    Fact,
-    Frf,
-    Hit,
-    HitFlags,
-    Remark,
-    check_hit,
-    estimate_frf,
-    infer_averages,
-    inspect_file,
-    read_frf,
-)
+import acquisition
+from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from modal import ConjugateError, pick_peaks
 
@@ -56,7 +44,7 @@ def read_file_frf(
     """
     accepted, averages = _parse_accepted_flags(accept), description.averages
     description = replace(description, averages=None)
-    recording = inspect_file(path, description)
+    recording = acquisition.inspect_file(path, description)
     if recording.problems:
         phase = "" if conjugate else _check_phase(path, description)
         raise DataError(f"{path}: {recording.problems}{missing_window_text(recording.window, window)}{phase}")
@@ -72,7 +60,7 @@ def read_file_frf(
 def _check_phase(path: Path, description: Description) -> str:
     """Return the fault of the phase of an FRF whose unit or response number is missing, else an empty text."""
     unit, response = description.unit or "m/N", description.response or 1
-    frf = inspect_file(path, replace(description, unit=unit, response=response)).frf
+    frf = acquisition.inspect_file(path, replace(description, unit=unit, response=response)).frf
     try:
         if frf is not None:
             pick_peaks(frf)
@@ -84,17 +72,17 @@ def _check_phase(path: Path, description: Description) -> str:
 
 
 def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
-    verdicts = [check_hit(hit) for hit in hits]
+    verdicts = [acquisition.check_hit(hit) for hit in hits]
     good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
         text = f"{refused} of {len(hits)} hits are averaged though they were refused"
-        frf = estimate_frf(good) if good[0].has_force else None
+        frf = acquisition.estimate_frf(good) if good[0].has_force else None
         return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
     if good and not good[0].has_force:
         return FileFrf(None, tuple(good))
     try:
-        return FileFrf(read_frf(path, description), tuple(good))
+        return FileFrf(acquisition.read_frf(path, description), tuple(good))
     except DataError:
         ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing or not hits[0].has_force:
@@ -126,7 +114,7 @@ def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = infer_averages(frf), "give it with Description.averages"
+    inferred, cure = acquisition.infer_averages(frf), "give it with Description.averages"
     if inferred is None:
         text = "the coherence is not used: the number of averages is not known and cannot be inferred"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+import modal
 from acquisition import DataError, Description, Fact, Frf, Remark, correct_windowed_receptance, remove_sensor_mass
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
@@ -16,20 +17,7 @@ from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
-from modal import (
-    Extraction,
-    Mode,
-    ModeEdits,
-    common_delay,
-    edit_modes,
-    extract_modes,
-    find_peaks_above_band,
-    find_truncated_peaks,
-    match_modes,
-    modes_from_decays,
-    modes_from_extraction,
-    pick_peaks,
-)
+from modal import Extraction, Mode, ModeEdits
 
 UNKNOWN_SENSOR = SensorLoading()
 """Accelerometer without any data."""
@@ -139,8 +127,8 @@ def fit_file_modes(
     edits = by_hand if tau is None else by_hand.with_window(tau)
 
     def fit(bare: Frf) -> FrfFit:
-        state = edit_modes(extract_modes([bare], band), edits)
-        return FrfFit(state, tuple(modes_from_extraction(state, [hits])), mode_edits_remarks(by_hand))
+        state = modal.edit_modes(modal.extract_modes([bare], band), edits)
+        return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), mode_edits_remarks(by_hand))
 
     extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
@@ -155,7 +143,7 @@ def fit_file_modes(
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
     remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
-    picked = tuple(pick_peaks(frf, band))
+    picked = tuple(modal.pick_peaks(frf, band))
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
 
 
@@ -165,8 +153,8 @@ def _fit_decay_modes(
     """Fit the modes of hits without force; DataError if a window adds damping to them."""
     if decays.recorded_window is not None:
         raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
-    state = edit_modes(extract_decay_modes(decays.hits, band), by_hand)
-    modes = tuple(modes_from_decays(state))
+    state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
+    modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks)
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
@@ -174,7 +162,7 @@ def _fit_decay_modes(
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
     yield from check_modes_together(modes)
-    for edge in find_truncated_peaks(frf, modes, band):
+    for edge in modal.find_truncated_peaks(frf, modes, band):
         text = "a peak may be cut by the edge of the lines, its mode missing"
         yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
     if band is None:
@@ -185,7 +173,7 @@ def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | No
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
     """Yield a remark on peaks above the usable band."""
-    peaks = find_peaks_above_band(frf)
+    peaks = modal.find_peaks_above_band(frf)
     if frf.usable_band is None or not peaks:
         return
     where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
@@ -212,7 +200,7 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
         text = "every K is negative: hammer or sensor is mounted or wired the other way round"
         remarks.append(Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign"))
-    delay = common_delay(modes)
+    delay = modal.common_delay(modes)
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
         text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
@@ -274,5 +262,5 @@ def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], other
             problem = "the same numbers are looked at already; name another measurement"
             raise ValueError(f"list_comparison_files.beside {text}: {problem}")
     found = [other.fitted for other in others]
-    as_recorded, fitted = (tuple(match_modes(modes, found)) for modes in (file_modes.as_recorded, file_modes.fitted))
-    return replace(file_modes, as_recorded=as_recorded, fitted=fitted)
+    as_recorded, fitted = (modal.match_modes(modes, found) for modes in (file_modes.as_recorded, file_modes.fitted))
+    return replace(file_modes, as_recorded=tuple(as_recorded), fitted=tuple(fitted))

@@ -229,4 +229,4 @@ def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable
         clock.CLOCK_BEFORE_RELEASE: created < clock.FIRST_RELEASE,
         clock.CLOCK_AHEAD: clock.is_in_future(created, now),
     }
-    return tuple(code for code in is_asked if is_asked[code])
+    return tuple(code for code, asked in is_asked.items() if asked)

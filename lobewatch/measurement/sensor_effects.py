@@ -5,18 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+import modal
 from acquisition import Frf, Hit, Remark, extract_free_decay, remove_sensor_mass
 from lobewatch.machine.settings.setup_tables import SensorLoading
-from modal import (
-    Extraction,
-    Mode,
-    Trust,
-    assess_trust,
-    decay_spectra,
-    extract_modes,
-    mass_loading,
-    with_mass_uncertainty,
-)
+from modal import Extraction, Mode, Trust
 
 TYPICAL_SENSOR_MASS = 0.010
 """Mass of a typical accelerometer (kg), assumed to decide whether an unknown mass matters."""
@@ -56,7 +48,7 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
         remark = _mass_not_removed_remark(sensor, "not the driving point, a K is negative")
         state, modes, remarks = fit(frf)
         return FrfFit(state, modes, (*remarks, remark))
-    modes = tuple(with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
+    modes = tuple(modal.with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
     remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} are taken off")
     return FrfFit(state, modes, (*remarks, remark, *_mounting_remarks(modes, bare, sensor)))
 
@@ -72,17 +64,17 @@ def _format_sensor_mass(sensor: SensorLoading) -> str:
 
 def _trusted_driving_point_modes(modes: Sequence[Mode], frf: Frf) -> list[Mode]:
     """Return the trusted modes at the driving point; empty if one has a negative K."""
-    trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
+    trusted = [mode for mode in modes if modal.assess_trust(mode) is Trust.TRUSTED]
     return trusted if frf.measured_as == "accelerance" and _is_driving_point(trusted) else []
 
 
 def _is_driving_point(modes: Sequence[Mode]) -> bool:
-    return all(mode.is_driving_point for mode in modes if assess_trust(mode) is Trust.TRUSTED)
+    return all(mode.is_driving_point for mode in modes if modal.assess_trust(mode) is Trust.TRUSTED)
 
 
 def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
     trusted = _trusted_driving_point_modes(modes, frf)
-    loadings = [(mode, mass_loading(mode, frf, TYPICAL_SENSOR_MASS)) for mode in trusted]
+    loadings = [(mode, modal.mass_loading(mode, frf, TYPICAL_SENSOR_MASS)) for mode in trusted]
     relevant = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
     if relevant:
         mode, loading = min(relevant, key=lambda pair: pair[1].frequency)
@@ -123,8 +115,8 @@ def extract_decay_modes(hits: Sequence[Hit], band: tuple[float, float] | None = 
     """
     rate, decays = hits[0].sample_rate, [extract_free_decay(hit) for hit in hits]
     shortest = min(map(len, decays))
-    spectra = decay_spectra([decay[:shortest] for decay in decays], rate)
-    return extract_modes(spectra, band or (0.0, MAX_DECAY_FREQUENCY_RATIO * rate))
+    spectra = modal.decay_spectra([decay[:shortest] for decay in decays], rate)
+    return modal.extract_modes(spectra, band or (0.0, MAX_DECAY_FREQUENCY_RATIO * rate))
 
 
 def decay_remarks(sensor: SensorLoading) -> list[Remark]:

@@ -11,25 +11,14 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+import modal
 from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
-from modal import (
-    CredibleModes,
-    Extraction,
-    Mode,
-    ModeEdits,
-    edit_modes,
-    extract_modes,
-    follow_mode,
-    modes_from_decays,
-    modes_from_extraction,
-    predominant_mode,
-    select_credible_modes,
-)
+from modal import CredibleModes, Extraction, Mode, ModeEdits
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
@@ -127,19 +116,19 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
 
 
 def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
-    state, remarks = _apply_edits(extract_modes([frf]), by_hand)
-    return FrfFit(state, tuple(modes_from_extraction(state, [tap.accepted])), remarks)
+    state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
+    return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
 
 
 def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
     state, remarks = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-    return FrfFit(state, tuple(modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
+    return FrfFit(state, tuple(modal.modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
     """Apply mode edits, or return the extraction with a remark if they are impossible."""
     try:
-        return edit_modes(state, by_hand) if by_hand else state, mode_edits_remarks(by_hand)
+        return modal.edit_modes(state, by_hand) if by_hand else state, mode_edits_remarks(by_hand)
     except ValueError as error:
         cure = "say it anew with folder_updates.store_mode_edits, or NO_MODE_EDITS to take it back"
         return state, (Remark(EDITS_NOT_APPLIED_CODE, str(by_hand), str(error), cure),)
@@ -158,7 +147,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         return Measurement(**vars(fit))
     remarks, modes = [*fit.remarks], fit.modes
     with _thread_controller().limit(limits=1):
-        trusted = select_credible_modes(_select_in_band(modes, machine))
+        trusted = modal.select_credible_modes(_select_in_band(modes, machine))
         remarks += trusted.remarks
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
@@ -171,9 +160,9 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
     """Interpret a cross FRF: modes of either sign, and no calibration."""
     signed = _select_in_band(fit.modes, machine)
     plain = [replace(mode, stiffness=abs(mode.stiffness)) for mode in signed]
-    trusted = select_credible_modes(plain)
+    trusted = modal.select_credible_modes(plain)
     cross = [mode for mode, size in zip(signed, plain, strict=True) if size in trusted.modes]
-    followed = predominant_mode(trusted.modes) if last is None else follow_mode(last, trusted.modes).mode
+    followed = modal.predominant_mode(trusted.modes) if last is None else modal.follow_mode(last, trusted.modes).mode
     remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
     if machine.tap.position_mm:
         text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
@@ -193,7 +182,7 @@ def _follow_mode(
     trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
     """Return the credible mode that continues the last one, or the predominant one."""
-    mode = predominant_mode(trusted.modes)
+    mode = modal.predominant_mode(trusted.modes)
     if mode is None:
         remarks.append(questions.no_mode_remark(modes, machine))
     elif last is not None:
@@ -203,7 +192,7 @@ def _follow_mode(
 
 def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
     """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
-    next_mode = follow_mode(last, candidates)
+    next_mode = modal.follow_mode(last, candidates)
     jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)

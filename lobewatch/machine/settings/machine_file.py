@@ -16,16 +16,8 @@ import msgspec
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
-from lobewatch.machine.settings import toml_schema
-from lobewatch.machine.settings.cut_tables import (
-    FEED_ANGLES,
-    CutTable,
-    DriveTable,
-    MaterialTable,
-    ProgramTable,
-    UncertaintyTable,
-    convert_pitch,
-)
+from lobewatch.machine.settings import cut_tables, toml_schema
+from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
@@ -65,13 +57,13 @@ class Machine(toml_schema.TomlTable, frozen=True):
     """Frequency drops that warn and alarm: [limits]."""
     speed: SpeedTable = SpeedTable()
     """Speed range of the lobe diagrams: [speed]."""
-    drive: DriveTable = DriveTable()
+    drive: cut_tables.DriveTable = cut_tables.DriveTable()
     """Power and torque of the spindle motor: [drive]."""
-    doubt: UncertaintyTable = UncertaintyTable()
+    doubt: cut_tables.UncertaintyTable = cut_tables.UncertaintyTable()
     """Uncertainty of the inputs: [doubt]."""
     notify: NotifyTable = NotifyTable()
     """Broker for alarms: [notify]."""
-    material: tuple[MaterialTable, ...] = ()
+    material: tuple[cut_tables.MaterialTable, ...] = ()
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
     """Cut that is watched besides the programs: [reference_cut]."""
@@ -155,15 +147,10 @@ class Machine(toml_schema.TomlTable, frozen=True):
             Cut or program.
         """
         coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
-        return Cut(
-            teeth=table.teeth,
-            immersion=table.immersion,
-            direction=table.direction,
-            tangential=coefficients.tangential,
-            radial=coefficients.radial,
-            helix_lag=2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter,
-            pitch=convert_pitch(self.pitch_deg(table), table.teeth),
-        )
+        lag = 2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter
+        pitch = cut_tables.convert_pitch(self.pitch_deg(table), table.teeth)
+        shape, pressures = (table.teeth, table.immersion), (coefficients.tangential, coefficients.radial)
+        return Cut(*shape, table.direction, *pressures, helix_lag=lag, pitch=pitch)
 
     def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
         """Return a cut at each radial depth along its path, feed along x.
@@ -224,7 +211,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         if tool is None:
             return
         try:
-            convert_pitch(self.pitch_deg(program), program.teeth)
+            cut_tables.convert_pitch(self.pitch_deg(program), program.teeth)
         except ValueError as error:
             raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
@@ -313,7 +300,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         for name, table in self.cut_tables.items():
             if not isinstance(table, ProgramTable) or table.tool == tool:
                 directed = product(self.engaged_cuts(table), table.feed_axes)
-                cuts[name] = tuple(replace(cut, feed_angle=FEED_ANGLES[axis]) for cut, axis in directed)
+                cuts[name] = tuple(replace(cut, feed_angle=cut_tables.FEED_ANGLES[axis]) for cut, axis in directed)
         return cuts
 
     @property

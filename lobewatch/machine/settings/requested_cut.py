@@ -57,15 +57,10 @@ class CutSetting:
 
     def cut_entry_fields(self, speed_rpm: float) -> dict[str, Any]:
         """Return the fields of a `CutEntry` that follow from the setting and the true speed (rpm)."""
-        feed = self.table.feed_per_tooth_mm
-        shared = {name: getattr(self, name) for name in ("program", "tool", "cut", "feed", "depth")}
-        return shared | {
-            "coefficients": self.material,
-            "feed_per_tooth": None if feed is None else feed / 1e3,
-            "commanded_rpm": self.speed_rpm,
-            "speed_rpm": speed_rpm,
-            "power": None if self.power is None else self.power.at(speed_rpm),
-        }
+        feed, power = self.table.feed_per_tooth_mm, None if self.power is None else self.power.at(speed_rpm)
+        fields = {name: getattr(self, name) for name in ("program", "tool", "cut", "feed", "depth")}
+        fields |= {"feed_per_tooth": None if feed is None else feed / 1e3, "coefficients": self.material}
+        return fields | {"commanded_rpm": self.speed_rpm, "speed_rpm": speed_rpm, "power": power}
 
 
 def find_cut_setting(

@@ -9,16 +9,8 @@ from typing import Annotated, Literal, Self
 
 from msgspec import Meta
 
-from acquisition import (
-    STANDARD_GRAVITY,
-    Channel,
-    Conditions,
-    DeviceSettings,
-    SensorInput,
-    TapDirection,
-    check_settings,
-    find_driver,
-)
+import acquisition
+from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
 from acquisition.text_boards import FrameFormat, OutputFormat
 from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
@@ -118,7 +110,7 @@ class TapTable(TomlTable, frozen=True):
         """Mass and mounting of the accelerometer."""
         return SensorLoading.of(self.sensor_mass_g, self.cable_mass_g, self.mounting or "")
 
-    def conditions(self, tool: str) -> Conditions:
+    def conditions(self, tool: str) -> acquisition.Conditions:
         """Return the conditions of a tap test; the stick-out is that of the tapped tool only.
 
         Parameters
@@ -127,7 +119,7 @@ class TapTable(TomlTable, frozen=True):
             Name of the tool in the spindle.
         """
         stick_out = self.stick_out_mm if tool == self.tool else None
-        return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
+        return acquisition.Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
 
 
 class ModeTable(TomlTable, frozen=True):
@@ -205,7 +197,7 @@ class ChannelTable(TomlTable, frozen=True):
         if self.sensitivity_mv_per_n is not None:
             sensitivity = self.sensitivity_mv_per_n / 1e3
         else:
-            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / STANDARD_GRAVITY
+            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
         channel = Channel(
             self.quantity,
             sensitivity * self.gain,
@@ -263,7 +255,7 @@ class DaqTable(TomlTable, frozen=True):
     """Sensors of a DAQ that does not describe them."""
 
     def __post_init__(self) -> None:
-        check_settings(find_driver(self.driver), self.settings)
+        acquisition.check_settings(acquisition.find_driver(self.driver), self.settings)
 
     @property
     def settings(self) -> DeviceSettings:

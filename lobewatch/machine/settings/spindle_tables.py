@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from msgspec import Meta
@@ -190,15 +191,8 @@ class ToolTable(TomlTable, frozen=True):
 
     def build(self, spindle: Spindle) -> Spindle:
         """Build the tool as a free shaft in SI units, with defaults of the spindle."""
-        return Spindle(
-            [segment.build() for segment in self.segments],
-            (),
-            youngs_modulus=spindle.youngs_modulus,
-            density=spindle.density,
-            theory=spindle.theory,
-            shear_modulus=spindle.shear_modulus,
-            masses=[mass.build() for mass in self.masses],
-        )
+        segments, masses = [part.build() for part in self.segments], [mass.build() for mass in self.masses]
+        return replace(spindle, segments=segments, bearings=(), masses=masses, joints=())
 
     def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
         """Return the spindle with this tool instead of the drawn one."""

@@ -102,9 +102,8 @@ def _set_values(tables: dict[str, Any], place: TablePath, values: Mapping[str, T
 def _locate_table(lines: list[str], place: TablePath) -> tuple[int, int]:
     """Return the line range of a table, adding the table if necessary."""
     headers = [(i, match) for i, line in enumerate(lines) if (match := TABLE_HEADER_PATTERN.match(line))]
-    named = [
-        (i, match) for i, match in headers if match[3] == place.name and bool(match[2]) == (place.number is not None)
-    ]
+    is_array = place.number is not None
+    named = [(i, match) for i, match in headers if match[3] == place.name and bool(match[2]) == is_array]
     active = [i for i, match in named if not match[1]]
     number = place.number or 0
     if number < len(active):

@@ -172,6 +172,6 @@ def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -
     return numbers
 
 
-def format_answer_number(value: float) -> str:
-    """Format a number as it is typed."""
-    return f"{value:.10g}"
+def format_answer(*values: float) -> str:
+    """Format numbers as they are typed."""
+    return " ".join(f"{value:.10g}" for value in values)

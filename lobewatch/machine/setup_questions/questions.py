@@ -7,48 +7,31 @@ from typing import Any
 from lobes import TOOL_MATERIALS, ToolMaterial
 from lobewatch.machine.settings.toml_text import TomlValue
 from lobewatch.machine.setup_questions import draft as setup
+from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion
 from lobewatch.machine.setup_questions.sensor_questions import SENSOR_QUESTIONS
 
 
-def _current_name(draft: setup.MachineDraft) -> str:
-    return str(draft.table("machine")["name"])
-
-
-def _set_name(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
-    return draft.set("machine", name=answer.strip())
-
-
-def _current_speeds(draft: setup.MachineDraft) -> str:
+def _current_speeds(draft: MachineDraft) -> str:
     speed = draft.table("speed")
-    limits = speed.get("low_rpm", 1000), speed.get("high_rpm", 24000)
-    return " ".join(map(setup.format_answer_number, limits))
+    return setup.format_answer(speed.get("low_rpm", 1000), speed.get("high_rpm", 24000))
 
 
-def _set_speeds(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
     low, high = setup.parse_numbers(answer, ("lowest speed in rpm", "highest speed in rpm"))
     return draft.set("speed", low_rpm=low, high_rpm=high)
 
 
-def _current_drive(draft: setup.MachineDraft) -> str:
+def _current_drive(draft: MachineDraft) -> str:
     drive = draft.table("drive")
-    known = [setup.format_answer_number(drive[key]) for key in ("power_kw", "torque_nm") if key in drive]
-    return " ".join(known) if len(known) == 2 else setup.OPEN_ANSWER
+    known = [drive[key] for key in ("power_kw", "torque_nm") if key in drive]
+    return setup.format_answer(*known) if len(known) == 2 else setup.OPEN_ANSWER
 
 
-def _set_drive(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
     power, torque = setup.parse_numbers(answer, ("power in kW", "torque in N m"))
     return draft.set("drive", power_kw=power, torque_nm=torque)
-
-
-NAME_QUESTION = setup.SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name)
-SPEEDS_QUESTION = setup.SetupQuestion(
-    "speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds
-)
-DRIVE_QUESTION = setup.SetupQuestion(
-    "drive", "Power (kW) and torque (N m) of the spindle motor?", "15 40", _current_drive, _set_drive
-)
 
 
 DEFAULT_PROGRAM_NAME = "first cut"
@@ -60,22 +43,18 @@ SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
-def _current_tool(draft: setup.MachineDraft) -> str:
+def _current_tool(draft: MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    numbers = [setup.format_answer_number(value) for value in (*values, *([stick_out] if stick_out else []))]
     made_of = draft.table("tool", _tool_number(draft)).get("tool_material")
-    return " ".join([*numbers, *([made_of] if made_of else [])])
+    numbers = setup.format_answer(*values, *([stick_out] if stick_out else []))
+    return f"{numbers} {made_of}" if made_of else numbers
 
 
-def _set_tool(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
-    names = (
-        "teeth",
-        "diameter in mm",
-        "helix in deg",
-        f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)",
-    )
+def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
+    length = f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)"
     numbers, made_of = _split_tool_answer(answer)
+    names = ("teeth", "diameter in mm", "helix in deg", length)
     teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} teeth; the number of teeth comes first")
@@ -96,7 +75,7 @@ def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
     return answer, None
 
 
-def _tool_number(draft: setup.MachineDraft) -> int:
+def _tool_number(draft: MachineDraft) -> int:
     """Return the index of the [[tool]] of the tapped tool, or of a new one."""
     number = 0
     while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
@@ -104,46 +83,40 @@ def _tool_number(draft: setup.MachineDraft) -> int:
     return number
 
 
-def _current_material(draft: setup.MachineDraft) -> str:
+def _current_material(draft: MachineDraft) -> str:
     cut = draft.table("reference_cut")
     if "material" in cut:
         return str(cut["material"])
     pair = tuple(cut[key] for key in SETUP_COEFFICIENT_KEYS if key in cut)
-    return (
-        setup.OPEN_ANSWER
-        if pair in (SETUP_TEMPLATE_COEFFICIENTS, ())
-        else " ".join(setup.format_answer_number(value) for value in pair)
-    )
+    return setup.OPEN_ANSWER if pair in (SETUP_TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
 
 
-def _set_material(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
+    values: dict[str, TomlValue] = {"material": None}
     try:
-        tangential, radial = setup.parse_numbers(answer, ("Kt", "Kr"))
-        material = None
+        values |= dict(zip(SETUP_COEFFICIENT_KEYS, setup.parse_numbers(answer, ("Kt", "Kr")), strict=True))
     except ValueError:
-        tangential, radial, material = None, None, answer.strip()
-    return _set_in_all_cuts(
-        draft, {"material": material, **dict(zip(SETUP_COEFFICIENT_KEYS, (tangential, radial), strict=True))}
-    )
+        values |= {"material": answer.strip(), **dict.fromkeys(SETUP_COEFFICIENT_KEYS)}
+    return _set_in_all_cuts(draft, values)
 
 
-def _set_in_all_cuts(draft: setup.MachineDraft, values: dict[str, TomlValue]) -> setup.MachineDraft:
+def _set_in_all_cuts(draft: MachineDraft, values: dict[str, TomlValue]) -> MachineDraft:
     """Set values of the reference cut and of the first program."""
     draft = draft.set("reference_cut", **values)
     return draft.set("program", 0, **values) if draft.table("program", 0) else draft
 
 
-def _current_program(draft: setup.MachineDraft) -> str:
+def _current_program(draft: MachineDraft) -> str:
     program = draft.table("program", 0)
     if not program:
         return setup.OPEN_ANSWER
     keys = ("speed_rpm", "depth_mm", "radial_depth_mm", "feed_per_tooth_mm")
-    return f"{program['name']}: " + " ".join(setup.format_answer_number(program[key]) for key in keys if key in program)
+    return f"{program['name']}: {setup.format_answer(*(program[key] for key in keys if key in program))}"
 
 
-def _set_program(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
@@ -157,43 +130,31 @@ def _set_program(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
-TOOL_QUESTION = setup.SetupQuestion(
-    "tool",
-    "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of "
-    f"{_TOOL_MATERIALS_TEXT}?",
-    "4 20 30 80 coated carbide",
-    _current_tool,
-    _set_tool,
-)
-MATERIAL_QUESTION = setup.SetupQuestion(
-    "material",
-    "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)",
-    "42CrMo4, 1.7225, AA 6061, 700 250",
-    _current_material,
-    _set_material,
-)
-PROGRAM_QUESTION = setup.SetupQuestion(
-    "program",
-    "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?",
-    "slot: 8000 2 20 0.1",
-    _current_program,
-    _set_program,
-)
-
-
-SETUP_QUESTIONS: tuple[setup.SetupQuestion, ...] = (
-    NAME_QUESTION,
-    SPEEDS_QUESTION,
-    DRIVE_QUESTION,
+_TOOL_TEXT = "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of"
+_MATERIAL_TEXT = "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)"
+_MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
+_PROGRAM_TEXT = "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?"
+_DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor?"
+_EXAMPLE_TOOL = "4 20 30 80 coated carbide"
+SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
+    SetupQuestion(
+        "name",
+        "What is the machine called?",
+        "mill-3",
+        lambda draft: str(draft.table("machine")["name"]),
+        lambda draft, answer: draft.set("machine", name=answer.strip()),
+    ),
+    SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds),
+    SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     *SENSOR_QUESTIONS,
-    TOOL_QUESTION,
-    MATERIAL_QUESTION,
-    PROGRAM_QUESTION,
+    SetupQuestion("tool", f"{_TOOL_TEXT} {_TOOL_MATERIALS_TEXT}?", _EXAMPLE_TOOL, _current_tool, _set_tool),
+    SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),
+    SetupQuestion("program", _PROGRAM_TEXT, "slot: 8000 2 20 0.1", _current_program, _set_program),
 )
 """All questions, in their order."""
 
 
-def find_setup_question(name: str) -> setup.SetupQuestion:
+def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
     for question in SETUP_QUESTIONS:
         if question.name == name:

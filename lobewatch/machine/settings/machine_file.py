@@ -16,7 +16,8 @@ import msgspec
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
-from lobewatch.machine.settings import cut_tables, toml_schema
+from lobewatch.machine.settings import cut_tables as cutting
+from lobewatch.machine.settings import toml_schema
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
@@ -57,13 +58,13 @@ class Machine(toml_schema.TomlTable, frozen=True):
     """Frequency drops that warn and alarm: [limits]."""
     speed: SpeedTable = SpeedTable()
     """Speed range of the lobe diagrams: [speed]."""
-    drive: cut_tables.DriveTable = cut_tables.DriveTable()
+    drive: cutting.DriveTable = cutting.DriveTable()
     """Power and torque of the spindle motor: [drive]."""
-    doubt: cut_tables.UncertaintyTable = cut_tables.UncertaintyTable()
+    doubt: cutting.UncertaintyTable = cutting.UncertaintyTable()
     """Uncertainty of the inputs: [doubt]."""
     notify: NotifyTable = NotifyTable()
     """Broker for alarms: [notify]."""
-    material: tuple[cut_tables.MaterialTable, ...] = ()
+    material: tuple[cutting.MaterialTable, ...] = ()
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
     """Cut that is watched besides the programs: [reference_cut]."""
@@ -148,7 +149,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         """
         coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
         lag = 2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter
-        pitch = cut_tables.convert_pitch(self.pitch_deg(table), table.teeth)
+        pitch = cutting.convert_pitch(self.pitch_deg(table), table.teeth)
         shape, pressures = (table.teeth, table.immersion), (coefficients.tangential, coefficients.radial)
         return Cut(*shape, table.direction, *pressures, helix_lag=lag, pitch=pitch)
 
@@ -211,7 +212,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         if tool is None:
             return
         try:
-            cut_tables.convert_pitch(self.pitch_deg(program), program.teeth)
+            cutting.convert_pitch(self.pitch_deg(program), program.teeth)
         except ValueError as error:
             raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
@@ -300,7 +301,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         for name, table in self.cut_tables.items():
             if not isinstance(table, ProgramTable) or table.tool == tool:
                 directed = product(self.engaged_cuts(table), table.feed_axes)
-                cuts[name] = tuple(replace(cut, feed_angle=cut_tables.FEED_ANGLES[axis]) for cut, axis in directed)
+                cuts[name] = tuple(replace(cut, feed_angle=cutting.FEED_ANGLES[axis]) for cut, axis in directed)
         return cuts
 
     @property

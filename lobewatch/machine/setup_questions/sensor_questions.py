@@ -132,7 +132,5 @@ SENSOR_QUESTIONS = (
         partial(_set_sensor, "acceleration"),
         partial(_described_by_daq, "acceleration"),
     ),
-    SetupQuestion(
-        "fixing", f"{_FIXING_TEXT} {', '.join(MOUNTINGS[:-1])} or hand?", "4.5 wax", _current_mounting, _set_mounting
-    ),
+    SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
 )

@@ -74,7 +74,7 @@ def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -
     diagrams = [compute_row_lobes(row, machine) for row in rows]
     return {
         name: _number_column([lobes[name].depth if name in lobes else nowhere for lobes in diagrams], speeds.size)
-        for name in machine.cut_names
+        for name in machine.cut_tables
     }
 
 

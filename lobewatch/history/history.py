@@ -150,7 +150,7 @@ class History:
         """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
 
-    def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict]) -> History:
+    def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict] | None) -> History:
         """Return the history with the verdicts after one of its rows.
 
         Parameters
@@ -158,7 +158,7 @@ class History:
         number
             Index of the row.
         verdicts
-            Stored verdicts by name of the program.
+            Stored verdicts by name of the program; None clears them.
         """
         row = replace(self.rows[number], verdicts=verdicts)
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
@@ -179,12 +179,6 @@ class History:
 def make_empty_history(machine: Machine) -> History:
     """Return the history of a machine without tap tests."""
     return History(machine.settings_hash, f"lobewatch {CURRENT_SOFTWARE.lobewatch}", ())
-
-
-def clear_newest_verdicts(history: History) -> History:
-    """Return the history without the verdicts after the newest tap test."""
-    *before, last = history.rows
-    return replace(history, rows=(*before, replace(last, verdicts=None)))
 
 
 def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:

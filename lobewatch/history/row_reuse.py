@@ -84,9 +84,8 @@ class ReusableRows:
     def __init__(self, rows: Sequence[HistoryRow], taps: Mapping[str, TapEntry], baselines: Sequence[datetime]) -> None:
         entries = [taps[row.tap_id] for row in rows if row.tap_id in taps]
         then = TapOrder(baselines, entries).places if len(entries) == len(rows) else []
-        known = then and all(
-            (row.baseline, row.series) == (place.baseline, place.series) for row, place in zip(rows, then, strict=True)
-        )
+        pairs = zip(rows, then, strict=True) if then else ()
+        known = then and all((row.baseline, row.series) == (place.baseline, place.series) for row, place in pairs)
         self._then = _RowArchive(then, rows)
         self._numbers = {row.tap_id: number for number, row in enumerate(rows)} if known else {}
         self._alike: set[str] = set()

@@ -131,10 +131,9 @@ def find_stored_rate(folder: MachineFolder, device: Device) -> MeasuredRate | No
     MeasuredRate or None
         Rate in daq.json; None without one.
     """
-    for entry in read_stored_devices(folder):
-        if _is_same_device(entry, device):
-            return MeasuredRate(entry.measured_rate_hz, entry.measured_rate_hz_std, entry.n_scans, entry.seconds)
-    return None
+    same = (entry for entry in read_stored_devices(folder) if _is_same_device(entry, device))
+    rates = (MeasuredRate(old.measured_rate_hz, old.measured_rate_hz_std, old.n_scans, old.seconds) for old in same)
+    return next(rates, None)
 
 
 def apply_measured_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:

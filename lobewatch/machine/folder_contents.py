@@ -85,17 +85,15 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
         taps = [*_sort_by_time([*taps, *whole])]
     else:
         cure = f"{format_command('verify', folder)} says what it is and what to do"
-        remarks += [
-            unlisted_file_remark(path, "not in the journal, does not count", cure) for path in extra[:MAX_LISTED_FILES]
-        ]
+        said = "not in the journal, does not count", cure
+        remarks += [unlisted_file_remark(path, *said) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
-    cuts = read_committed_cuts(reading)
     acknowledged = alarm_entries.read_acknowledgements(reading.other_entries)
-    scatters = alarm_entries.read_fleet_scatters(reading.other_entries)
-    usable, unusable, damage, count = tuple(taps), _sort_by_time(lost), tuple(remarks), len(reading.lines)
-    return FolderContents(usable, unusable, damage, events, count, cuts, acknowledged, scatters)
+    others = read_committed_cuts(reading), acknowledged, alarm_entries.read_fleet_scatters(reading.other_entries)
+    usable, unusable = tuple(taps), _sort_by_time(lost)
+    return FolderContents(usable, unusable, tuple(remarks), events, len(reading.lines), *others)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:

@@ -229,7 +229,7 @@ def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
         if path.relative_to(spool).parts[0] in saved:
             continue
         try:
-            yield from _verify_spooled_test(folder, path) if path.is_dir() else _verify_spooled_file(folder, path)
+            yield from _verify_spooled(folder, path)
         except FileNotFoundError:
             continue
         except OSError as error:
@@ -237,15 +237,13 @@ def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
             yield _damaged_file_remark(about, format_error(error).removeprefix(f"{path}: "))
 
 
-def _verify_spooled_test(folder: Path, path: Path) -> Iterator[Remark]:
+def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
+    """Verify a file or the folder of an interrupted test."""
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
-    cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
-    yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
-
-
-def _verify_spooled_file(folder: Path, path: Path) -> Iterator[Remark]:
-    about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
-    if path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
+    if path.is_dir():
+        cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
+        yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
+    elif path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
         cure = f"{tap} sets it aside and goes on with the others{_deletion_hint(path.parent)}"
         yield _damaged_file_remark(about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):

@@ -99,10 +99,9 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     if np.isnan(window.time_constant):
         window = replace(window, time_constant=named)
     if np.isnan(window.time_constant):
-        raise ValueError(
-            "the response lies under a window, and the file does not say how that falls; give the time constant of an "
-            "exponential one with Window.time_constant, export the file anew where it is another"
-        )
+        cure = "give the time constant of an exponential one with Window.time_constant"
+        problem = "the response lies under a window, and the file does not say how that falls"
+        raise ValueError(f"{problem}; {cure}, export the file anew where it is another")
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
         option = f"Window.time_constant {window.time_constant:g}"
         raise ValueError(f"{option}: the file says {named:.4g} s; leave the option out")

@@ -175,7 +175,9 @@ def assemble(
     """
     taps = [newest, *([across] if across is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
-    moved = None if across is None else _frequency_change_since(across.time, series.get(newest.direction, ()))
+    points = series.get(newest.direction, ())
+    then = None if across is None else interpolate_frequency(points, across.time)
+    moved = None if then is None else points[-1].frequency / then
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
     signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
@@ -219,12 +221,6 @@ def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = N
     if unusable is None:
         return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
     return Remark("one-direction", tool, f"{text}; {missing} is tapped, not usable: {unusable[0]}", unusable[1])
-
-
-def _frequency_change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
-    """Return the frequency of the newest test of a series over that at a time, or None."""
-    frequency = interpolate_frequency(series, time)
-    return None if frequency is None else series[-1].frequency / frequency
 
 
 def _direction_remarks(

@@ -45,7 +45,7 @@ class MountingTracker:
         mountings = self._mountings.setdefault(tap.tool, [])
         if mountings and tap.conditions == UNKNOWN_CONDITIONS:
             return mountings[-1].first.id, ()
-        remarks = [*self._check_drawbar(tap), *self._check_hours(tap)]
+        remarks = [*self._check_values(tap)]
         current = mountings[-1] if mountings else None
         conditions = tap.conditions.with_defaults(current.conditions) if current else tap.conditions
         same = (old for old in reversed(mountings) if not _differing_conditions(old.conditions, conditions))
@@ -59,24 +59,22 @@ class MountingTracker:
             mountings.append(ToolMounting(tap, conditions))
         return mountings[-1].first.id, tuple(remarks)
 
-    def _check_drawbar(self, tap: TapEntry) -> Iterator[Remark]:
-        now, before = tap.conditions.drawbar_kn, self._drawbar.get(tap.tool)
-        if now is None:
-            return
-        self._drawbar[tap.tool] = now
-        if before not in (None, now):
-            text = f"drawbar force {now:g} kN, {before:g} kN before: the frequency may have changed with it"
-            yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
-
-    def _check_hours(self, tap: TapEntry) -> Iterator[Remark]:
-        now, before = tap.conditions.hours, self._hours
-        if now is None:
-            return
-        self._hours = now
-        if before is not None and now < before:
-            text = f"running hours {now:g} h, {before:g} h before: forecasts of a series that it is in count in days"
-            cure = "exclude it and replay its file with the right Conditions.hours"
-            yield Remark("hours-went-back", tap.tool, text, cure)
+    def _check_values(self, tap: TapEntry) -> Iterator[Remark]:
+        """Yield remarks on a changed drawbar force and on fewer running hours than before."""
+        force, hours = tap.conditions.drawbar_kn, tap.conditions.hours
+        last_force, last_hours = self._drawbar.get(tap.tool), self._hours
+        if force is not None:
+            self._drawbar[tap.tool] = force
+            if last_force not in (None, force):
+                text = f"drawbar force {force:g} kN, {last_force:g} kN before: the frequency may have changed with it"
+                yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
+        if hours is not None:
+            self._hours = hours
+            if last_hours is not None and hours < last_hours:
+                series = "forecasts of a series that it is in count in days"
+                cure = "exclude it and replay its file with the right Conditions.hours"
+                text = f"running hours {hours:g} h, {last_hours:g} h before: {series}"
+                yield Remark("hours-went-back", tap.tool, text, cure)
 
 
 def _differing_conditions(first: Conditions, second: Conditions) -> list[str]:

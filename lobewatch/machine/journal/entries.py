@@ -81,10 +81,9 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
     tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
     if tapped:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
-        raise ValueError(
-            f"{begin.astimezone():%Y-%m-%d}: tapped on that day at {clock}; give the time of the new baseline too, "
-            f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
-        )
+        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
+        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
+        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
 
 
 ExcludableEntry = TapEntry | CutEntry

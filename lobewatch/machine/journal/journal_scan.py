@@ -85,9 +85,8 @@ def _continue_chain(chain: list[bytes], lines: list[bytes]) -> bool:
     """Tell whether all lines continue the chain; the digest in a line proves the line before it."""
     if len(lines) < 2 or not (_continues_chain(chain, lines[0]) and _continues_chain(lines[:-1], lines[-1])):
         return False
-    return all(
-        _read_previous_digest(line) == hashlib.sha256(before).hexdigest().encode() for before, line in pairwise(lines)
-    )
+    pairs = ((hashlib.sha256(before).hexdigest(), line) for before, line in pairwise(lines))
+    return all(_read_previous_digest(line) == digest.encode() for digest, line in pairs)
 
 
 def _read_previous_digest(line: bytes) -> bytes:

@@ -305,11 +305,6 @@ class Machine(toml_schema.TomlTable, frozen=True):
         return cuts
 
     @property
-    def cut_names(self) -> list[str]:
-        """Names of the reference cut and of all programs."""
-        return list(self.cut_tables)
-
-    @property
     def cut_tables(self) -> dict[str, CutTable]:
         """Reference cut and all programs by name."""
         tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}

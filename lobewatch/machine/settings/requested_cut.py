@@ -96,7 +96,7 @@ def choose_cut(
 ) -> CutSetting:
     """Return the setting of a program, or of a cut with speed (rpm) and depth (mm); ValueError unless one is named."""
     if bool(program) == bool(cut):
-        names = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
+        names = ", ".join(map(repr, machine.cut_tables)) or "none: add a [[program]] to machine.toml"
         both = f"{'both' if cut else 'neither'} of choose_cut.program and choose_cut.cut"
         raise ValueError(f"{both}: say which cut it is; there are {names}")
     if cut and (speed is None or depth is None):

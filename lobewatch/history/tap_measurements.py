@@ -12,8 +12,7 @@ from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
-from lobewatch.tool.assembly import Assembly, assemble
-from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.assembly import Assembly, assemble, predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier
 
 MAX_MEASUREMENTS_IN_MEMORY = 500
@@ -122,15 +121,13 @@ def measure_excluded_taps(
 
     rows: rows of the series, at least one. A tap test before its baseline is left out.
     """
-    rows_out = []
-    for entry in excluded:
-        if (entry.tool, entry.direction) != (rows[-1].tool, rows[-1].direction):
-            continue
+    rows_out, (tool, direction, baseline) = [], (rows[-1].tool, rows[-1].direction, rows[-1].baseline)
+    for entry in [entry for entry in excluded if (entry.tool, entry.direction) == (tool, direction)]:
         try:
             tap = folder.read(entry)
         except DamagedTapError:
             continue
-        time, baseline = tap.circumstances.created, rows[-1].baseline
+        time = tap.circumstances.created
         if baseline is None or time >= baseline:
             before = [row.mode for row in rows if row.time < time and row.mode is not None]
             measurement = measure(tap, folder.machine, before[-1] if before else None)

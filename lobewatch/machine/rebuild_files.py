@@ -181,10 +181,8 @@ def _is_temporarily_unreadable(path: Path) -> bool:
     """Tell whether a file cannot be read at the moment; it stays where it is."""
     try:
         read_regular_file(path)
-    except IrregularFileError:
-        return False
-    except OSError:
-        return True
+    except OSError as error:
+        return not isinstance(error, IrregularFileError)
     return False
 
 

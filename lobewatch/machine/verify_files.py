@@ -29,9 +29,8 @@ DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged"
 DERIVED_FILES = ("history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "report.html")
 """Files that are made again if they are deleted."""
 LOBEWATCH_FILES = {JOURNAL_NAME, JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml", *DERIVED_FILES}
-"""Files in a machine folder that lobewatch writes."""
-LOBEWATCH_FOLDERS = {"taps", "cuts", "spool"}
-"""Folders in a machine folder that lobewatch makes."""
+LOBEWATCH_FILES |= {"taps", "cuts", "spool"}
+"""Files and folders in a machine folder that lobewatch writes."""
 ALTERED_TEXT = "altered or cut short since it was written"
 """Fault of a file with a wrong checksum."""
 
@@ -102,16 +101,13 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
     Nothing happens if another program writes, the journal is damaged, or the folder cannot be written.
     """
     journal, entered = folder.journal, list[str]()
-    try:
-        with folder.locked(patience=0):
-            committed = set(contents.read_committed_taps(journal.read()))
-            for name, path in contents.list_tap_files(folder.path).items():
-                entry = read_unverified_tap(path) if name not in committed else None
-                if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
-                    journal.append(entry.line)
-                    entered.append(entry.file)
-    except (DataError, OSError):
-        return entered
+    with contextlib.suppress(DataError, OSError), folder.locked(patience=0):
+        committed = set(contents.read_committed_taps(journal.read()))
+        for name, path in contents.list_tap_files(folder.path).items():
+            entry = read_unverified_tap(path) if name not in committed else None
+            if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
+                journal.append(entry.line)
+                entered.append(entry.file)
     return entered
 
 
@@ -207,7 +203,7 @@ def _verify_names(folder: Path) -> Iterator[Remark]:
             yield Remark(
                 "not-verified", path.name, "no cache any more, or an export", "delete it when you do not need it"
             )
-        elif path.name not in LOBEWATCH_FILES | LOBEWATCH_FOLDERS:
+        elif path.name not in LOBEWATCH_FILES:
             yield Remark("not-verified", path.name, "no file of lobewatch")
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:

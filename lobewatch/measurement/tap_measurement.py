@@ -105,8 +105,9 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     with _thread_controller().limit(limits=1):
         try:
             if tap.frf is None:
-                fitted = _fit_decays(tap, machine, by_hand)
-                return TapFit(*named, fitted.modes, fitted.remarks)
+                state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
+                said = (*edited, *decay_remarks(machine.tap.sensor))
+                return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
             windows = hidden_window_remarks(tap.accepted, fitted.modes)
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
@@ -118,11 +119,6 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
 def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
     state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
     return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
-
-
-def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
-    state, remarks = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-    return FrfFit(state, tuple(modal.modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:

@@ -78,11 +78,10 @@ class Machine(toml_schema.TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self._check_tools()
         self._check_hammer()
-        names = [program.name for program in self.all_programs]
+        names, low, high = [program.name for program in self.all_programs], self.speed.low_rpm, self.speed.high_rpm
         for i, program in enumerate(self.all_programs, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
                 raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
-            low, high = self.speed.low_rpm, self.speed.high_rpm
             if not (math.isnan(program.speed_rpm) or low <= program.speed_rpm <= high):
                 speed = f"speed_rpm={program.speed_rpm:g}"
                 raise ValueError(f"program {i}: {speed} is outside [speed] {low:g}..{high:g} rpm")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import re
@@ -70,11 +71,9 @@ def edit_toml(text: str, place: TablePath, values: Mapping[str, TomlValue]) -> s
     for key, value in values.items():
         end += _edit_line(lines, start, end, key, value)
     edited = "\n".join(lines)
-    try:
+    with contextlib.suppress(tomllib.TOMLDecodeError):
         if tomllib.loads(edited) == wanted:
             return edited
-    except tomllib.TOMLDecodeError:
-        pass
     raise DataError(f"machine.toml: [{place.name}] is written in a way that only a person can edit; edit it by hand")
 
 

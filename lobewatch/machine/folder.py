@@ -19,7 +19,7 @@ from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
-from lobewatch.machine.settings.toml_text import read_toml_text
+from lobewatch.machine.settings.toml import read_toml_text
 
 
 class MachineFolder:

@@ -22,7 +22,7 @@ from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.machine.settings.setting_questions import find_all_questions, find_template_bearings
-from lobewatch.machine.settings.toml_text import TablePath, edit_toml
+from lobewatch.machine.settings.toml import TablePath, edit_toml
 from modal import ModeEdits
 
 TOOTH_FREQUENCY_TOLERANCE = 0.005

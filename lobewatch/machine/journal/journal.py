@@ -28,7 +28,7 @@ import msgspec
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
 from acquisition.file_io import atomic_write, open_regular_file, read_regular_file, sync_folder
 from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX
-from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
+from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_COPY_NAME = "journal.copy.jsonl"

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from lobes import CuttingCoefficients, Direction, tangential_and_radial
 from lobes.cut import normalize_pitch
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
 """Angle from x to the feed (rad) by axis."""

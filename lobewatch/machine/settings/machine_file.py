@@ -17,12 +17,11 @@ from acquisition import DataError
 from dsm import Spindle
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
 from lobewatch.machine.settings import cut_tables as cutting
-from lobewatch.machine.settings import toml_schema
+from lobewatch.machine.settings import toml
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] among the names of programs."""
@@ -30,7 +29,7 @@ USER_SOURCE = "machine.toml"
 """Source of cutting coefficients that a person has entered."""
 
 
-class Machine(toml_schema.TomlTable, frozen=True):
+class Machine(toml.TomlTable, frozen=True):
     """All tables of machine.toml.
 
     >>> from pathlib import Path
@@ -320,19 +319,19 @@ class Machine(toml_schema.TomlTable, frozen=True):
 
 def read_machine_file(path: Path) -> Machine:
     """Read a machine file; DataError with the place of a fault, OSError if it cannot be read."""
-    return parse_machine_file(read_toml_text(path), str(path))
+    return parse_machine_file(toml.read_toml_text(path), str(path))
 
 
 def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
     """Parse the text of a machine file; DataError with the place of a fault."""
     tables: dict[str, Any] = {}
     try:
-        tables = parse_toml_tables(text)
-        toml_schema.check_control_characters(tables)
+        tables = toml.parse_toml_tables(text)
+        toml.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{toml_schema.suggest_decimal_point(text)}") from error
+        raise DataError(f"{name}: {error}{toml.suggest_decimal_point(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {toml_schema.explain_validation_error(str(error), tables, Machine)}") from error
+        raise DataError(f"{name}: {toml.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error

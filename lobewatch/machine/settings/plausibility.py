@@ -15,7 +15,7 @@ from acquisition import Remark
 from lobewatch.machine.settings import setup_tables as setup
 from lobewatch.machine.settings import spindle_tables as model
 from lobewatch.machine.settings.cut_tables import CutTable, DriveTable, MaterialTable, UncertaintyTable
-from lobewatch.machine.settings.toml_schema import TomlTable
+from lobewatch.machine.settings.toml import TomlTable
 
 KT_RANGE = (200.0, 6000.0)
 """Tangential cutting coefficient Kt (N/mm2)."""

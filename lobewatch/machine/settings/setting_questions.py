@@ -14,7 +14,7 @@ from lobewatch.machine.settings.cut_tables import CutTable, MaterialTable, Progr
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.machine.settings.plausibility import ImplausibleSetting, SettingFault, check_ranges, check_ratio
 from lobewatch.machine.settings.spindle_tables import MassTable, SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_schema import TomlTable
+from lobewatch.machine.settings.toml import TomlTable
 
 
 def find_program_questions(machine: Machine, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:

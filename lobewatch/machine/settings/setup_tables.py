@@ -13,7 +13,7 @@ import acquisition
 from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
 from acquisition.text_boards import FrameFormat, OutputFormat
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
 """How an accelerometer is fixed."""

@@ -13,7 +13,7 @@ from msgspec import Meta
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 
 class SegmentTable(TomlTable, frozen=True):

@@ -189,7 +189,8 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     low, high = (0.0, math.inf) if speed is None else (speed.low / per_rpm, speed.high / per_rpm)
     speeds = max(machine.speed.low_rpm, low if low <= fastest else 0.0), min(fastest, high)
     missing = tuple(_find_missing_data(machine, table, tool, speed, feed))
-    return ToolLimits(tool, cut, *speeds, speed, feed, _find_max_depth_mm(table, tool), missing)
+    flutes = tool.flute_length_mm if table.flute_length_mm is None else None
+    return ToolLimits(tool, cut, *speeds, speed, feed, flutes or table.deepest_mm, missing)
 
 
 def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:
@@ -217,12 +218,6 @@ def _convert_published_range(published: PublishedRange | None, unit: float) -> A
         return None
     names = dict.fromkeys(source.partition(": ")[0] for source in published.sources)
     return AllowedRange(published.low * unit, published.high * unit, "; ".join(names))
-
-
-def _find_max_depth_mm(table: CutTable, tool: ToolProperties) -> float:
-    if table.flute_length_mm is None and tool.flute_length_mm is not None:
-        return tool.flute_length_mm
-    return table.deepest_mm
 
 
 def _find_missing_data(

@@ -10,7 +10,7 @@ from typing import Any, Self
 from acquisition import STANDARD_GRAVITY, Channel, DataError, DeviceError, find_driver
 from acquisition.devices import DeviceSettings, PortScan, convert_driver_errors, scan_ports
 from lobewatch.machine.settings.machine_file import parse_machine_file
-from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml, parse_toml_tables
+from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 from acquisition import DataError
-from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
+from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.show.fleet.export_files import EXPORT_COLUMNS, ExportOutcome
 
 POSTGRES_TABLE = "lobewatch_taps"
@@ -70,7 +70,7 @@ class _ExportCounts(NamedTuple):
     """Number of stored rows that no longer count."""
 
 
-def upsert_table(tables: Iterable[TapTable], address: str) -> ExportOutcome:
+def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
     Rows that no longer count stay and are marked. Each transaction reads its machines while no other export writes.
@@ -143,7 +143,7 @@ def _make_table(connection: Any) -> bool:
         return bool(has_timescale)
 
 
-def _write_next(connection: Any, remaining: Iterator[TapTable]) -> _ExportCounts | None:
+def _write_next(connection: Any, remaining: Iterator[TapTestTable]) -> _ExportCounts | None:
     """Read the next machines and write them; None where none are left."""
     with connection.transaction(), connection.cursor() as cursor:
         cursor.execute(EXPORT_LOCK_QUERY)
@@ -159,15 +159,15 @@ def _write_next(connection: Any, remaining: Iterator[TapTable]) -> _ExportCounts
     return _ExportCounts(sum(len(table.tap_id) for table in batch), written, set_aside)
 
 
-def _read_batch(remaining: Iterator[TapTable]) -> list[TapTable]:
-    batch, count = list[TapTable](), 0
+def _read_batch(remaining: Iterator[TapTestTable]) -> list[TapTestTable]:
+    batch, count = list[TapTestTable](), 0
     while count < POSTGRES_BATCH_TAPS and (table := next(remaining, None)) is not None:
         batch.append(table)
         count += len(table.tap_id)
     return batch
 
 
-def _table_rows(table: TapTable) -> Iterator[Sequence[Any]]:
+def _table_rows(table: TapTestTable) -> Iterator[Sequence[Any]]:
     """Return rows in the order of the columns."""
     series = [(tool, direction, n) for n, (tool, direction) in enumerate(table.series, 1)]
     taps = zip(table.tap_id, table.time, table.series_numbers, table.numbers.tolist(), table.remarks, strict=True)

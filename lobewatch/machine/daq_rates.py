@@ -54,11 +54,9 @@ def check_device_rate(
     """Return the sample rate of a device, measured once per device and machine.
 
     Call it after every connect, before device.start(), with the folder locked. A rate within 0.2 % of the nominal one
-    is
-    accepted as nominal. A larger difference is an error, or with accept_measured_rate = true in [daq] the device gets
-    the
-    measured rate: make the Trigger from the returned rate. Only a certain rate is stored in daq.json; an uncertain one,
-    the best of three, adds a remark. Devices without a clock are not checked.
+    is accepted as nominal. A larger difference is an error, or with accept_measured_rate = true in [daq] the device
+    gets the measured rate: make the Trigger from the returned rate. Only a certain rate is stored in daq.json; an
+    uncertain one, the best of three, adds a remark. Devices without a clock are not checked.
 
     Parameters
     ----------

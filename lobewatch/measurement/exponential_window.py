@@ -147,8 +147,7 @@ def remove_recorded_window(
     """Remove the window of a record (s) from modes, and remark on those that it cannot contain.
 
     A mode that decays no faster than the window is none. Raises ValueError if that holds for all: then the time
-    constant
-    is wrong.
+    constant is wrong.
     """
     rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
     kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]

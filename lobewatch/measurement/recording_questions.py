@@ -202,12 +202,11 @@ def question_remarks(
     counts = Counter(question.code for questions in asked.values() for question in questions)
     for question, tap_ids in same.items():
         answer = _answer_command(path, tap_ids, question.code, all_of_them=len(tap_ids) == counts[question.code])
-        if len(tap_ids) == 1:
-            about = f"tap test {tap_ids[0]}"
-            rest, test = "it sets no reference until you say that it is", "this test is"
-        else:
+        about, rest = f"tap test {tap_ids[0]}", "it sets no reference until you say that it is"
+        if len(tap_ids) > 1:
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
-            rest, test = "they set no reference until you say that they are", "these tests are"
+            rest = "they set no reference until you say that they are"
+        test = "this test is" if len(tap_ids) == 1 else "these tests are"
         cure = f"Tap again; if {test} right, say so: {answer}"
         yield Remark(question.code, about, f"{question.text}; {rest} right: {answer}", cure)
 

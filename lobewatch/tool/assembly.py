@@ -171,8 +171,7 @@ def assemble(
     """Assemble a tool from its newest tap test and the newest one in the other direction.
 
     series: tap tests of both directions up to the newest; cross: newest cross FRF. The frequencies of an older
-    direction
-    are shifted by the change of the newest one since.
+    direction are shifted by the change of the newest one since.
     """
     taps = [newest, *([across] if across is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}

@@ -124,9 +124,9 @@ def find_principal_directions(
     """Find the principal directions of the modes measured in x and in y.
 
     cross: signed modes hit in x and measured in y. Peaks of x and y are matched in the order of their frequencies. With
-    a
-    neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other. A
-    single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF decides.
+    a neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other.
+    A single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF
+    decides.
     """
     modes = [*x, *y]
     stiffness = np.array([mode.stiffness for mode in modes])

@@ -155,8 +155,7 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     """Return the limits of the tool of a cut in its material.
 
     Speeds come from [[tool]] cutting_speed_m_min, else from published values for both materials; without them, up to
-    the
-    fastest of all tools. Sources of the published ranges: docs/tools.md.
+    the fastest of all tools. Sources of the published ranges: docs/tools.md.
 
     Parameters
     ----------

@@ -34,11 +34,6 @@ class StoredDevice(msgspec.Struct, frozen=True):
     """CRC-32 of all other fields; 0 in the first files."""
 
     @property
-    def is_altered(self) -> bool:
-        """Whether the CRC is wrong."""
-        return self.crc not in (0, self.computed_crc)
-
-    @property
     def computed_crc(self) -> int:
         """CRC-32 of all other fields."""
         return zlib.crc32(msgspec.json.encode(msgspec.structs.replace(self, crc=0)))
@@ -188,7 +183,7 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
         return []
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
-    if any(entry.is_altered for entry in entries):
+    if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
         raise DataError(f"{path}: altered since it was written; delete this file, the DAQ's rate is then measured anew")
     return entries
 

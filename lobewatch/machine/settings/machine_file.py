@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from acquisition import DataError
-from dsm import Spindle
+from dsm import Spindle, change_tool
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
 from lobewatch.machine.settings import cut_tables as cutting
 from lobewatch.machine.settings import toml
@@ -261,7 +261,8 @@ class Machine(toml.TomlTable, frozen=True):
         spindle = self.spindle.build()
         if tool == self.tap.tool:
             return spindle
-        return self.find_modelled_tool(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+        free_tool = self.find_modelled_tool(tool).build(spindle)
+        return change_tool(spindle, (self.spindle.tool_length_mm or 0.0) / 1e3, free_tool)
 
     @property
     def modelled_tools(self) -> list[ToolTable]:

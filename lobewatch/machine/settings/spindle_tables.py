@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
 from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
@@ -193,7 +193,3 @@ class ToolTable(TomlTable, frozen=True):
         """Build the tool as a free shaft in SI units, with defaults of the spindle."""
         segments, masses = [part.build() for part in self.segments], [mass.build() for mass in self.masses]
         return replace(spindle, segments=segments, bearings=(), masses=masses, joints=())
-
-    def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
-        """Return the spindle with this tool instead of the drawn one."""
-        return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))

@@ -149,10 +149,10 @@ def test_after_a_repair_the_scatter_of_before_is_known(run: Run, new_shop: type[
             shop.tap(7 * week + 0.1, 0.98 * FREQUENCY * math.exp(percent / 100), "y", tool=tool)
     repaired = shop.start + timedelta(days=110)
     assert run("event", shop.path, "new bearings", "--date", f"{repaired:%Y-%m-%d}", "--new-baseline").code == 0
-    assert shop.logbook.files.known_scatter is None
+    assert shop.logbook.files.fleet_scatter is None
     shop.tap(112, FREQUENCY)
     assert run("event", shop.path, "coolant pump replaced").code == 0  # whatever tells of the machine
-    known = shop.logbook.files.known_scatter
+    known = shop.logbook.files.fleet_scatter
     assert known is not None
     assert known.series == 4
     assert known.alone[0] == pytest.approx(0.2, rel=0.4)

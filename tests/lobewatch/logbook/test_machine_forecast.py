@@ -198,7 +198,7 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--tool", "other"], "no such series; there are: --tool reference --direction x"),
+        (["--tool", "other"], "no such series; there are: SeriesStatus.tool reference SeriesStatus.direction x"),
         (["--direction", "z"], "no such series"),
         (["--csv", "--json"], "give one of them"),
     ],

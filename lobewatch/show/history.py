@@ -135,9 +135,9 @@ def history_json(logbook: Logbook) -> dict[str, Any]:
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
-        "events": [event_json(event) for event in logbook.files.events],
-        "acknowledged": [acknowledgement_json(word) for word in logbook.files.acknowledgements],
-        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.cuts],
+        "events": [event_json(event) for event in logbook.files.contents.events],
+        "acknowledged": [acknowledgement_json(word) for word in logbook.files.contents.acknowledgements],
+        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.contents.cuts],
     }
 
 
@@ -204,7 +204,7 @@ def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
         shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
         kind = "excluded" if cut["excluded"] else "cut"
         entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
-    for acknowledgement in logbook.files.acknowledgements:
+    for acknowledgement in logbook.files.contents.acknowledgements:
         text = f"{acknowledgement.alarm_id}: {acknowledgement}"
         time = _utc_text(acknowledgement.time)
         entries.append({"kind": "ack", "id": acknowledgement.alarm_id, "time": time, "text": text})

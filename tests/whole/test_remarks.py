@@ -12,7 +12,6 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
 CODE = r"[a-z]+(?:-[a-z]+)*"
 SHARED: dict[str, str] = {
-    "one-direction": "of an assembly, and of the standing that it leads to",
 }
 """Codes that several modules give, each with the reason why they mean the same."""
 

@@ -64,10 +64,9 @@ def make_events(data: ReportData) -> list[Section]:
     """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
     files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
-    lines = [(event.time, event_day_text(event)) for event in files.events]
-    lines += [
-        (word.time, f"{word.time.astimezone():%Y-%m-%d}: {word.alarm_id} {word}") for word in files.acknowledgements
-    ]
+    lines = [(event.time, event_day_text(event)) for event in files.contents.events]
+    acknowledged = files.contents.acknowledgements
+    lines += [(word.time, f"{word.time.astimezone():%Y-%m-%d}: {word.alarm_id} {word}") for word in acknowledged]
     lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in data.excluded_rows]
     if not lines:
         return []

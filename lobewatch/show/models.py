@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from itertools import starmap
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
+from dsm import Calibration, Joint, PredictedMode, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
 from lobewatch.show.terminal.json_fields import json_fields
@@ -32,15 +33,19 @@ STIFFNESS_FIT_FIELDS = json_fields("""
 DAMPING_FIELDS = json_fields("""
     damping_ratio bearing_damping_n_s_per_m=bearing_damping bearing_damping_sensitivity=sensitivity
 """)
-MODEL_FIELDS = json_fields("""
-    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
-    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
-    first_frequency_with_rigid_bearings_hz=rigid_frequency
-""")
 MODEL_MODE_FIELDS = json_fields("""
     frequency_hz=frequency modal_tip_stiffness_n_per_m=tip_stiffness bearing_energy_share=bearing_share
     segment_energy_share=segment_share joint_energy_share=joint_share
 """)
+model_json = json_fields(
+    """
+    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
+    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
+    first_frequency_with_rigid_bearings_hz=rigid_frequency
+    """,
+    {"modes": MODEL_MODE_FIELDS},
+)
+"""Function that returns a spindle model with its modes."""
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
@@ -67,16 +72,8 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
     stiffness = calibration.stiffness
     preload = stiffness.remaining_preload if isinstance(stiffness, Calibration) else None
     parts = (stiffness, preload, calibration.dampers)
-    return [*_label_lines(calibration.label), *(str(part) for part in parts if part is not None)]
-
-
-def _label_lines(label: str) -> list[str]:
-    return [f"model: {label}"] if label else []
-
-
-def model_json(model: ModelSummary) -> dict[str, Any]:
-    """Return a spindle model with its modes."""
-    return MODEL_FIELDS(model) | {"modes": [MODEL_MODE_FIELDS(mode) for mode in model.modes]}
+    label = [f"model: {calibration.label}"] if calibration.label else []
+    return [*label, *(str(part) for part in parts if part is not None)]
 
 
 def model_texts(model: ModelSummary) -> list[str | Table]:
@@ -121,52 +118,40 @@ def tools_json(calibration: JointCalibration) -> dict[str, Any]:
 
 def tools_texts(calibration: JointCalibration) -> list[str | Table]:
     """Return the fit to several tools in words, what it rests on, and tools that it predicts."""
-    for_people: list[str | Table] = [
-        *_label_lines(calibration.label),
-        *(
-            f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed"
-            for number, tap in enumerate(calibration.taps, 1)
-        ),
-        str(calibration.fit),
-        *(
-            f"not counted: {', '.join(f'{f:.1f}' for f in frequencies)} Hz of tool {tool}, nothing of the model is near"
-            for tool, frequencies in calibration.unmatched.items()
-        ),
-        *(f"warning: {remark}" for remark in calibration.remarks),
-        *_joint_entry_lines(calibration),
-    ]
-    return [*for_people, *_prediction_tables(calibration)]
-
-
-def _joint_entry_lines(calibration: JointCalibration) -> list[str]:
+    lines = [f"model: {calibration.label}"] if calibration.label else []
+    for number, tap in enumerate(calibration.taps, 1):
+        lines.append(f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed")
+    lines.append(str(calibration.fit))
+    for tool, frequencies in calibration.unmatched.items():
+        left_out = ", ".join(f"{frequency:.1f}" for frequency in frequencies)
+        lines.append(f"not counted: {left_out} Hz of tool {tool}, nothing of the model is near")
+    lines += [f"warning: {remark}" for remark in calibration.remarks]
     if calibration.joints:
         unsure = ", ".join(sorted(calibration.fit.open_groups))
         caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
-        return [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
-    return [MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT]
+        lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
+    else:
+        lines.append(MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT)
+    return [*lines, *_prediction_tables(calibration)]
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
     """Return joints as lines of machine.toml."""
-    if not joints:
-        return []
     lines = [
         f"    {{ position_mm = {joint.position * 1e3:.6g}, stiffness_n_per_um = {joint.stiffness / 1e6:.4g}, "
         f"rotational_stiffness_n_m_per_rad = {joint.rotational_stiffness:.4g}, group = {json.dumps(joint.group)} }},"
         for joint in joints
     ]
-    return ["joints = [", *lines, "]"]
+    return ["joints = [", *lines, "]"] if joints else []
 
 
 def _prediction_tables(calibration: JointCalibration) -> list[Table]:
     if not calibration.predicted or calibration.fit.has_misfit:
         return []
-    rows = (
-        (
-            name,
-            format_with_error(mode.frequency, mode.frequency_std),
-            format_with_error(mode.stiffness, mode.stiffness_std, 1e6),
-        )
-        for name, mode in calibration.predicted.items()
-    )
-    return [new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)", rows=rows)]
+
+    def cells(name: str, mode: PredictedMode) -> list[str]:
+        stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
+        return [name, format_with_error(mode.frequency, mode.frequency_std), stiffness]
+
+    headings = "~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)"
+    return [new_table(*headings, rows=starmap(cells, calibration.predicted.items()))]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from rich.table import Table
 
@@ -32,27 +31,17 @@ NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
 
-MODE_FIELDS = json_fields("""
-    frequency_hz=frequency frequency_hz_std=frequency frequency_hz_std_of_fit=frequency
-    damping_ratio damping_ratio_std=damping_ratio damping_ratio_std_of_fit=damping_ratio
-    stiffness_n_per_m=stiffness stiffness_n_per_m_std=stiffness stiffness_n_per_m_std_of_fit=stiffness
-    interval_95=interval correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
-    misfit_share trust=method found_again=match_count half_power_damping_ratio=half_power_damping remarks method
-""")
-FILE_MODES_FIELDS = json_fields("""
-    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
-    remarks
-""")
-
-
-def mode_json(mode: Mode) -> dict[str, Any]:
-    """Return one mode with its standard errors over the hits and of the fit."""
-    errors = {
-        f"{name}_{source}": value
-        for source, values in (("std", mode.standard_error), ("std_of_fit", mode.fit_error))
-        for name, value in zip(("frequency_hz", "damping_ratio", "stiffness_n_per_m"), values, strict=True)
-    }
-    return MODE_FIELDS(mode) | errors | {"interval_95": mode.interval(), "trust": assess_trust(mode)}
+mode_json = json_fields(
+    """
+    frequency_hz=frequency frequency_hz_std=standard_error.0 frequency_hz_std_of_fit=fit_error.0
+    damping_ratio damping_ratio_std=standard_error.1 damping_ratio_std_of_fit=fit_error.1
+    stiffness_n_per_m=stiffness stiffness_n_per_m_std=standard_error.2 stiffness_n_per_m_std_of_fit=fit_error.2
+    interval_95=self correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
+    misfit_share trust=self found_again=match_count half_power_damping_ratio=half_power_damping remarks method
+    """,
+    {"interval_95": Mode.interval, "trust": assess_trust},
+)
+"""Function that returns one mode with its standard errors over the hits and of the fit."""
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
@@ -173,13 +162,14 @@ def _difference_text(mode: Mode, fitted: Sequence[Mode]) -> str:
     return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
 
 
-def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
-    """Return the modes of one file, fitted and by peak picking."""
-    return FILE_MODES_FIELDS(file_modes) | {
-        "file": str(file_modes.path),
-        "modes": [mode_json(mode) for mode in file_modes.fitted],
-        "peak_picking": [mode_json(mode) for mode in file_modes.picked],
-    }
+file_modes_json = json_fields(
+    """
+    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
+    remarks
+    """,
+    {"file": str, "modes": mode_json, "peak_picking": mode_json},
+)
+"""Function that returns the modes of one file, fitted and by peak picking."""
 
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -77,31 +79,24 @@ def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, a
         raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
 
 
-PREVIEW_FIELDS = json_fields("""
+STATUS_FIELDS = json_fields("file known=stored_tap_id refused=rejection", {"file": str})
+QUESTION_FIELDS = json_fields("code text")
+PREVIEW_FIELDS = json_fields(
+    """
     format=recording.title facts=recording.facts time=measurement.time tool=measurement.tool
     direction=measurement.direction hits=tap.flags lines=tap.frf.frequency.size averages=tap.frf.n_averages
     modes=measurement.modes followed=measurement.followed questions=measurement.remarks
-""")
-QUESTION_FIELDS = json_fields("code text")
+    """,
+    {"time": datetime.isoformat, "hits": attrgetter("words"), "modes": mode_json, "followed": mode_json},
+)
 
 
 def preview_json(preview: ReplayPreview) -> dict[str, Any]:
     """Return what would become of one file."""
-    measurement, tap = preview.measurement, preview.tap
-    status: dict[str, Any] = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
-    if measurement is None or tap is None or preview.recording is None:
-        return status
-    return (
-        status
-        | PREVIEW_FIELDS(preview)
-        | {
-            "time": measurement.time.isoformat(),
-            "hits": [flags.words for flags in tap.flags],
-            "modes": [mode_json(mode) for mode in measurement.modes],
-            "followed": measurement.followed and mode_json(measurement.followed),
-            "questions": list(map(QUESTION_FIELDS, find_open_questions(measurement.remarks))),
-        }
-    )
+    if preview.measurement is None or preview.tap is None or preview.recording is None:
+        return STATUS_FIELDS(preview)
+    asked = find_open_questions(preview.measurement.remarks)
+    return STATUS_FIELDS(preview) | PREVIEW_FIELDS(preview) | {"questions": list(map(QUESTION_FIELDS, asked))}
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
@@ -131,13 +126,13 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         return []
     modes = sort_modes(measurement.modes, rejected=False)[:8]
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
-    details = [
-        *fact_lines(recording.facts),
-        f"modes: {', '.join(map(_mode_text, modes)) or 'none'}",
-        f"followed: {f'{measurement.followed.frequency:.2f} Hz' if measurement.followed else 'none'}",
-        *(questions or ["plausible for this machine: nothing would be asked"]),
-    ]
-    return [f"{preview.file}: {recording.title}, {_hits_text(preview)}", *(f"  {line}" for line in details)]
+    followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
+    details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
+    details += [f"followed: {followed}", *(questions or ["plausible for this machine: nothing would be asked"])]
+    words = Counter(flags.words for flags in preview.tap.flags)
+    hits = f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
+    kind = hits if preview.tap.hits else "an FRF"
+    return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 
 def _mode_text(mode: Mode) -> str:
@@ -145,14 +140,6 @@ def _mode_text(mode: Mode) -> str:
     frequency, damping = format_rounded(mode.frequency, f_std), format_rounded(mode.damping_ratio, zeta_std, 0.01)
     stiffness = f", {format_rounded(mode.stiffness, k_std, 1e6)} N/um" if mode.has_stiffness else ""
     return f"{frequency} Hz ({damping} %{stiffness})"
-
-
-def _hits_text(preview: ReplayPreview) -> str:
-    """Return the number of hits by verdict."""
-    if preview.tap is None or not preview.tap.hits:
-        return "an FRF"
-    words = Counter(flags.words for flags in preview.tap.flags)
-    return f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
 
 
 def _preview_row(preview: ReplayPreview) -> list[str]:
@@ -212,23 +199,17 @@ def emit_replay(
     as_json: bool,
 ) -> None:
     """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
-    _print_known(outcome.already_stored, n_files)
-    if passed:
-        notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
-    payload, texts = dict[str, Any](), list[str | Table]()
+    known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
+    if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
+        known = [f"{len(known)} of {n_files} files are stored already"]
+    known += [f"passed over: {len(passed)} other files, such as {passed[0].name}"] if passed else []
+    for line in known:
+        notes.print(line, markup=False)
     if as_json:
-        payload = replay_json(outcome, logbook) | {"accepted": list(accepted), "questions": logbook.questions}
-    else:
-        texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
-    emit(payload, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
-
-
-def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
-    if n_files > MIN_FILES_TO_COUNT and len(stored) > MAX_KNOWN_LISTED:
-        notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
+        emit(replay_json(outcome, logbook) | {"accepted": accepted, "questions": logbook.questions}, as_json)
         return
-    for file, tap_id in stored.items():
-        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
+    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
@@ -236,7 +217,7 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
     stored = outcome.new_tap_ids
     return {
         "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored],
-        "programs": [verdict_json(verdict) for verdict in logbook.verdicts()] if stored else [],
+        "programs": list(map(verdict_json, logbook.verdicts())) if stored else [],
         "known": {str(file): tap_id for file, tap_id in outcome.already_stored.items()},
         "refused": {str(file): reason for file, reason in outcome.rejected.items()},
         "taken": outcome.assumed_facts,
@@ -266,20 +247,16 @@ def _series_table(rows: Sequence[HistoryRow]) -> Table:
     for row in rows:
         series.setdefault((row.tool, row.direction), []).append(row)
     headings = "<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)"
-    return new_table(*headings, rows=map(_series_cells, series.values()))
-
-
-def _series_cells(tests: Sequence[HistoryRow]) -> list[str]:
-    first, last = tests[0], tests[-1]
-    modes = [row.mode for row in tests if row.mode is not None]
-    ends = (modes[0], modes[-1]) if modes else ()
-    values = (
-        (f"{mode.frequency:.1f}" for mode in ends),
-        (f"{100 * mode.damping_ratio:.2f}" for mode in ends),
-        (f"{mode.stiffness / 1e6:.1f}" for mode in ends if mode.has_stiffness),
-    )
-    days = f"{first.time:%Y-%m-%d}", f"{last.time:%Y-%m-%d}"
-    return [first.tool, first.direction, str(len(tests)), *days, *map(" .. ".join, values)]
+    table = new_table(*headings)
+    for (tool, direction), tests in series.items():
+        modes = [row.mode for row in tests if row.mode is not None]
+        ends = (modes[0], modes[-1]) if modes else ()
+        frequency = " .. ".join(f"{mode.frequency:.1f}" for mode in ends)
+        damping = " .. ".join(f"{100 * mode.damping_ratio:.2f}" for mode in ends)
+        stiffness = " .. ".join(f"{mode.stiffness / 1e6:.1f}" for mode in ends if mode.has_stiffness)
+        days = (f"{test.time:%Y-%m-%d}" for test in (tests[0], tests[-1]))
+        table.add_row(tool, direction, str(len(tests)), *days, frequency, damping, stiffness)
+    return table
 
 
 class MachineRebuild(NamedTuple):
@@ -295,17 +272,15 @@ class MachineRebuild(NamedTuple):
     """Remarks on the machine after the rebuild."""
 
 
-def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
-    """Return the outcome of rebuilding one machine."""
-    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": rebuild.remarks}
+rebuild_json = json_fields("done=repairs tap_tests=n_taps remarks")
+"""Function that returns the outcome of rebuilding one machine."""
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
-    if rebuild.is_saved:
-        history = f"history.rows: made anew from {rebuild.n_taps} tap test(s)"
-    else:
-        history = "history.rows: not made anew (see above); the next command that can write makes it"
+    made = f"made anew from {rebuild.n_taps} tap test(s)"
+    missing = "not made anew (see above); the next command that can write makes it"
+    history = f"history.rows: {made if rebuild.is_saved else missing}"
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
 
 

@@ -14,27 +14,35 @@ from lobewatch.sensors import Finding, MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.json_fields import json_fields
 from lobewatch.show.terminal.output import new_table
 
-SENSORS_FIELDS = json_fields("""
+CHANNEL_FIELDS = json_fields(
+    """
+    quantity direction sensitivity_v_per_si=sensitivity full_scale_v=full_scale full_scale_si=self adc_bits
+    serial_number calibration_date skew_us=skew*1e6
+    """,
+    {"full_scale_si": lambda channel: channel.full_scale / abs(channel.sensitivity)},
+)
+sensors_json = json_fields(
+    """
     model=identity.model serial=identity.serial channels sample_rate_hz=nominal_rate measured_rate_hz=measured_rate.rate
     measured_rate_hz_std=measured_rate.std remarks errors
+    """,
+    {"channels": CHANNEL_FIELDS},
+)
+"""Function that returns the device, its channels and its sample rate."""
+mass_check_json = json_fields("""
+    mass_kg=calibration.mass ratio=calibration.ratio ratio_std=calibration.ratio_std phase_deg=calibration.phase
+    inverted=calibration.inverted flatness=calibration.flatness band_hz=calibration.band hits=calibration.n_hits
+    agrees=calibration.agrees force_sensitivity_v_per_n=calibration.force_sensitivity
+    acceleration_sensitivity_v_per_m_s2=calibration.acceleration_sensitivity remarks=calibration.remarks
 """)
-CHANNEL_FIELDS = json_fields("""
-    quantity direction sensitivity_v_per_si=sensitivity full_scale_v=full_scale full_scale_si=full_scale adc_bits
-    serial_number calibration_date skew_us=skew*1e6
-""")
-MASS_CHECK_FIELDS = json_fields("""
-    mass_kg=mass ratio ratio_std phase_deg=phase inverted flatness band_hz=band hits=n_hits agrees
-    force_sensitivity_v_per_n=force_sensitivity acceleration_sensitivity_v_per_m_s2=acceleration_sensitivity remarks
-""")
-SKEW_CHECK_FIELDS = json_fields("""
-    skew_us=measured.skew*1e6 skew_us_std=measured.std*1e6 skew_samples=measured.skew
-    coherent_share=measured.coherent_share
-""")
-
-
-def sensors_json(sensors: SensorList) -> dict[str, Any]:
-    """Return the device, its channels and its sample rate."""
-    return SENSORS_FIELDS(sensors) | {"channels": [_channel_json(channel) for channel in sensors.channels]}
+"""Function that returns the ratio F/(m a) of a hung mass, and the sensitivities that follow from it."""
+skew_check_json = json_fields(
+    """
+    skew_us=measured.skew*1e6 skew_us_std=measured.std*1e6 skew_samples=self coherent_share=measured.coherent_share
+    """,
+    {"skew_samples": lambda check: check.measured.skew * check.sample_rate},
+)
+"""Function that returns the skew between the channels and its standard error."""
 
 
 def sensors_texts(sensors: SensorList) -> list[str | Table]:
@@ -48,10 +56,6 @@ def sensors_texts(sensors: SensorList) -> list[str | Table]:
         f"rate: {sensors.nominal_rate:g} Hz, {rate}",
         *(f"{'error' if remark in sensors.errors else 'warning'}: {remark}" for remark in sensors.remarks),
     ]
-
-
-def _channel_json(channel: Channel) -> dict[str, Any]:
-    return CHANNEL_FIELDS(channel) | {"full_scale_si": channel.full_scale / abs(channel.sensitivity)}
 
 
 CHANNEL_HEADINGS = "no", "<quantity", "sensitivity", "range", "input", "bits", "skew\n(us)", "~serial", "<calibrated"
@@ -72,11 +76,6 @@ def _channel_cells(number: int, channel: Channel) -> list[str]:
     ]
 
 
-def mass_check_json(check: MassCheck) -> dict[str, Any]:
-    """Return the ratio F/(m a) of a hung mass, and the sensitivities that follow from it."""
-    return MASS_CHECK_FIELDS(check.calibration)
-
-
 def mass_check_texts(check: MassCheck) -> list[str]:
     """Return the result of the mass check, and what to change where."""
     ratio = check.calibration.ratio
@@ -89,11 +88,6 @@ def mass_check_texts(check: MassCheck) -> list[str]:
         place = check.place.place
     change = f"To change in {place}: multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}."
     return [str(check.calibration), change]
-
-
-def skew_check_json(check: SkewCheck) -> dict[str, Any]:
-    """Return the skew between the channels and its standard error."""
-    return SKEW_CHECK_FIELDS(check) | {"skew_samples": check.measured.skew * check.sample_rate}
 
 
 def skew_check_texts(check: SkewCheck) -> list[str]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
 from acquisition import Remark, merge_remarks
@@ -21,29 +20,44 @@ from lobewatch.show.terminal.output import new_table, remark_lines
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 
-COMPARISON_FIELDS = json_fields("""
+POCKET_TIP_FIELDS = json_fields("speed_rpm depth_mm=depth*1e3 from_rpm to_rpm")
+SHIFT_FIELDS = json_fields(
+    "then=before now=after speed_change depth_change", {"then": POCKET_TIP_FIELDS, "now": POCKET_TIP_FIELDS}
+)
+COMPARISON_FIELDS = json_fields(
+    """
     tap_id=now.assembly.tap_id source=now.source speed_rpm=now.lobes.speed_rpm depth_mm=now.lobes.depth*1e3
-    chatter_frequencies_hz=now.lobes.chatter_frequency kind=now.lobes.kind
+    chatter_frequencies_hz=now.lobes.chatter_frequency kind=now.lobes.kind pockets pocket_shifts=shifts
+    programs=verdicts
+    """,
+    {"pockets": setting_json, "pocket_shifts": SHIFT_FIELDS, "programs": verdict_json},
+)
+LOBES_FIELDS = json_fields("""
+    method method_detail=detail minimum_depth_mm=minimum.depth*1e3 at_speed_rpm=minimum.speed_rpm
+    chatter_frequency_hz=minimum.chatter_frequency
 """)
+
+
+def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
+    """Return the method and the lowest point of a diagram."""
+    return {"cut": name} | LOBES_FIELDS(lobes)
 
 
 def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
     """Return the newest diagram, its pockets, and the verdicts on the programs with this cut."""
     diagram = lobes_json(comparison.now.name, comparison.now.lobes) | COMPARISON_FIELDS(comparison)
-    return diagram | {
-        "pockets": [setting_json(pocket) for pocket in comparison.pockets],
-        "pocket_shifts": [shift_json(shift) for shift in comparison.shifts],
-        "programs": [verdict_json(verdict) for verdict in comparison.verdicts],
-        "remarks": merge_remarks(remarks),
-    }
+    return diagram | {"remarks": merge_remarks(remarks)}
 
 
 def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
     """Return the newest diagram in words, its pockets, and the verdicts on the programs with this cut."""
-    now, verdicts = comparison.now, comparison.verdicts
+    now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
+    lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
     texts: list[str | Table] = [
         f"{now.name}: {now.lobes.method_text}, from the {now.source} of {now.assembly.tap_id}",
-        _lowest_limit_text(comparison),
+        f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
+        if math.isfinite(low.depth)
+        else f"no limit in this speed range ({now.lobes.method_text})",
         *shift_lines(comparison.shifts),
     ]
     if comparison.pockets:
@@ -52,48 +66,21 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> l
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
     if verdicts:
         texts += [verdict_table(verdicts), f"verdicts by {verdicts[0].method}, as lobewatch check"]
-        texts += _at_speed_lines(comparison)
+    if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
+        still = "the diagram and its pockets are" if now.name == REFERENCE_CUT else "the diagram is"
+        texts.append(f"{at_speed_text(taught)}; {still} of the spindle at rest")
     return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET_CODE])]
-
-
-def _at_speed_lines(comparison: LobeComparison) -> list[str]:
-    """Return what holds for the rotating spindle where test cuts were used."""
-    taught = [verdict for verdict in comparison.verdicts if verdict.n_cuts]
-    if not taught:
-        return []
-    still = "the diagram and its pockets are" if comparison.now.name == REFERENCE_CUT else "the diagram is"
-    return [f"{at_speed_text(taught)}; {still} of the spindle at rest"]
-
-
-def _lowest_limit_text(comparison: LobeComparison) -> str:
-    lobes, low = comparison.now.lobes, comparison.now.lobes.minimum
-    if not np.isfinite(low.depth):
-        return f"no limit in this speed range ({lobes.method_text})"
-    return (
-        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz"
-    )
 
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Return a table with a line for each recommended pocket."""
-    headings = "pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "fall left"
-    return new_table(*headings, rows=map(_pocket_cells, pockets))
-
-
-def _pocket_cells(pocket: Setting) -> list[str]:
-    low, high = pocket.window_rpm
-    drop = f"{100 * pocket.drop_margin:.0f} %{' or more' if pocket.drop_margin >= CHECKED_DROPS[-1] else ''}"
-    margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
-    return [f"{pocket.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{pocket.depth_mm:.2f}", margin, drop]
-
-
-SHIFT_FIELDS = json_fields("then=before now=after speed_change depth_change")
-POCKET_TIP_FIELDS = json_fields("speed_rpm depth_mm=depth*1e3 from_rpm to_rpm")
-
-
-def shift_json(shift: PocketShift) -> dict[str, Any]:
-    """Return a pocket of the diagram at the first and at the newest tap tests."""
-    return SHIFT_FIELDS(shift) | {"then": POCKET_TIP_FIELDS(shift.before), "now": POCKET_TIP_FIELDS(shift.after)}
+    table = new_table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "fall left")
+    for pocket in pockets:
+        window = "{:.0f}..{:.0f}".format(*pocket.window_rpm)
+        margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
+        drop = f"{100 * pocket.drop_margin:.0f} %{' or more' if pocket.drop_margin >= CHECKED_DROPS[-1] else ''}"
+        table.add_row(f"{pocket.speed_rpm:.0f}", window, f"{pocket.depth_mm:.2f}", margin, drop)
+    return table
 
 
 def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
@@ -105,14 +92,3 @@ def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
             f"({100 * shift.speed_change:+.1f} %), its tip from {before.depth * 1e3:.2f} to "
             f"{after.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
         )
-
-
-LOBES_FIELDS = json_fields("""
-    method method_detail=detail minimum_depth_mm=minimum.depth*1e3 at_speed_rpm=minimum.speed_rpm
-    chatter_frequency_hz=minimum.chatter_frequency
-""")
-
-
-def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
-    """Return the method and the lowest point of a diagram."""
-    return {"cut": name} | LOBES_FIELDS(lobes)

@@ -51,11 +51,8 @@ def factor_text(name: str) -> str:
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 
 
-def uncertainty_json(verdict: Verdict) -> dict[str, Any] | None:
-    """Return relative half-widths by cause (degrees for phases) of the modes in x, then y; None without a result."""
-    if verdict.samples is None:
-        return None
-    uncertainty = verdict.samples.uncertainty
+def uncertainty_json(uncertainty: Uncertainty) -> dict[str, Any]:
+    """Return relative half-widths by cause (degrees for phases) of the modes in x, then y."""
     modes = {
         cause: dict(zip(UNCERTAINTY_KEYS, (widths * [1, 1, 1, DEGREES_PER_RADIAN]).T.tolist(), strict=True))
         for cause, widths in uncertainty.modes.items()
@@ -191,25 +188,22 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
 }
 """Style of each verdict, the same everywhere."""
 VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
-
-
-VERDICT_FIELDS = json_fields("""
-    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=assembly.tap_id
+verdict_json = json_fields(
+    """
+    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=self
     stable=is_stable verdict=stability measured=is_measured limit_mm=limit*1e3 limit_low_mm=limit_low*1e3
     limit_high_mm=limit_high*1e3 depth_margin chance_turning=chatter_risk decided_by=decisive_cause cuts=n_cuts
-    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3 doubt=samples
-    method method_detail=detail
-""")
-
-
-def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """Return one verdict as a JSON object; unknown numbers are NaN or None."""
-    return VERDICT_FIELDS(verdict) | {
-        "tap_id": verdict.assembly.tap_id if verdict.assembly else "",
-        "decided_by": verdict.decisive_cause or None,
-        "worst_feed_deg": math.degrees(verdict.feed_angle),
-        "doubt": uncertainty_json(verdict),
-    }
+    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3
+    doubt=samples.uncertainty method method_detail=detail
+    """,
+    {
+        "tap_id": lambda verdict: verdict.assembly.tap_id if verdict.assembly else "",
+        "decided_by": lambda cause: cause or None,
+        "worst_feed_deg": math.degrees,
+        "doubt": uncertainty_json,
+    },
+)
+"""Function that returns one verdict as a JSON object; unknown numbers are NaN or None."""
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import astuple
 from datetime import datetime
 from pathlib import Path
-from typing import Any
-
-from rich.table import Table
 
 from lobewatch.monitoring.trend import date_of_days
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 from lobewatch.show.trend import reach_text
 from lobewatch.tap.demo import DemoTap, LevelForecast
 
@@ -31,7 +27,7 @@ TAP_FIELDS = json_fields(
 )
 
 
-def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
+def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> JsonObject:
     """Return all tap tests of the demo, and the forecast with the true dates."""
     levels = {item.level: {**item.reached.to_row(), "truth": _date_text(item.truth)} for item in forecasts}
     return {"taps": list(map(TAP_FIELDS, taps)), "forecast": levels, "report": str(report)}
@@ -41,9 +37,7 @@ def _date_text(days: float | None) -> str | None:
     return None if days is None else f"{date_of_days(days):%Y-%m-%d}"
 
 
-def demo_texts(
-    taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path
-) -> list[str | Table]:
+def demo_texts(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path) -> Texts:
     """Return the true and the measured values, their errors, and the forecast with the truth."""
     in_x = [tap for tap in taps if tap.plan.direction == "x"]
     first, last = in_x[0], in_x[-1]

@@ -18,8 +18,7 @@ from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import MaintenanceEvent
 from lobewatch.show.programs.materials import power_text
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import align_columns, blank_nonfinite, format_csv
+from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, json_fields
 
 
 def cut_text(cut: CutEntry) -> str:
@@ -126,7 +125,7 @@ def event_text(event: MaintenanceEvent) -> str:
     return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
 
 
-def history_json(logbook: Logbook) -> dict[str, Any]:
+def history_json(logbook: Logbook) -> JsonObject:
     """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
@@ -189,7 +188,7 @@ def _history_cells(line: Mapping[str, Any]) -> list[str]:
     return [when, line["kind"].removeprefix("new "), line.get("tool", ""), line.get("direction", ""), *numbers]
 
 
-def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
+def _history_entries(logbook: Logbook) -> list[JsonObject]:
     """Return tap tests, excluded ones, events, acknowledgements and test cuts as JSON objects, oldest first."""
     history = history_json(logbook)
     groups = ("tap", history["taps"]), ("kept", history["kept"]), ("excluded", history["excluded"])
@@ -207,7 +206,7 @@ def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
     return sorted(entries, key=lambda entry: entry["time"])
 
 
-def _tap_json(row: HistoryRow, logbook: Logbook) -> dict[str, Any]:
+def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
     verdicts = row.verdicts or {}
     names = [program.name for program in logbook.machine.program if program.name in verdicts]
     return TAP_FIELDS(row) | {

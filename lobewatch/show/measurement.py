@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
-
-from rich.table import Table
 
 from acquisition import Conditions
 from dsm import RemainingPreload
@@ -20,8 +17,7 @@ from lobewatch.show.models import CALIBRATION_FIELDS
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
 from lobewatch.show.programs.lobes import lobes_json
 from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import emit, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, notes, remark_lines
 from lobewatch.show.terminal.status_labels import status_label
 from lobewatch.tap.session import TapSession
 from lobewatch.tool import compute_lobes
@@ -32,7 +28,7 @@ MEASUREMENT_FIELDS = json_fields(
 )
 
 
-def measurement_json(measurement: Measurement, logbook: Logbook) -> dict[str, Any]:
+def measurement_json(measurement: Measurement, logbook: Logbook) -> JsonObject:
     """Return a measurement, the diagrams of its tool as it was known then, and the remarks on it."""
     assembly = logbook.assembly(until=measurement.tap_id)
     lobes = compute_lobes(assembly, logbook.machine)
@@ -44,10 +40,10 @@ def measurement_json(measurement: Measurement, logbook: Logbook) -> dict[str, An
     }
 
 
-def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
+def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
     """Return a measurement in words."""
     named = [f"tool {m.tool}", f"direction {m.direction}", *condition_texts(_tap_conditions(m, logbook))]
-    texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
+    texts: Texts = [f"{m.tap_id}  ({', '.join(named)})"]
     if m.modes:
         shown = sort_modes(m.modes, rejected=False)
         texts += [mode_table(shown), *grouped_remark_lines(shown, check_modes_together(m.modes))]
@@ -94,8 +90,8 @@ def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: 
     emit(payload, as_json, *_result_texts(logbook, finished, details))
 
 
-def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> list[str | Table]:
-    texts: list[str | Table] = []
+def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> Texts:
+    texts: Texts = []
     for session in finished:
         outcome = session.state.outcome
         texts += measurement_texts(session.measurement, logbook) if details else []

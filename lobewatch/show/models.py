@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from itertools import starmap
-from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -12,8 +11,7 @@ from rich.table import Table
 from dsm import Calibration, Joint, PredictedMode, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 
 NODE_STIFFNESS_RATIO = 1e4
 """Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
@@ -48,7 +46,7 @@ model_json = json_fields(
 """Function that returns a spindle model with its modes."""
 
 
-def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
+def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
     """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for those that the modes leave open."""
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
     return STIFFNESS_FIT_FIELDS(fit) | {
@@ -57,7 +55,7 @@ def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
     }
 
 
-def model_calibration_json(calibration: ModelCalibration) -> dict[str, Any]:
+def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
     """Return the stiffnesses and dampers that make a model fit."""
     stiffness, dampers = calibration.stiffness, calibration.dampers
     if isinstance(stiffness, Calibration):
@@ -76,7 +74,7 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
     return [*label, *(str(part) for part in parts if part is not None)]
 
 
-def model_texts(model: ModelSummary) -> list[str | Table]:
+def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
     headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
@@ -102,7 +100,7 @@ MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into m
 UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written into machine.toml"
 
 
-def tools_json(calibration: JointCalibration) -> dict[str, Any]:
+def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
     return stiffness_fit_json(fit) | {
@@ -116,7 +114,7 @@ def tools_json(calibration: JointCalibration) -> dict[str, Any]:
     }
 
 
-def tools_texts(calibration: JointCalibration) -> list[str | Table]:
+def tools_texts(calibration: JointCalibration) -> Texts:
     """Return the fit to several tools in words, what it rests on, and tools that it predicts."""
     lines = [f"model: {calibration.label}"] if calibration.label else []
     for number, tap in enumerate(calibration.taps, 1):

@@ -11,8 +11,7 @@ from rich.table import Table
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import Texts, json_fields, new_table
 from modal import Mode, Trust, assess_trust, trust_rules
 
 TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
@@ -172,12 +171,12 @@ file_modes_json = json_fields(
 """Function that returns the modes of one file, fitted and by peak picking."""
 
 
-def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:
+def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Texts:
     """Return the modes of one file in words; everything: rejected modes and each single remark, too."""
     shown = sort_modes(file_modes.fitted, rejected=everything)
     trusted = [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]
     remarks = mode_remark_lines if everything else grouped_remark_lines
-    texts: list[str | Table] = [
+    texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
         mode_table(shown),

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from rich.markup import escape
-from rich.table import Table
 
 from acquisition.devices import PortScan, ScannedPort
 from acquisition.ports import PortInfo, explain_no_ports
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import Texts, json_fields, new_table
 
 NO_ANSWER_TEXT = (
     "No DAQ answers. One that was just plugged in may need some seconds; a DATAQ device must blink yellow (CDC mode)."
 )
 
 
-def ports_texts(scan: PortScan) -> list[str | Table]:
+def ports_texts(scan: PortScan) -> Texts:
     """Return a table of the ports, their problems, and the next step."""
     remarks = [f"{remark}." for remark in scan.remarks]
     if not scan.ports:

@@ -8,7 +8,7 @@ from datetime import datetime
 from itertools import chain
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -24,8 +24,7 @@ from lobewatch.measurement.recording_questions import find_open_questions, quest
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import emit, new_table, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
@@ -91,7 +90,7 @@ PREVIEW_FIELDS = json_fields(
 )
 
 
-def preview_json(preview: ReplayPreview) -> dict[str, Any]:
+def preview_json(preview: ReplayPreview) -> JsonObject:
     """Return what would become of one file."""
     if preview.measurement is None or preview.tap is None or preview.recording is None:
         return STATUS_FIELDS(preview)
@@ -99,7 +98,7 @@ def preview_json(preview: ReplayPreview) -> dict[str, Any]:
     return STATUS_FIELDS(preview) | PREVIEW_FIELDS(preview) | {"questions": list(map(QUESTION_FIELDS, asked))}
 
 
-def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
+def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
     """Return a few files in full, many in a table with what is asked and refused below it."""
     if len(previews) <= MAX_PREVIEWS_IN_FULL:
         usable = (preview for preview in previews if not preview.rejection)
@@ -212,7 +211,7 @@ def emit_replay(
     emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 
-def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
+def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
     """Return all tap tests that were stored, and the files that were known already or rejected."""
     stored = outcome.new_tap_ids
     return {
@@ -224,9 +223,9 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
     }
 
 
-def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
+def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
     """Return a few tap tests in full, many as their series, and the verdicts on the programs."""
-    stored, texts = outcome.new_tap_ids, list[str | Table]()
+    stored, texts = outcome.new_tap_ids, Texts()
     if len(set(stored)) <= MAX_TAPS_IN_FULL:
         for tap_id in stored:
             texts += measurement_texts(logbook.measurement(tap_id), logbook)
@@ -284,7 +283,7 @@ def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
 
 
-def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> dict[str, Any]:
+def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> JsonObject:
     """Return the outcomes of rebuilding the machines of a folder, by name."""
     return {"machines": {name: rebuild_json(rebuild) for name, rebuild in rebuilds.items()}}
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from rich.markup import escape
-from rich.table import Table
 
 from acquisition import STANDARD_GRAVITY, Channel
 from dsm import format_with_error
 from lobewatch.sensors import Finding, MassCheck, SensorList, SkewCheck
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 
 CHANNEL_FIELDS = json_fields(
     """
@@ -45,7 +42,7 @@ skew_check_json = json_fields(
 """Function that returns the skew between the channels and its standard error."""
 
 
-def sensors_texts(sensors: SensorList) -> list[str | Table]:
+def sensors_texts(sensors: SensorList) -> Texts:
     """Return the device in words, a table of its channels, its sample rate, and warnings."""
     measured = sensors.measured_rate
     rate = "not measured" if measured is None else f"measured {format_with_error(measured.rate, measured.std)} Hz"
@@ -104,12 +101,12 @@ def skew_check_texts(check: SkewCheck) -> list[str]:
     ]
 
 
-def findings_json(findings: Sequence[Finding]) -> dict[str, Any]:
+def findings_json(findings: Sequence[Finding]) -> JsonObject:
     """Return all findings on the computer, and how many prevent a tap test."""
     return {"findings": findings, "hinder": _count_state(findings, "hinders")}
 
 
-def findings_texts(findings: Sequence[Finding]) -> list[str | Table]:
+def findings_texts(findings: Sequence[Finding]) -> Texts:
     """Return a table of the findings with their remedies, and a count."""
     marks = {"fine": "✓", "note": "·", "hinders": "✗"}
     rows = ((marks[item.state], *map(escape, (item.subject, item.text, item.cure))) for item in findings)

@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from dsm import RemainingPreload, format_with_error
 from lobewatch.arrays import Floats, Indices
@@ -18,8 +17,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
 from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import blank_nonfinite, format_csv, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, json_fields, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
@@ -46,7 +44,7 @@ SERIES_FIELDS = json_fields(
 )
 
 
-def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> dict[str, Any]:
+def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> JsonObject:
     """Return points, score, alarm, status and forecast; percents are 100 ln of the frequency over that of the first."""
     status, points = outlook.status, series.trend.points if series.trend else ()
     return SERIES_FIELDS(series) | {
@@ -68,11 +66,11 @@ def trend_csv(series: SeriesStatus) -> str:
     return format_csv(rows)
 
 
-def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> list[str | Table]:
+def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> Texts:
     """Return chart, sentence and forecast dates, and the change of the other series."""
     if series.trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
-    texts: list[str | Table] = [*chart_lines(series.trend), trend_sentence(series)]
+    texts: Texts = [*chart_lines(series.trend), trend_sentence(series)]
     texts += [] if preload is None else [str(preload)]
     dates = new_table("~what", "~becomes doubtful", "~is not stable", rows=forecast_date_rows(outlook))
     why_none = no_dates_text(outlook)

@@ -10,7 +10,7 @@ from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMO
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.programs.materials import power_text
-from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import JsonObject, json_fields
 
 FAULT_TEXTS: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
@@ -163,7 +163,7 @@ RECORDED_CUT_FIELDS = json_fields("""
 """)
 
 
-def recorded_cut_json(comparison: CutComparison) -> dict[str, Any]:
+def recorded_cut_json(comparison: CutComparison) -> JsonObject:
     """Return a recorded cut with all that was detected in it."""
     chatter, expected = comparison.detected.chatter, comparison.predicted
     return RECORDED_CUT_FIELDS(comparison) | {
@@ -176,7 +176,7 @@ def _stability_text(is_stable: bool) -> str:
     return "stable" if is_stable else "chatter"
 
 
-def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:
     """Return the cut in a recording, several as a list in `cuts`; more: further keys of each."""
     cuts = [recorded_cut_json(comparison) for comparison in comparisons]
     for cut, keys in zip(cuts, more, strict=False):

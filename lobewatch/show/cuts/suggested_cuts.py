@@ -6,7 +6,6 @@ import math
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.table import Table
 
@@ -19,8 +18,7 @@ from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import factor_text
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import count_noun, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
 SPEED_POCKET_FIELDS = json_fields("speed_rpm window_rpm depth_mm=speed_rpm over_lowest_limit=gain")
@@ -30,7 +28,7 @@ SUGGESTED_CUT_FIELDS = json_fields("""
 INTERVAL_FIELDS = json_fields("mean low high std")
 
 
-def speed_pocket_json(pocket: SpeedPocket) -> dict[str, Any]:
+def speed_pocket_json(pocket: SpeedPocket) -> JsonObject:
     """Return one pocket, whose depth is not known."""
     return SPEED_POCKET_FIELDS(pocket) | {"depth_mm": None}
 
@@ -46,18 +44,18 @@ def _pocket_cells(pocket: SpeedPocket) -> list[str]:
     return [format_rpm(round(pocket.speed_rpm)), f"{format_rpm(math.ceil(low))}..{format_rpm(math.floor(high))}", gain]
 
 
-def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> dict[str, Any]:
+def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> JsonObject:
     """Return the pockets of a cut, and why no depth is known."""
     return {"cut": cut, "pockets": list(map(speed_pocket_json, pockets)), "remarks": merge_remarks(remarks)}
 
 
-def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> list[str | Table]:
+def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> Texts:
     """Return the pockets of a cut as a table, and why no depth is known."""
     heading = f"{cut}: pockets by frequency and damping, the largest removal rate first; how deep, test cuts tell"
     return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
 
 
-def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], first: float) -> dict[str, Any]:
+def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
     """Return the next test cut, and the depths that were tried in each pocket; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     return {
@@ -110,7 +108,7 @@ def _round_to_mm(depth: float) -> float:
     return round(1e3 * depth, 4)
 
 
-def suggestion_json(next_cut: NextCut) -> dict[str, Any]:
+def suggestion_json(next_cut: NextCut) -> JsonObject:
     """Return the next test cut, and what it rests on."""
     learning, best = next_cut.learning, _best_stable_cut(next_cut.learning)
     return {
@@ -123,7 +121,7 @@ def suggestion_json(next_cut: NextCut) -> dict[str, Any]:
     }
 
 
-def _suggested_cut_json(cut: Suggestion) -> dict[str, Any]:
+def _suggested_cut_json(cut: Suggestion) -> JsonObject:
     return SUGGESTED_CUT_FIELDS(cut) | {"depth_mm": round(1e3 * cut.depth, 6), "repeats": cut.repeats or None}
 
 
@@ -171,7 +169,7 @@ def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
     return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
 
 
-def learned_json(learning: LearningResult) -> dict[str, Any]:
+def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
     before, after = learning.prior.intervals, learning.posterior.intervals
     return {
@@ -183,7 +181,7 @@ def learned_json(learning: LearningResult) -> dict[str, Any]:
     }
 
 
-def learned_texts(learning: LearningResult) -> list[str | Table]:
+def learned_texts(learning: LearningResult) -> Texts:
     """Return a table of what the test cuts have taught; nothing where there are none."""
     count = len(learning.accepted_cuts)
     return [f"learnt from {count_noun(count, 'cut')}:", learned_table(learning)] if count else []

@@ -17,19 +17,19 @@ from lobewatch.monitoring.threshold_dates import (
     build_limit_row,
     find_next_limit,
 )
-from lobewatch.show.terminal.output import align_columns, format_csv, make_printable
+from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
 """Codes of reasons that have columns of their own."""
 
 
-def fleet_rows(machines: Sequence[FleetMachine]) -> list[dict[str, Any]]:
+def fleet_rows(machines: Sequence[FleetMachine]) -> list[JsonObject]:
     """Return a row for each machine, in their order."""
     return [fleet_row(machine) for machine in machines]
 
 
-def fleet_row(machine: FleetMachine) -> dict[str, Any]:
+def fleet_row(machine: FleetMachine) -> JsonObject:
     """Return the row of one machine, with the series of the largest frequency drop."""
     summary, dated = machine.summary, machine.current
     ahead = find_next_limit(summary.limits)

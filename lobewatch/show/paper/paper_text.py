@@ -5,10 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from lobewatch.paper import Claim, Comparison, PaperStudy
-from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import JsonObject, json_fields
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
@@ -22,7 +21,7 @@ NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference r
 CLAIM_FIELDS = json_fields("claim=text verdict evidence")
 
 
-def paper_json(study: PaperStudy, page: Path | None) -> dict[str, Any]:
+def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
     """Return every number and every claim of the paper, and the page that was written."""
     rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {

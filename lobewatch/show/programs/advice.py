@@ -6,10 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from acquisition import Remark
 from lobewatch.logbook import Logbook
@@ -17,8 +15,7 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.show.programs.verdicts import verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import count_noun, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
@@ -74,13 +71,13 @@ ADVICE_FIELDS = json_fields(
 )
 
 
-def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> dict[str, Any]:
+def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> JsonObject:
     """Return all programs with advice, and how many may not be run; remarks: on the files."""
     advised = [verdict_json(program.verdict) | ADVICE_FIELDS(program) for program in programs]
     return {"programs": advised, **count_unsafe(programs), "remarks": remarks}
 
 
-def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
+def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> Texts:
     """Return all programs in words: the table, the advice, and notes on reading it."""
     decays = [frequency_margin_text(program.advice) for program in programs]
     verdicts = [program.verdict for program in programs]

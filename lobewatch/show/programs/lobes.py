@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from rich.table import Table
 
@@ -15,8 +14,7 @@ from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.show.programs.advice import setting_json
 from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_table
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table, remark_lines
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 
@@ -38,22 +36,22 @@ LOBES_FIELDS = json_fields("""
 """)
 
 
-def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
+def lobes_json(name: str, lobes: StabilityLobes) -> JsonObject:
     """Return the method and the lowest point of a diagram."""
     return {"cut": name} | LOBES_FIELDS(lobes)
 
 
-def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
+def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> JsonObject:
     """Return the newest diagram, its pockets, and the verdicts on the programs with this cut."""
     diagram = lobes_json(comparison.now.name, comparison.now.lobes) | COMPARISON_FIELDS(comparison)
     return diagram | {"remarks": merge_remarks(remarks)}
 
 
-def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
+def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> Texts:
     """Return the newest diagram in words, its pockets, and the verdicts on the programs with this cut."""
     now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
-    texts: list[str | Table] = [
+    texts: Texts = [
         f"{now.name}: {now.lobes.method_text}, from the {now.source} of {now.assembly.tap_id}",
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)

@@ -11,8 +11,7 @@ from rich.table import Table
 from lobes import Cut, CuttingCoefficients
 from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
 from lobewatch.machine.settings.drive_power import CutPower
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import json_fields, new_table
 
 MAX_MATERIALS_IN_FULL = 5
 """Largest number of materials that are shown with their sources."""

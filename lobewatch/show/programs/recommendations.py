@@ -7,17 +7,13 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
-
-from rich.table import Table
 
 from acquisition import Remark
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import LINE_REMARK_CODES, format_rpm, robustness_text, setting_json, worst_feed_text
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, new_table, remark_lines
+from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, JsonObject, Texts, json_fields, new_table, remark_lines
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation
@@ -52,7 +48,7 @@ PITCH_FIELDS = json_fields("""
 """)
 
 
-def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> dict[str, Any]:
+def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
     others = ({"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives)
     return PROGRAM_FIELDS(answer.program) | {
@@ -66,7 +62,7 @@ def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) 
     }
 
 
-def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> dict[str, Any]:
+def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> JsonObject:
     feed = None if answer.feed_mm is None else answer.feed_mm[1]
     return {
         **setting_json(setting),
@@ -142,7 +138,7 @@ HIDDEN_PITCH_CODES = ("doubt-decides",)
 """Codes of remarks on the verdict, which this output does not show."""
 
 
-def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> dict[str, Any]:
+def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
     """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
     return PROPOSAL_FIELDS(proposal) | {
         "depth_mm": depth_mm,
@@ -152,11 +148,11 @@ def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: f
     }
 
 
-def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> dict[str, Any]:
+def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
     return PITCH_FIELDS(pitch) | ({"verdict": None} if depth_mm is None else {})
 
 
-def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> list[str | Table]:
+def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:
     """Return a table of the patterns, and which to have ground; depth_mm: requested depth of cut, None for any."""
     headings = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
     table = new_table(*headings, *([] if depth_mm is None else [f"<at {depth_mm:g} mm"]))

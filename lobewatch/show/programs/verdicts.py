@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.markup import escape
@@ -14,8 +14,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import count_noun, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 from lobewatch.verdicts import Stability, Verdict
@@ -51,7 +50,7 @@ def factor_text(name: str) -> str:
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 
 
-def uncertainty_json(uncertainty: Uncertainty) -> dict[str, Any]:
+def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     """Return relative half-widths by cause (degrees for phases) of the modes in x, then y."""
     modes = {
         cause: dict(zip(UNCERTAINTY_KEYS, (widths * [1, 1, 1, DEGREES_PER_RADIAN]).T.tolist(), strict=True))
@@ -282,10 +281,10 @@ def _mm_text(depth: float) -> str:
     return f"{mm:.2f}" if mm < 99.995 else f"{mm:.1f}" if mm < 999.95 else f"{mm:.0f}"
 
 
-def program_texts(logbook: Logbook) -> list[str | Table]:
+def program_texts(logbook: Logbook) -> Texts:
     """Return the verdicts on all programs, where to read on, and the remarks on the files."""
     verdicts = logbook.verdicts()
-    texts: list[str | Table] = [verdict_table(verdicts), *verdict_notes(verdicts, logbook.machine)] if verdicts else []
+    texts: Texts = [verdict_table(verdicts), *verdict_notes(verdicts, logbook.machine)] if verdicts else []
     if not all(map(is_safe, verdicts)):
         texts.append("lobewatch check says what would settle it, and where to go instead")
     return [*texts, *remark_lines(logbook.remarks)]

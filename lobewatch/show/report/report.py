@@ -20,7 +20,7 @@ from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
 from lobewatch.show.report.summary import make_summary
-from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.show.terminal.output import JsonObject, json_fields
 from lobewatch.show.terminal.status_labels import status_css_class
 from lobewatch.verdicts.verdict import Stability
 
@@ -62,7 +62,7 @@ REPORT_FIELDS = json_fields("""
 
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
-) -> dict[str, Any]:
+) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
     groups, tap = [make(data) for make in sections], data.newest
@@ -104,7 +104,7 @@ def _enum_value(value: Any) -> Any:
     return value.value if isinstance(value, StatusLevel) else value
 
 
-def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
+def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine as the template takes it."""
     left, last = row["days_left"], row["last_tap"]
     due = (

@@ -12,8 +12,10 @@ import os
 import re
 import sys
 import webbrowser
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from itertools import starmap
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Protocol
 
 import typer
@@ -30,6 +32,10 @@ from lobewatch.show.terminal.option_names import with_option_names
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
+JsonObject = dict[str, Any]
+"""Object of the JSON output."""
+Texts = list[str | Table]
+"""Texts and tables of the output for people."""
 REPLACEMENT_CHARACTER = "\ufffd"
 """Character shown instead of a control character."""
 
@@ -68,7 +74,7 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 """Console for results, wide enough for every table: a narrow terminal may wrap lines, but no number is cut off."""
 
 
-def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
+def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
         import msgspec  # only JSON output waits for it
@@ -156,6 +162,54 @@ def _to_list(array: Any) -> Any:
     return array.tolist()
 
 
+FIELD_PATTERN = re.compile(r"(\w+)(?:=([\w.-]+))?(?:([*/])([\d.e]+))?")
+"""Key, attribute path, and factor or divisor of a unit."""
+JsonFields = Callable[[Any], JsonObject]
+"""Function that makes the JSON object of a record."""
+
+
+def json_fields(table: str, encoders: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})) -> JsonFields:
+    """Return a function that makes the JSON object of a record, its keys in the order of the table.
+
+    An entry of the table is a key, `key=path.of.attribute`, or either of them with the factor or divisor of its unit;
+    the path `self` is the record, a number in a path an index. The value is None where a part of the path is None. An
+    encoder makes the value of its key from the attribute. Encoder and unit apply to each item of a list or tuple.
+
+    >>> from types import SimpleNamespace
+    >>> pocket = SimpleNamespace(speed_rpm=6000.0, tip=SimpleNamespace(depth=0.002), mode=None)
+    >>> json_fields("speed_rpm depth_mm=tip.depth*1e3 frequency_hz=mode.frequency", {"speed_rpm": round})(pocket)
+    {'speed_rpm': 6000, 'depth_mm': 2.0, 'frequency_hz': None}
+    """
+    fields = [_read_field(entry, encoders) for entry in table.split()]
+    return lambda record: {key: value(record) for key, value in fields}
+
+
+def _read_field(entry: str, encoders: Mapping[str, Callable[[Any], Any]]) -> tuple[str, Callable[[Any], Any]]:
+    match = FIELD_PATTERN.fullmatch(entry)
+    if match is None:
+        raise ValueError(f"{entry!r} is no key=path.of.attribute*factor")
+    key, path, operator, unit = match.groups()
+    names, size = [] if path == "self" else (path or key).split("."), float(unit or 1)
+    encode = encoders.get(key, lambda value: value)
+
+    def scale(number: Any) -> Any:
+        return number * size if operator == "*" else number / size
+
+    def value(record: Any) -> Any:
+        part = reduce(_follow, names, record)
+        is_list = isinstance(part, (list, tuple)) and not hasattr(part, "_fields")
+        convert = scale if operator else encode
+        return list(map(convert, part)) if is_list else None if part is None else convert(part)
+
+    return key, value
+
+
+def _follow(part: Any, name: str) -> Any:
+    if part is None:
+        return None
+    return part[int(name)] if name.lstrip("-").isdigit() else getattr(part, name)
+
+
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
     """Return a line for each remark, the same remark on several things as one."""
     return [f"note: {remark}" for remark in merge_remarks(remarks)]
@@ -198,7 +252,7 @@ WatchToken = Annotated[
 ]
 
 
-class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
+class ServedScreen(contextlib.AbstractContextManager["ServedScreen"], Protocol):
     """Server of a screen that answers within its context."""
 
     @property
@@ -213,7 +267,7 @@ class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
 
 
 @contextlib.contextmanager
-def serve_screen(server: ScreenServer) -> Iterator[None]:
+def serve_screen(server: ServedScreen) -> Iterator[None]:
     """Run a screen server, and print its address."""
     with server:
         show_address(server.url, server.watch_url)

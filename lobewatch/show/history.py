@@ -156,8 +156,9 @@ def history_lines(logbook: Logbook) -> list[str]:
     """Return the history in local time: a line for each entry below the headings, its notes in a line below it."""
     entries = _history_entries(logbook)
     taps = [entry["id"] for entry in entries if "direction" in entry]
-    names = dict(zip(taps, shorten_ids(taps), strict=True))
-    cells = ((*_history_cells(entry), names.get(entry["id"], entry.get("name", ""))) for entry in entries)
+    names: dict[str, str] = {entry["id"]: entry.get("name", "") for entry in entries}
+    names |= zip(taps, shorten_ids(taps), strict=True)
+    cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
     lines = align_columns([*HISTORY_HEADINGS, *cells], NUMBER_COLUMNS)
     texts = ["", "", *map(_note_text, entries)]
     return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]

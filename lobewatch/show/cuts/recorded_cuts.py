@@ -110,10 +110,10 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
     """Return the verdict on a recorded cut, and what it rests on."""
     detected, texts = comparison.detected, [cut_verdict_text(comparison)]
     if detected.spindle_speed is not None:
-        difference = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+        off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
         duration = math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
         texts.append(
-            f"{comparison.speed_rpm:.1f} rpm ({difference:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
+            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
             f"{comparison.tooth_passing_frequency:.1f} Hz; listened to {duration:.2f} s"
         )
     if (measured := detected.measured_rpm) is not None:
@@ -127,7 +127,12 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
         texts.append(MICROPHONE_NOTE)
     if comparison.power is not None:
         texts.append(power_text(comparison.power, comparison.setting.cut))
-    return texts + _prediction_texts(comparison)
+    if (expected := comparison.predicted) is not None:
+        difference = comparison.frequency_difference
+        apart = "" if difference is None else f", {difference:.1f} Hz from what was heard modulo tooth passing"
+        word = "stable" if expected.stable else "chatter"
+        texts.append(f"by the tap tests, at rest: {word}, at this depth {expected.frequency:.1f} Hz{apart}")
+    return texts
 
 
 def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:
@@ -141,39 +146,24 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
     return texts
 
 
-def _prediction_texts(comparison: CutComparison) -> list[str]:
-    expected, difference = comparison.predicted, comparison.frequency_difference
-    if expected is None:
-        return []
-    apart = "" if difference is None else f", {difference:.1f} Hz from what was heard modulo tooth passing"
-    frequency = f"at this depth {expected.frequency:.1f} Hz"
-    return [f"by the tap tests, at rest: {_stability_text(expected.stable)}, {frequency}{apart}"]
-
-
-RECORDED_CUT_FIELDS = json_fields("""
+recorded_cut_json = json_fields(
+    """
     word=detected.verdict reason=detected.reason chatter_frequency_hz=detected.chatter.frequency
     chatter_frequency_hz_std=detected.chatter.error elsewhere_rpm=detected.distant_rpm
     unexplained_tone_hz=detected.tone sensor speed_rpm=detected.speed_rpm
     speed_rpm_std=detected.spindle_speed.error*60 commanded_rpm=setting.speed_rpm measured_rpm=detected.measured_rpm
     depth_mm=setting.depth*1e3 tooth_frequency_hz=tooth_passing_frequency energy_ratio=detected.energy_ratio
-    lobe=lobe_number side_bands_hz=detected.chatter.peaks.frequency power_kw=power.watts/1e3
-    tangential_by_power_n_per_mm2=power.tangential/1e6 predicted predicted_frequency_hz=predicted.frequency
-    predicted_apart_hz=frequency_difference begin_s=detected.parts.begin end_s=detected.parts.end
-    steady_begin_s=detected.parts.steady_begin steady_end_s=detected.parts.steady_end
-""")
-
-
-def recorded_cut_json(comparison: CutComparison) -> JsonObject:
-    """Return a recorded cut with all that was detected in it."""
-    chatter, expected = comparison.detected.chatter, comparison.predicted
-    return RECORDED_CUT_FIELDS(comparison) | {
-        "side_bands_hz": [] if chatter is None else sorted(chatter.peaks.frequency.tolist()),
-        "predicted": None if expected is None else _stability_text(expected.stable),
-    }
-
-
-def _stability_text(is_stable: bool) -> str:
-    return "stable" if is_stable else "chatter"
+    lobe=lobe_number side_bands_hz=detected power_kw=power.watts/1e3
+    tangential_by_power_n_per_mm2=power.tangential/1e6 predicted=predicted.stable
+    predicted_frequency_hz=predicted.frequency predicted_apart_hz=frequency_difference begin_s=detected.parts.begin
+    end_s=detected.parts.end steady_begin_s=detected.parts.steady_begin steady_end_s=detected.parts.steady_end
+    """,
+    {
+        "side_bands_hz": lambda heard: sorted(heard.chatter.peaks.frequency.tolist()) if heard.chatter else [],
+        "predicted": lambda is_stable: "stable" if is_stable else "chatter",
+    },
+)
+"""Function that returns a recorded cut with all that was detected in it."""
 
 
 def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:

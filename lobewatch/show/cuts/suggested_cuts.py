@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from pathlib import Path
 
 from rich.table import Table
@@ -12,7 +13,6 @@ from rich.table import Table
 from acquisition import Remark, merge_remarks
 from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import MAX_POCKET_CUTS, PocketDepth
-from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.machine import ProgramTable
@@ -21,27 +21,47 @@ from lobewatch.show.programs.verdicts import factor_text
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
-SPEED_POCKET_FIELDS = json_fields("speed_rpm window_rpm depth_mm=speed_rpm over_lowest_limit=gain")
-SUGGESTED_CUT_FIELDS = json_fields("""
+
+def _round_to_mm(depth: float) -> float:
+    return round(1e3 * depth, 4)
+
+
+def _known_mm(depth: float) -> float | None:
+    return _round_to_mm(depth) if depth and math.isfinite(depth) else None
+
+
+speed_pocket_json = json_fields(
+    "speed_rpm window_rpm depth_mm=self over_lowest_limit=gain", {"depth_mm": lambda _: None}
+)
+"""Function that returns one pocket, whose depth is not known."""
+TRIED_FIELDS = json_fields(
+    "cut_at_rpm=speed_rpm cuts heard_stable_mm=stable_depth heard_chatter_mm=chatter_depth",
+    {"cuts": attrgetter("id"), "heard_stable_mm": _known_mm, "heard_chatter_mm": _known_mm},
+)
+SUGGESTED_CUT_FIELDS = json_fields(
+    """
     speed_rpm depth_mm=depth chance_of_chatter=chatter_probability expected_gain=gain settles=most_informative repeats
-""")
+    """,
+    {"depth_mm": lambda depth: round(1e3 * depth, 6), "repeats": lambda name: name or None},
+)
 INTERVAL_FIELDS = json_fields("mean low high std")
-
-
-def speed_pocket_json(pocket: SpeedPocket) -> JsonObject:
-    """Return one pocket, whose depth is not known."""
-    return SPEED_POCKET_FIELDS(pocket) | {"depth_mm": None}
+LEARNED_FIELDS = json_fields(
+    """
+    cuts=accepted_cuts chatter_frequencies=posterior.n_frequencies frequency_learnt=posterior.n_frequencies
+    effective_sample_size=posterior.effective_size
+    """,
+    {"cuts": attrgetter("id"), "frequency_learnt": bool},
+)
 
 
 def speed_pocket_table(pockets: Sequence[SpeedPocket]) -> Table:
     """Return a table with a line for each pocket."""
-    return new_table("speed (rpm)", "window (rpm)", "over the lowest limit", rows=map(_pocket_cells, pockets))
-
-
-def _pocket_cells(pocket: SpeedPocket) -> list[str]:
-    low, high = pocket.window_rpm
-    gain = f"{pocket.gain:.1f} times" if pocket.gain < MAX_POCKET_GAIN else f"{MAX_POCKET_GAIN:g} times or more"
-    return [format_rpm(round(pocket.speed_rpm)), f"{format_rpm(math.ceil(low))}..{format_rpm(math.floor(high))}", gain]
+    table = new_table("speed (rpm)", "window (rpm)", "over the lowest limit")
+    for pocket in pockets:
+        low, high = math.ceil(pocket.window_rpm[0]), math.floor(pocket.window_rpm[1])
+        gain = f"{pocket.gain:.1f} times" if pocket.gain < MAX_POCKET_GAIN else f"{MAX_POCKET_GAIN:g} times or more"
+        table.add_row(format_rpm(round(pocket.speed_rpm)), f"{format_rpm(low)}..{format_rpm(high)}", gain)
+    return table
 
 
 def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> JsonObject:
@@ -61,16 +81,7 @@ def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], firs
     return {
         "program": program.name,
         "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
-        "pockets": [
-            speed_pocket_json(tried.pocket)
-            | {
-                "cut_at_rpm": tried.speed_rpm,
-                "cuts": [cut.id for cut in tried.cuts],
-                "heard_stable_mm": _round_to_mm(tried.stable_depth) if tried.stable_depth else None,
-                "heard_chatter_mm": _round_to_mm(tried.chatter_depth) if math.isfinite(tried.chatter_depth) else None,
-            }
-            for tried in depths
-        ],
+        "pockets": [speed_pocket_json(tried.pocket) | TRIED_FIELDS(tried) for tried in depths],
     }
 
 
@@ -104,25 +115,17 @@ def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, flo
     return None if wanted is None else (depths[0].speed_rpm, wanted)
 
 
-def _round_to_mm(depth: float) -> float:
-    return round(1e3 * depth, 4)
-
-
 def suggestion_json(next_cut: NextCut) -> JsonObject:
     """Return the next test cut, and what it rests on."""
     learning, best = next_cut.learning, _best_stable_cut(next_cut.learning)
     return {
         "program": learning.program.name,
-        "suggested": next_cut.suggestion and _suggested_cut_json(next_cut.suggestion),
+        "suggested": next_cut.suggestion and SUGGESTED_CUT_FIELDS(next_cut.suggestion),
         "cuts_made": len(learning.own_cuts),
         "cuts_left": next_cut.cuts_left,
         "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
         "learnt": learned_json(learning),
     }
-
-
-def _suggested_cut_json(cut: Suggestion) -> JsonObject:
-    return SUGGESTED_CUT_FIELDS(cut) | {"depth_mm": round(1e3 * cut.depth, 6), "repeats": cut.repeats or None}
 
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
@@ -157,9 +160,8 @@ def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
 def _no_suggestion_text(next_cut: NextCut) -> str:
     if not next_cut.cuts_left:
         return f"{len(next_cut.learning.own_cuts)} test cuts are made; a larger --cuts asks for more"
-    if next_cut.cut_range.is_empty:
-        return f"no test cut: {next_cut.cut_range.text}; choose another tool"
-    return "no test cut is worth making: nothing more is to be gained"
+    reason = f"no test cut: {next_cut.cut_range.text}; choose another tool"
+    return reason if next_cut.cut_range.is_empty else "no test cut is worth making: nothing more is to be gained"
 
 
 def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
@@ -172,35 +174,19 @@ def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
 def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
     before, after = learning.prior.intervals, learning.posterior.intervals
-    return {
-        "cuts": [cut.id for cut in learning.accepted_cuts],
-        "chatter_frequencies": learning.posterior.n_frequencies,
-        "frequency_learnt": learning.posterior.n_frequencies > 0,
-        "effective_sample_size": learning.posterior.effective_size,
-        "factors": {name: INTERVAL_FIELDS(after[name]) | {"before": INTERVAL_FIELDS(before[name])} for name in after},
-    }
+    factors = {name: INTERVAL_FIELDS(after[name]) | {"before": INTERVAL_FIELDS(before[name])} for name in after}
+    return LEARNED_FIELDS(learning) | {"factors": factors}
 
 
 def learned_texts(learning: LearningResult) -> Texts:
     """Return a table of what the test cuts have taught; nothing where there are none."""
-    count = len(learning.accepted_cuts)
-    return [f"learnt from {count_noun(count, 'cut')}:", learned_table(learning)] if count else []
-
-
-def learned_table(learning: LearningResult) -> Table:
-    """Return a table of the factors before and after the test cuts."""
-    before, after = learning.prior.intervals, learning.posterior.intervals
-    rows = ((factor_text(name), _interval_text(before[name]), _learned_text(learning, name)) for name in after)
-    return new_table("~at speed, over at rest", "before (95 %)", "learnt (95 %)", rows=rows)
-
-
-def _learned_text(learning: LearningResult, name: str) -> str:
-    is_open = name.startswith("frequency") and not learning.posterior.n_frequencies
-    return "not learnt" if is_open else _interval_text(learning.posterior.intervals[name])
-
-
-def _interval_text(interval: Interval) -> str:
-    return f"{interval.mean:.3f} ({interval.low:.3f}..{interval.high:.3f})"
+    count, table = len(learning.accepted_cuts), new_table("~at speed, over at rest", "before (95 %)", "learnt (95 %)")
+    for name, interval in learning.posterior.intervals.items():
+        both = learning.prior.intervals[name], interval
+        before, after = (f"{value.mean:.3f} ({value.low:.3f}..{value.high:.3f})" for value in both)
+        is_open = name.startswith("frequency") and not learning.posterior.n_frequencies
+        table.add_row(factor_text(name), before, "not learnt" if is_open else after)
+    return [f"learnt from {count_noun(count, 'cut')}:", table] if count else []
 
 
 def learned_remarks(learning: LearningResult) -> Iterator[Remark]:

@@ -97,7 +97,13 @@ def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
-    return _to_one_line(row["key"]), light, _drop_text(row), _due_text(row), row["limit"]
+    drop = "" if row["fall"] is None else format_with_error(row["fall"], row["fall_std"])
+    drop = "first test" if row["fall_std"] == 0 else drop
+    due, left = "", row["days_left"]
+    if left is not None:
+        last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
+        due = f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")
+    return _to_one_line(row["key"]), light, drop, due, row["limit"]
 
 
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
@@ -110,19 +116,3 @@ def _machine_notes(row: Mapping[str, Any]) -> list[str]:
 
 def _to_one_line(text: str) -> str:
     return make_printable(text).replace("\n", " ").replace("\t", " ")
-
-
-def _drop_text(row: Mapping[str, Any]) -> str:
-    if row["fall"] is None:
-        return ""
-    if row["fall_std"] == 0:
-        return "first test"
-    return format_with_error(row["fall"], row["fall_std"])
-
-
-def _due_text(row: Mapping[str, Any]) -> str:
-    left = row["days_left"]
-    if left is None:
-        return ""
-    last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
-    return f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")

@@ -21,7 +21,7 @@ from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
+from lobewatch.show.figures.lobe_figures import pick_evenly, plot_lobes, select_test_cuts
 from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.report.section import NumberTable, tabulate_lobes
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
@@ -162,9 +162,8 @@ def compute_lobe_history(
     assembly: the newest; series: of the same tool, for the forecast; cuts: all test cuts. The forecast lets all
     modes drop by the same share, with K from the model.
     """
-    shown = [row for row in rows if row.x or row.y]
-    picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MAX_LOBE_DIAGRAMS)).round().astype(int)).tolist()
-    diagrams = [(shown[i].time, compute_row_lobes(shown[i], machine, [cut]).get(cut)) for i in picked]
+    shown = pick_evenly([row for row in rows if row.x or row.y], MAX_LOBE_DIAGRAMS)
+    diagrams = [(row.time, compute_row_lobes(row, machine, [cut]).get(cut)) for row in shown]
     limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
     if len(limits) < 2:
         return None

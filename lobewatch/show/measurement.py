@@ -15,7 +15,7 @@ from lobewatch.monitoring.series_history import build_series_history, estimate_p
 from lobewatch.show.history import condition_texts
 from lobewatch.show.models import CALIBRATION_FIELDS
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
-from lobewatch.show.programs.lobes import lobes_json
+from lobewatch.show.programs.advice import lobes_json
 from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
 from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, notes, remark_lines
 from lobewatch.show.terminal.status_labels import status_label

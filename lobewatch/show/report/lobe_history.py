@@ -62,8 +62,12 @@ class LobeDiagram(NamedTuple):
         """Depths (m) of the bands and of the rotating spindle, by name."""
         edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
         if self.learned is not None:
-            edges |= {"at speed": self.learned.lobes.depth, "at speed, lowest": self.learned.band.low}
-            edges |= {"at speed, highest": self.learned.band.high}
+            band = self.learned.band
+            edges |= {
+                "at speed": self.learned.lobes.depth,
+                "at speed, lowest": band.low,
+                "at speed, highest": band.high,
+            }
         return edges
 
 
@@ -78,20 +82,14 @@ def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence
     depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
     cuts = machine.cuts(assembly.tool)
     same = [program for program in programs if cuts.get(program.verdict.program.name) == cuts[cut]]
-    settings = (
+    settings = [
         setting for program in same for setting in (program.advice.best, program.advice.deepest_here) if setting
-    )
-    verdicts = [program.verdict for program in same]
-    return LobeDiagram(
-        cut,
-        now,
-        depths | {assembly.label: now.depth},
-        verdicts,
-        list(dict.fromkeys(settings)),
-        compute_limit_band(now, cut, assembly, machine),
-        select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0]),
-        compute_lobes_at_speed(verdicts, machine),
-    )
+    ]
+    verdicts, depths = [program.verdict for program in same], depths | {assembly.label: now.depth}
+    band = compute_limit_band(now, cut, assembly, machine)
+    heard = select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0])
+    learned = compute_lobes_at_speed(verdicts, machine)
+    return LobeDiagram(cut, now, depths, verdicts, list(dict.fromkeys(filter(None, settings))), band, heard, learned)
 
 
 MAX_LOBE_DIAGRAMS = 24
@@ -129,10 +127,8 @@ class LobeHistory(NamedTuple):
     def numbers(self) -> NumberTable:
         """Depth (mm) over speed of each diagram."""
         step = max(math.ceil(self.speed_rpm.size / MAX_LOBE_SPEEDS), 1)
-        depths = [*self.depth, *self.ahead.values()]
-        return tabulate_lobes(
-            self.speed_rpm[::step], {name: depth[::step] for name, depth in zip(self.labels, depths, strict=True)}
-        )
+        named = zip(self.labels, [*self.depth, *self.ahead.values()], strict=True)
+        return tabulate_lobes(self.speed_rpm[::step], {name: depth[::step] for name, depth in named})
 
     @property
     def marks(self) -> NumberTable | None:
@@ -202,6 +198,6 @@ def _forecast_drop(trend: Trend, months: int) -> float | None:
 
 
 def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
-    stiffness_at, _ = model_softening(assembly)
+    stiffness = model_softening(assembly)[0](fall)
     modes = (assembly.x if direction == "x" else assembly.y) or ()
-    return [mode.scaled(1 - fall, stiffness_at(fall), "foretold") for mode in modes]
+    return [mode.scaled(1 - fall, stiffness, "foretold") for mode in modes]

@@ -170,9 +170,9 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
     events = [(event.time, event.text) for event in data.analysis.files.events if event.time >= since]
     numbers = [estimate.value / value.scale for _, estimate in estimates]
-    near = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
+    low, high = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
-    marks = TrendMarks(events, [(time, number) for time, number in aside if near[0] <= number <= near[1]])
+    marks = TrendMarks(events, [(time, number) for time, number in aside if low <= number <= high])
     is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
     limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from acquisition import merge_remarks
 from dsm import format_with_error
-from lobewatch.history.history import ModeValues
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
 from lobewatch.show.figures.lobe_figures import plot_waterfall
 from lobewatch.show.figures.trend_figures import plot_frf
@@ -24,7 +23,7 @@ from lobewatch.show.programs.verdicts import (
     verdict_notes,
     verdict_text,
 )
-from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, ValueTrend, make_value_trend
+from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, make_value_trend
 from lobewatch.show.report.section import (
     DataTable,
     Fragment,
@@ -37,7 +36,7 @@ from lobewatch.show.report.section import (
     tabulate_value,
 )
 from lobewatch.show.report.tables import make_events, make_provenance, make_series, make_tap_tests, make_test_cuts
-from lobewatch.show.terminal.output import count_noun
+from lobewatch.show.terminal.output import count_noun, json_fields
 from lobewatch.show.trend import FORECAST_ASSUMPTIONS, forecast_date_rows, no_dates_text, trend_sentence
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
@@ -46,23 +45,20 @@ from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
 
 def make_figures(data: ReportData) -> list[Section]:
     """Make all figures that have data."""
-    makers = make_value_figures, make_lobe_figure, make_waterfall, make_frequency_response
-    return [section for make in makers for section in make(data)]
+    lobes = [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data)]
+    return [*lobes, *make_frequency_response(data)]
 
 
-def make_value_figures(data: ReportData) -> list[Section]:
+def make_value_figures(data: ReportData) -> Iterator[Section]:
     """Make a figure over time of each value that is known."""
-    trends = (make_value_trend(data, value) for value in (FREQUENCY_VALUE, BEARING_VALUE))
-    return [_value_section(trend) for trend in trends if trend is not None]
-
-
-def _value_section(trend: ValueTrend) -> Section:
-    value, texts = trend.value, [trend.value.text]
-    texts += ["Dotted lines: what was done."] if trend.marks.events else []
-    texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
-    texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
-    numbers = tabulate_value(value.label, value.scale, trend.estimates, trend.excluded, trend.curve)
-    return make_figure_section(value.heading, " ".join(texts), trend.figure(), numbers)
+    for value in (FREQUENCY_VALUE, BEARING_VALUE):
+        trend = make_value_trend(data, value)
+        if trend is not None:
+            texts = [value.text, *(["Dotted lines: what was done."] if trend.marks.events else [])]
+            texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
+            texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
+            numbers = tabulate_value(value.label, value.scale, trend.estimates, trend.excluded, trend.curve)
+            yield make_figure_section(value.heading, " ".join(texts), trend.figure(), numbers)
 
 
 def make_lobe_figure(data: ReportData) -> list[Section]:
@@ -71,10 +67,10 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
     if diagram is None:
         return []
     cut, method, directions = diagram.cut, diagram.now.method, data.assembly.directions
+    sides = f"{' and '.join(directions)} direction{'s' if len(directions) > 1 else ' alone'}"
     text = (
-        f"Limit of the {cut} by {method}, {' and '.join(directions)} direction"
-        f"{'s' if len(directions) > 1 else ' alone'}; cuts above the band chatter. Marks: programs with this "
-        "same cut and their verdicts; boxes: settings recommended instead, as in the table above."
+        f"Limit of the {cut} by {method}, {sides}; cuts above the band chatter. Marks: programs with this same cut and "
+        "their verdicts; boxes: settings recommended instead, as in the table above."
     )
     if np.isinf(diagram.now.minimum.depth):
         text = f"The {cut} has no limit in this speed range ({method})."
@@ -143,13 +139,13 @@ def make_programs(data: ReportData) -> list[Section]:
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
 
 
+PROGRAM_FIELDS = json_fields("name speed_rpm depth_mm")
+
+
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
-    return {
-        "name": verdict.program.name,
-        "speed_rpm": verdict.program.speed_rpm,
-        "depth_mm": verdict.program.depth_mm,
+    return PROGRAM_FIELDS(verdict.program) | {
         "limit": limit_text(verdict),
         "band": band_text(verdict).replace("..", " to "),
         "margin": margin_text(verdict),
@@ -179,9 +175,8 @@ def make_notes(data: ReportData) -> list[Section]:
     """Make remarks on the newest test of the series, and on both directions of its tool."""
     of_tap = [remark for remark in data.last.remarks if remark.code not in DIRECTION_CODES]
     of_tool = [remark for remark in data.assembly.remarks if remark.code in DIRECTION_CODES]
-    return [
-        Section("", [Paragraph(f"Note: {remark}.")], is_framed=False) for remark in merge_remarks([*of_tap, *of_tool])
-    ]
+    merged = merge_remarks([*of_tap, *of_tool])
+    return [Section("", [Paragraph(f"Note: {remark}.")], is_framed=False) for remark in merged]
 
 
 def make_changes(data: ReportData) -> list[Section]:
@@ -209,39 +204,34 @@ def make_changes(data: ReportData) -> list[Section]:
     return [Section("What has changed", [table, *below])]
 
 
-def _measured_changes(history: SeriesHistory) -> list[list[str]]:
-    rows = []
+def _measured_changes(history: SeriesHistory) -> Iterator[list[str]]:
     for name, label, scale in CHANGE_VALUES:
         values = history.values[name]
         if values.change.is_known:
             newest = getattr(values.known_rows[-1], name)
             now, start = (format_with_error(estimate.value, estimate.std, scale) for estimate in (newest, values.start))
-            rows.append([label, start, now, f"{values.change.value:+z.2f} %"])
-    return rows
+            yield [label, start, now, f"{values.change.value:+z.2f} %"]
 
 
-def _model_changes(history: SeriesHistory) -> list[list[str]]:
-    rows = []
+def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
     for name, label in MODEL_CHANGE_VALUES:
         values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
         if values and np.isfinite(getattr(history.rows[-1], name)):
             start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
             change = f"{100 * (values[-1] / values[0] - 1):+z.2f} %"
-            rows.append([f"{label} tip stiffness, model (N/µm)", start, now, change])
-    return rows
+            yield [f"{label} tip stiffness, model (N/µm)", start, now, change]
 
 
 def make_modes(data: ReportData) -> list[Section]:
     """Make the table of the modes of the newest test."""
     heads = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"]
-    table = DataTable(heads, [_mode_row(mode) for mode in data.last.modes], if_empty="none was found")
+    rows = list[list[str]]()
+    for frequency, damping, stiffness, _ in data.last.modes:
+        shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
+        remark = "not a driving point" if stiffness < 0 else ""
+        rows.append([f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, remark])
+    table = DataTable(heads, rows, if_empty="none was found")
     return [Section("Modes of the newest test", [table], is_framed=False)]
-
-
-def _mode_row(mode: ModeValues) -> list[str]:
-    frequency, damping, stiffness, _ = mode
-    shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
-    return [f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, "not a driving point" if stiffness < 0 else ""]
 
 
 SECTIONS: tuple[SectionMaker, ...] = (

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
-from lobewatch.paper import Claim, Comparison, PaperStudy
+from lobewatch.paper import Comparison, PaperStudy
 from lobewatch.show.terminal.output import JsonObject, json_fields
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
@@ -42,13 +42,8 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
             yield from _indent(row.reason, width)
     yield from ("", "What the paper claims, and whether it holds on the surrogate")
     for claim in study.claims:
-        yield from textwrap.wrap(claim_text(claim), width)
+        yield from textwrap.wrap(f"{claim.verdict}: {claim.text}", width)
         yield from _indent(claim.evidence, width)
-
-
-def claim_text(claim: Claim) -> str:
-    """Return a claim with the verdict on it."""
-    return f"{claim.verdict}: {claim.text}"
 
 
 def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
@@ -76,10 +71,8 @@ def difference_text(row: Comparison) -> str:
 
 
 def _table_line(texts: tuple[str, ...]) -> str:
-    sides = "<<>><>"
-    return " ".join(
-        f"{text:{side}{width}}" for text, side, width in zip(texts, sides, PAPER_COLUMN_WIDTHS, strict=True)
-    ).rstrip()
+    columns = zip(texts, "<<>><>", PAPER_COLUMN_WIDTHS, strict=True)
+    return " ".join(f"{text:{side}{width}}" for text, side, width in columns).rstrip()
 
 
 def _indent(text: str, width: int) -> list[str]:

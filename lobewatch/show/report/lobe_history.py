@@ -62,12 +62,8 @@ class LobeDiagram(NamedTuple):
         """Depths (m) of the bands and of the rotating spindle, by name."""
         edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
         if self.learned is not None:
-            band = self.learned.band
-            edges |= {
-                "at speed": self.learned.lobes.depth,
-                "at speed, lowest": band.low,
-                "at speed, highest": band.high,
-            }
+            lobes, band = self.learned.lobes, self.learned.band
+            edges |= {"at speed": lobes.depth, "at speed, lowest": band.low, "at speed, highest": band.high}
         return edges
 
 
@@ -82,9 +78,7 @@ def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence
     depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
     cuts = machine.cuts(assembly.tool)
     same = [program for program in programs if cuts.get(program.verdict.program.name) == cuts[cut]]
-    settings = [
-        setting for program in same for setting in (program.advice.best, program.advice.deepest_here) if setting
-    ]
+    settings = (setting for program in same for setting in (program.advice.best, program.advice.deepest_here))
     verdicts, depths = [program.verdict for program in same], depths | {assembly.label: now.depth}
     band = compute_limit_band(now, cut, assembly, machine)
     heard = select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0])

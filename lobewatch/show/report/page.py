@@ -28,9 +28,7 @@ def render_page(template: str, **content: Any) -> str:
     options: dict[str, Any] = {"autoescape": True, "undefined": jinja2.StrictUndefined, "finalize": _name_options}
     environment = jinja2.Environment(loader=loader, **options)
     environment.filters |= {"in_css": _escape_css, "named": _label_svg, "next": next, "unbroken": _join_units}
-    environment.filters["macro_name"] = lambda part: type(
-        part
-    ).__name__.lower()  # of parts.html, for a part of a section
+    environment.filters["macro_name"] = lambda part: type(part).__name__.lower()
     return environment.get_template(template).render(_static_files() | content)
 
 

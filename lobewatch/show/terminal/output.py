@@ -54,14 +54,17 @@ class SafeTable(Table):
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
         """Add a row."""
-        super().add_row(*(_one_line(cell) if isinstance(cell, str) else cell for cell in cells), **options)
+        safe = (make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells)
+        super().add_row(*safe, **options)
 
     @property
     def min_table_width(self) -> int:
         """Smallest width (characters) that leaves a word for each column that wraps; 0 for any width."""
         breaking = sum(not column.no_wrap for column in self.columns)
-        wholes = (_max_cell_width([column.header, *column.cells]) for column in self.columns if column.no_wrap)
-        return sum(wholes) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
+        whole = ([column.header, *column.cells] for column in self.columns if column.no_wrap)
+        texts = ("\n".join(Text.from_markup(cell).plain for cell in cells if isinstance(cell, str)) for cells in whole)
+        widths = (max(map(cell_len, text.split("\n"))) for text in texts)
+        return sum(widths) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
 
 
 MIN_COLUMN_WIDTH = 10
@@ -79,9 +82,9 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     if as_json:
         import msgspec  # only JSON output waits for it
 
-        plain = _json_value(msgspec.to_builtins(payload, enc_hook=_to_list))
-        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
-        exact = CONTROL_CHARACTERS.sub(_escape_control, exact)
+        plain = _json_value(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
+        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
+        exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
         else:
@@ -127,25 +130,10 @@ def count_noun(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' if count > 1 else ''}"
 
 
-def _max_cell_width(cells: Iterable[RenderableType]) -> int:
-    texts = (Text.from_markup(cell).plain for cell in cells if isinstance(cell, str))
-    return max(cell_len(line) for text in texts for line in text.split("\n"))
-
-
-def _one_line(cell: str) -> str:
-    return CONTROL_CHARACTERS.sub(REPLACEMENT_CHARACTER, with_option_names(cell))
-
-
-def make_printable(text: str) -> str:
-    """Replace control characters except newline and tab, and name options instead of library fields."""
-    return CONTROL_CHARACTERS.sub(
-        lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
-    )
-
-
-def _escape_control(match: re.Match[str]) -> str:
-    """Escape a control character as in JSON; newlines occur only between lines."""
-    return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
+def make_printable(text: str, kept: str = "\n\t") -> str:
+    """Replace control characters except those to keep, and name options instead of library fields."""
+    named = with_option_names(text)
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else REPLACEMENT_CHARACTER, named)
 
 
 def _json_value(value: Any) -> Any:
@@ -156,10 +144,6 @@ def _json_value(value: Any) -> Any:
     if isinstance(value, str):
         return with_option_names(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _to_list(array: Any) -> Any:
-    return array.tolist()
 
 
 FIELD_PATTERN = re.compile(r"(\w+)(?:=([\w.-]+))?(?:([*/])([\d.e]+))?")
@@ -244,12 +228,9 @@ def blank_nonfinite(value: Any) -> Any:
 
 
 Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
-Token = Annotated[
-    str | None, typer.Option(help="What a browser must know to see and alter anything; a new one where not given.")
-]
-WatchToken = Annotated[
-    str | None, typer.Option(help="What a browser must know only to see anything; a new one where not given.")
-]
+KNOWN = "What a browser must know"
+Token = Annotated[str | None, typer.Option(help=f"{KNOWN} to see and alter anything; a new one where not given.")]
+WatchToken = Annotated[str | None, typer.Option(help=f"{KNOWN} only to see anything; a new one where not given.")]
 
 
 class ServedScreen(contextlib.AbstractContextManager["ServedScreen"], Protocol):
@@ -280,8 +261,7 @@ def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
         results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
         results.file.flush()
     else:
-        notes.print(f"screen: {url}", markup=False)
-        notes.print(f"only to watch: {watch_url}", markup=False)
+        notes.print(f"screen: {url}\nonly to watch: {watch_url}", markup=False)
     display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.stdout.isatty() and display:
         webbrowser.open(url)

@@ -93,10 +93,9 @@ class TapPrinter:
 
     def _print_hits(self, state: TapState) -> None:
         for hit in state.hits[self._n_printed :]:
-            if hit.earlier:
-                continue
-            good = sum(not earlier.flags for earlier in state.hits[: hit.number])
-            self._console.print(f"{good:3d} / {state.wanted}  {hit_markup(hit)}  ({hit.peak})")
+            if not hit.earlier:
+                good = sum(not earlier.flags for earlier in state.hits[: hit.number])
+                self._console.print(f"{good:3d} / {state.wanted}  {hit_markup(hit)}  ({hit.peak})")
         self._n_printed = len(state.hits)
 
 
@@ -144,10 +143,10 @@ class KeyReader:
         if sys.platform == "win32":
             import msvcrt
 
-            keys = []
+            keys = ""
             while msvcrt.kbhit():
-                keys.append(msvcrt.getwch())
-            return normalize_keys("".join(keys))
+                keys += msvcrt.getwch()
+            return normalize_keys(keys)
         if self._before is None:
             return ""
         import os
@@ -293,7 +292,10 @@ def _state_lines(state: TapState) -> Iterator[RenderableType]:
     yield Text(" - ".join(filter(None, (state.title, state.device))), "bold")
     if state.resumed:
         yield Text(with_option_names(state.resumed))
-    yield _banner(state)
+    symbol, style = STEP_STYLES[state.word]
+    trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
+    banner = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
+    yield Panel(Align.center(banner), style=style, padding=(1, 1))
     yield Text(with_option_names(state.reason) or " ", "bold")
     if state.outcome is not None:
         yield from _outcome_lines(state.outcome)
@@ -314,13 +316,6 @@ def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
     early = "EARLY " if outcome.is_early else ""
     next_step = f"  next: {with_option_names(outcome.next_step)}"
     yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), next_step)
-
-
-def _banner(state: TapState) -> RenderableType:
-    symbol, style = STEP_STYLES[state.word]
-    trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
-    text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
-    return Panel(Align.center(text), style=style, padding=(1, 1))
 
 
 def _level_line(state: TapState) -> str:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from itertools import starmap
 
 import numpy as np
-from rich.table import Table
 
-from dsm import Calibration, Joint, PredictedMode, StiffnessFit, format_rounded, format_with_error
+from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
 from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
@@ -78,22 +76,20 @@ def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
     headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
+    table = new_table(*headings)
+    for number, mode in enumerate(model.modes, 1):
+        is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
+        stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
+        shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
+        table.add_row(str(number), f"{mode.frequency:.2f}", stiffness, *shares)
     return [
         f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
         f"bearings of {model.state.origin}",
-        new_table(*headings, rows=(_mode_cells(model, number) for number in range(len(model.modes)))),
+        table,
         f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",
         f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
         f"with rigid bearings          {model.rigid_frequency:.1f} Hz in mode 1",
     ]
-
-
-def _mode_cells(model: ModelSummary, number: int) -> list[str]:
-    mode = model.modes[number]
-    is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
-    stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
-    shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
-    return [str(number + 1), f"{mode.frequency:.2f}", stiffness, *shares]
 
 
 MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
@@ -130,7 +126,13 @@ def tools_texts(calibration: JointCalibration) -> Texts:
         lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
         lines.append(MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT)
-    return [*lines, *_prediction_tables(calibration)]
+    if not calibration.predicted or calibration.fit.has_misfit:
+        return [*lines]
+    table = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
+    for name, mode in calibration.predicted.items():
+        stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
+        table.add_row(name, format_with_error(mode.frequency, mode.frequency_std), stiffness)
+    return [*lines, table]
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
@@ -141,15 +143,3 @@ def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
         for joint in joints
     ]
     return ["joints = [", *lines, "]"] if joints else []
-
-
-def _prediction_tables(calibration: JointCalibration) -> list[Table]:
-    if not calibration.predicted or calibration.fit.has_misfit:
-        return []
-
-    def cells(name: str, mode: PredictedMode) -> list[str]:
-        stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
-        return [name, format_with_error(mode.frequency, mode.frequency_std), stiffness]
-
-    headings = "~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)"
-    return [new_table(*headings, rows=starmap(cells, calibration.predicted.items()))]

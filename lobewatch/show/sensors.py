@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from rich.markup import escape
 
-from acquisition import STANDARD_GRAVITY, Channel
-from acquisition.devices import PortScan, ScannedPort
-from acquisition.ports import PortInfo, explain_no_ports
+from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPort, explain_no_ports
 from dsm import format_with_error
 from lobewatch.sensors import Finding, MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
@@ -117,17 +116,11 @@ CHANNEL_HEADINGS = "no", "<quantity", "sensitivity", "range", "input", "bits", "
 
 def _channel_cells(number: int, channel: Channel) -> list[str]:
     unit, si = ("N", 1.0) if channel.quantity == "force" else ("g", STANDARD_GRAVITY)
-    return [
-        str(number),
-        channel.name,
-        f"{channel.sensitivity * 1e3 * si:.4g} mV/{unit}",
-        f"±{channel.full_scale / abs(channel.sensitivity) / si:.4g} {unit}",
-        f"±{channel.full_scale:g} V",
-        str(channel.adc_bits),
-        f"{channel.skew * 1e6:.4g}",
-        escape(channel.serial_number or "-"),
-        channel.calibration_date or "-",
-    ]
+    sensitivity = f"{channel.sensitivity * 1e3 * si:.4g} mV/{unit}"
+    reach = f"±{channel.full_scale / abs(channel.sensitivity) / si:.4g} {unit}"
+    digits = f"±{channel.full_scale:g} V", str(channel.adc_bits), f"{channel.skew * 1e6:.4g}"
+    sensor = escape(channel.serial_number or "-"), channel.calibration_date or "-"
+    return [str(number), channel.name, sensitivity, reach, *digits, *sensor]
 
 
 def mass_check_texts(check: MassCheck) -> list[str]:
@@ -135,9 +128,8 @@ def mass_check_texts(check: MassCheck) -> list[str]:
     ratio = check.calibration.ratio
     if check.calibration.sizes_agree:
         return [str(check.calibration)]
-    if check.place is None:
-        force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
-    else:
+    force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
+    if check.place is not None:
         force, acceleration = f"{check.place.sensitivity} of the force channel", "that of the acceleration channel"
         place = check.place.place
     change = f"To change in {place}: multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}."
@@ -147,9 +139,8 @@ def mass_check_texts(check: MassCheck) -> list[str]:
 def skew_check_texts(check: SkewCheck) -> list[str]:
     """Return the skew, and where to enter it."""
     skew, channel = check.measured, check.channel
-    if check.place is None:
-        entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
-    else:
+    entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
+    if check.place is not None:
         entry = f"{check.place.skew} = {skew.skew:.3e} in {check.place.place}"
     return [
         f"channel 1 ({channel.quantity}) is sampled {format_with_error(skew.skew, skew.std, 1e-6)} us "
@@ -160,7 +151,7 @@ def skew_check_texts(check: SkewCheck) -> list[str]:
 
 def findings_json(findings: Sequence[Finding]) -> JsonObject:
     """Return all findings on the computer, and how many prevent a tap test."""
-    return {"findings": findings, "hinder": _count_state(findings, "hinders")}
+    return {"findings": findings, "hinder": Counter(finding.state for finding in findings)["hinders"]}
 
 
 def findings_texts(findings: Sequence[Finding]) -> Texts:
@@ -168,10 +159,7 @@ def findings_texts(findings: Sequence[Finding]) -> Texts:
     marks = {"fine": "✓", "note": "·", "hinders": "✗"}
     rows = ((marks[item.state], *map(escape, (item.subject, item.text, item.cure))) for item in findings)
     table = new_table("<", "<what", "~there is", "~what to do", rows=rows)
-    hinder, notes = _count_state(findings, "hinders"), _count_state(findings, "note")
+    count = Counter(finding.state for finding in findings)
+    hinder, notes = count["hinders"], count["note"]
     end = f"{hinder} of {len(findings)} stand in the way of a tap test" if hinder else "Nothing stands in the way"
     return [table, f"{end}; {notes} worth knowing" if notes else end]
-
-
-def _count_state(findings: Sequence[Finding], state: str) -> int:
-    return sum(finding.state == state for finding in findings)

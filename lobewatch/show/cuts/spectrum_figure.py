@@ -14,7 +14,7 @@ from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
 from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
-from lobewatch.tool.assembly import Assembly
+from lobewatch.tool import Assembly
 
 LINE_KIND_MARKS = {
     "turns": ("turns of the spindle", Paint.FIRST, "|"),

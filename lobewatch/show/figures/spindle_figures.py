@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
-from lobewatch.logbook.chart_data import ModelFigureData
+from lobewatch.logbook import ModelFigureData
 from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
-from lobewatch.machine.settings.setup_tables import LimitsTable
+from lobewatch.machine import LimitsTable
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import Paint, new_axes
 

@@ -12,8 +12,7 @@ from rich.table import Table
 
 from acquisition import Remark, merge_remarks
 from lobes import PocketShift, StabilityLobes
-from lobewatch.logbook import LobeComparison, Logbook
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis, LobeComparison, Logbook
 from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.cut_range import CutRange

@@ -17,9 +17,8 @@ from lobewatch.machine import Machine, UncertaintyTable
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
-from lobewatch.verdicts import Stability, Verdict
+from lobewatch.verdicts import SpindleAtSpeed, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
-from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 

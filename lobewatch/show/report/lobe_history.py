@@ -16,7 +16,7 @@ from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.monitoring import SeriesStatus

@@ -11,8 +11,7 @@ from typing import Any
 
 from acquisition import Remark, merge_remarks
 from dsm import format_with_error
-from lobewatch.logbook import Logbook
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis, Logbook
 from lobewatch.machine import Machine
 from lobewatch.monitoring import MachineStatus, SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from acquisition import Frf, TapTest
 from lobewatch.history import HistoryRow
 from lobewatch.history.tap_measurements import measure_excluded_taps
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import LimitsTable, Machine
-from lobewatch.measurement.estimate import Estimate
+from lobewatch.measurement import Estimate
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.show.figures.trend_figures import TREND_FIGURE_SIZE, TrendCurve, TrendMarks, make_trend_curve, plot_trend
 from lobewatch.show.programs.advice import ProgramAdvice, advise_program

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
-from lobewatch.measurement.estimate import Estimate
+from lobewatch.measurement import Estimate
 from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.trend_figures import TrendCurve

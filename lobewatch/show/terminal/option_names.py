@@ -10,51 +10,42 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-SAME_NAME_FIELDS = """
-    Circumstances.direction Circumstances.tool Conditions.reclamped Description.averages Description.columns
+FIELD_OPTIONS = """
+    Circumstances.direction Circumstances.tool Conditions.reclamped CutEntry.at=date
+    CutEntry.chatter_frequency_hz=frequency CutEntry.has_chatter=chatter Description.averages Description.columns
     Description.date Description.date_pattern Description.decimal Description.direction Description.force
     Description.force_unit Description.full_scale Description.pulses Description.quantity Description.rate
     Description.response Description.sensitivity Description.sensor Description.skip Description.spacing
-    Description.start Description.tacho Description.unit EmulationSetup.tcp LobeChart.source ModeEdits.add
-    ModeEdits.drop ModeEdits.fix MountingVariation.scatter ProgramTable.direction ProgramTable.material
-    ProgramTable.teeth ProgramTable.tool ScreenServer.listen SeriesStatus.direction SeriesStatus.tool Window.hit_at
-    Workers.jobs Workers.scheduler acknowledge_alarms.until acquire_cut.file acquire_cut.port add_event.new_baseline
-    calibrate_joints.mode choose_cut.cut choose_cut.program compare_lobes.cut compute_lobe_chart.method
-    exclude_entry.reason fit_file_modes.accept fit_file_modes.conjugate list_comparison_files.beside
-    plan_session.port rotate_structure.direction store_recordings.keep_going
+    Description.start Description.tacho Description.unit EmulationSetup.tcp LobeChart.source MaintenanceEvent.time=date
+    ModeEdits.add ModeEdits.drop ModeEdits.fix MountingVariation.bad_share=bad-clampings MountingVariation.scatter
+    MountingVariation.temperature_swing=temperature ProgramTable.depth_mm=depth ProgramTable.direction
+    ProgramTable.feed_per_tooth_mm=feed-per-tooth ProgramTable.material ProgramTable.name=save
+    ProgramTable.radial_depth_mm=radial ProgramTable.speed_rpm=speed ProgramTable.teeth ProgramTable.tool
+    ProgramTable.tool_diameter_mm=diameter ScreenServer.listen SeriesStatus.direction SeriesStatus.tool Window.hit_at
+    Window.start=window-start Window.time_constant=window Workers.jobs Workers.scheduler accept_questions.codes=accept
+    accept_settings.keys=accept acknowledge_alarms.until acquire_cut.file acquire_cut.port add_event.new_baseline
+    build_power_reading.power_kw=power calibrate_joints.mode calibrate_joints.tools=tool choose_cut.cut
+    choose_cut.program compare_lobes.cut compute_lobe_chart.method evaluate_requested.names=program
+    exclude_entry.reason find_setup_question.name=edit fit_file_modes.accept fit_file_modes.conjugate
+    list_comparison_files.beside plan_session.port record_cut.time_limit=seconds rotate_structure.degrees=askew
+    rotate_structure.direction screen.ScreenServer=screen store_recordings.keep_going
 """
-"""Fields of the name of their option."""
+"""Fields with the name of their option where it is another one."""
+_ENTRIES = (entry.partition("=") for entry in FIELD_OPTIONS.split())
 OPTION_NAMES: Mapping[str, str] = {
-    **{field: f"--{field.partition('.')[2].replace('_', '-')}" for field in SAME_NAME_FIELDS.split()},
-    "CutEntry.at": "--date",
-    "CutEntry.chatter_frequency_hz": "--frequency",
-    "CutEntry.has_chatter": "--chatter",
+    **{
+        field: f"--{name or field.partition('.')[2].replace('_', '-')}"
+        for field, _, name in (entry.partition("=") for entry in FIELD_OPTIONS.split())
+    },
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
     "Logbook.verdicts": "lobewatch check",
     "MachineFolder.accept": "replay --accept",
     "MachineFolder.contents": "lobewatch history",
-    "MaintenanceEvent.time": "--date",
-    "MountingVariation.bad_share": "--bad-clampings",
-    "MountingVariation.temperature_swing": "--temperature",
-    "ProgramTable.depth_mm": "--depth",
-    "ProgramTable.feed_per_tooth_mm": "--feed-per-tooth",
-    "ProgramTable.name": "--save",
-    "ProgramTable.radial_depth_mm": "--radial",
-    "ProgramTable.speed_rpm": "--speed",
-    "ProgramTable.tool_diameter_mm": "--diameter",
     "TapSession.run": "lobewatch tap",
-    "Window.start": "--window-start",
-    "Window.time_constant": "--window",
-    "accept_questions.codes": "--accept",
-    "accept_settings.keys": "--accept",
     "acquisition.measure_rate": "lobewatch sensors",
     "acquisition.scan_ports": "lobewatch ports",
-    "build_power_reading.power_kw": "--power",
-    "calibrate_joints.tools": "--tool",
-    "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",
-    "find_setup_question.name": "--edit",
     "fit_file_modes": "lobewatch modes",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_files.make_machine_folder.template": "lobewatch init --example",
@@ -72,9 +63,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "pocket_depth.find_pocket_depths": "lobewatch suggest",
     "program_learning.find_next_cut": "lobewatch suggest",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
-    "record_cut.time_limit": "--seconds",
-    "rotate_structure.degrees": "--askew",
-    "screen.ScreenServer": "--screen",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
     "session.TapSession": "lobewatch tap",
 }

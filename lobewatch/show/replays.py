@@ -71,8 +71,7 @@ MAX_PREVIEWS_IN_FULL = 6
 
 def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
     """Print what would become of files; passed: other files of the folders. Raise DataError for unusable files."""
-    files = [preview_json(preview) for preview in previews]
-    payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
+    payload = {"dry_run": True, "files": [*map(preview_json, previews)], "passed_over": [*map(str, passed)]}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     if refused := sum(bool(preview.rejection) for preview in previews):
         raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
@@ -100,11 +99,13 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
     """Return a few files in full, many in a table with what is asked and refused below it."""
+    rejected = ((str(item.file), f"cannot be used: {item.rejection}") for item in previews if item.rejection)
+    refused = group_by_message(rejected)
     if len(previews) <= MAX_PREVIEWS_IN_FULL:
         usable = (preview for preview in previews if not preview.rejection)
-        return [*chain.from_iterable(map(_preview_lines, usable)), *_refused_lines(previews)]
-    headings = "<date", "<series", "hits", "frequency (Hz)", "<", "~file"
-    return [new_table(*headings, rows=map(_preview_row, previews)), *_preview_notes(previews)]
+        return [*chain.from_iterable(map(_preview_lines, usable)), *refused]
+    table = new_table("<date", "<series", "hits", "frequency (Hz)", "<", "~file", rows=map(_preview_row, previews))
+    return [table, *_preview_notes(previews), *refused]
 
 
 def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
@@ -153,7 +154,7 @@ def _preview_row(preview: ReplayPreview) -> list[str]:
 
 
 def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
-    """Return assumed facts, questions and rejections, each once."""
+    """Return assumed facts and questions, each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
     asked = (
         (preview.file.name, f"question ({question.code}): {question.text}")
@@ -161,13 +162,7 @@ def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
         if preview.measurement is not None
         for question in find_open_questions(preview.measurement.remarks)
     )
-    return [*fact_lines(_merge_facts(facts), NON_FILE_ORIGINS), *group_by_message(asked), *_refused_lines(previews)]
-
-
-def _refused_lines(previews: Sequence[ReplayPreview]) -> list[str]:
-    return group_by_message(
-        (str(preview.file), f"cannot be used: {preview.rejection}") for preview in previews if preview.rejection
-    )
+    return [*fact_lines(_merge_facts(facts), NON_FILE_ORIGINS), *group_by_message(asked)]
 
 
 def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:

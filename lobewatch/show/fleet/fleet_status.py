@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any
 
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
-from lobewatch.monitoring.threshold_dates import (
-    UNIX_EPOCH,
-    ThresholdDates,
-    build_forecast_rows,
-    build_limit_row,
-    find_next_limit,
-)
+from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, build_limit_row, find_next_limit
+from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
@@ -75,7 +70,7 @@ def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -
 
 
 def _month_text(days: float | None) -> str:
-    return "" if days is None else f"{UNIX_EPOCH + timedelta(days=days):%Y-%m}"
+    return "" if days is None else f"{date_of_days(days):%Y-%m}"
 
 
 FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")

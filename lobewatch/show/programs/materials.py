@@ -54,16 +54,10 @@ def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | T
 
 def _material_cells(material: CuttingCoefficients) -> list[str]:
     edge = material.tangential_edge
-    return [
-        escape(material.material),
-        material.iso_group or "-",
-        f"{material.tangential / 1e6:.0f}",
-        _range_text(material.tangential_range, 1e6, 0),
-        f"{material.radial / material.tangential:.2f}",
-        _range_text(material.ratio_range, 1.0, 2),
-        "-" if math.isnan(edge) else f"{edge / 1e3:.0f}",
-        escape(", ".join(material.equivalents)),
-    ]
+    tangential = f"{material.tangential / 1e6:.0f}", _range_text(material.tangential_range, 1e6, 0)
+    ratio = f"{material.radial / material.tangential:.2f}", _range_text(material.ratio_range, 1.0, 2)
+    others = "-" if math.isnan(edge) else f"{edge / 1e3:.0f}", escape(", ".join(material.equivalents))
+    return [escape(material.material), material.iso_group or "-", *tangential, *ratio, *others]
 
 
 def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) -> str:

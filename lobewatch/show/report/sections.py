@@ -13,16 +13,8 @@ from dsm import format_with_error
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
 from lobewatch.show.figures.lobe_figures import plot_waterfall
 from lobewatch.show.figures.trend_figures import plot_frf
+from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, frequency_margin_text
-from lobewatch.show.programs.verdicts import (
-    VERDICT_STYLES,
-    band_text,
-    chatter_risk_text,
-    limit_text,
-    margin_text,
-    verdict_notes,
-    verdict_text,
-)
 from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, make_value_trend
 from lobewatch.show.report.section import (
     DataTable,
@@ -133,7 +125,7 @@ def make_programs(data: ReportData) -> list[Section]:
     content = {
         "programs": [_program_row(program) for program in data.programs],
         "lines": [*lines, *map(str, speeds)],
-        "doubt": verdict_notes(checked, data.machine),
+        "doubt": verdicts.verdict_notes(checked, data.machine),
         "method": checked[0].method if checked else "",
     }
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
@@ -146,18 +138,19 @@ def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
     return PROGRAM_FIELDS(verdict.program) | {
-        "limit": limit_text(verdict),
-        "band": band_text(verdict).replace("..", " to "),
-        "margin": margin_text(verdict),
-        "turning": chatter_risk_text(verdict),
+        "limit": verdicts.limit_text(verdict),
+        "band": verdicts.band_text(verdict).replace("..", " to "),
+        "margin": verdicts.margin_text(verdict),
+        "turning": verdicts.chatter_risk_text(verdict),
         "left": frequency_margin_text(program.advice),
         "at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value),
-        "now": _verdict_cell(verdict.stability, verdict_text(verdict)),
+        "now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict)),
     }
 
 
 def _verdict_cell(word: Stability, text: str) -> TableCell:
-    return TableCell(f"{VERDICT_STYLES[word].symbol} {text}", VERDICT_STYLES[word].css_class)
+    style = verdicts.VERDICT_STYLES[word]
+    return TableCell(f"{style.symbol} {text}", style.css_class)
 
 
 def make_forecast(data: ReportData) -> list[Section]:

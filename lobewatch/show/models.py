@@ -47,20 +47,18 @@ model_json = json_fields(
 def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
     """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for those that the modes leave open."""
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
-    return STIFFNESS_FIT_FIELDS(fit) | {
-        "stiffness_n_per_m": np.where(is_fitted, fit.stiffness, np.nan),
-        "stiffness_n_per_m_std": None if std is None else np.where(is_fitted, std, np.nan),
-    }
+    errors = None if std is None else np.where(is_fitted, std, np.nan)
+    values = np.where(is_fitted, fit.stiffness, np.nan)
+    return STIFFNESS_FIT_FIELDS(fit) | {"stiffness_n_per_m": values, "stiffness_n_per_m_std": errors}
 
 
 def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
     """Return the stiffnesses and dampers that make a model fit."""
     stiffness, dampers = calibration.stiffness, calibration.dampers
+    damping = {} if dampers is None else DAMPING_FIELDS(dampers)
     if isinstance(stiffness, Calibration):
-        fitted = CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload}
-    else:
-        fitted = stiffness_fit_json(stiffness)
-    return fitted | ({} if dampers is None else DAMPING_FIELDS(dampers))
+        return CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload} | damping
+    return stiffness_fit_json(stiffness) | damping
 
 
 def model_calibration_texts(calibration: ModelCalibration) -> list[str]:

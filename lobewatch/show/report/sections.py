@@ -11,21 +11,22 @@ import numpy as np
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
+from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.lobe_figures import plot_waterfall
 from lobewatch.show.figures.trend_figures import plot_frf
 from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, frequency_margin_text
-from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, make_value_trend
+from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, ValueTrend, make_value_trend
 from lobewatch.show.report.section import (
     DataTable,
     Fragment,
+    NumberTable,
     Paragraph,
     Section,
     TableCell,
     make_figure_section,
     tabulate_lobes,
     tabulate_response,
-    tabulate_value,
 )
 from lobewatch.show.report.tables import make_events, make_provenance, make_series, make_tap_tests, make_test_cuts
 from lobewatch.show.terminal.output import count_noun, json_fields
@@ -49,8 +50,24 @@ def make_value_figures(data: ReportData) -> Iterator[Section]:
             texts = [value.text, *(["Dotted lines: what was done."] if trend.marks.events else [])]
             texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
             texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
-            numbers = tabulate_value(value.label, value.scale, trend.estimates, trend.excluded, trend.curve)
-            yield make_figure_section(value.heading, " ".join(texts), trend.figure(), numbers)
+            yield make_figure_section(value.heading, " ".join(texts), trend.figure(), _tabulate_trend(trend))
+
+
+def _tabulate_trend(trend: ValueTrend) -> NumberTable:
+    """Tabulate a value over time: tests, excluded tests, the fitted line, and the 80 % band of the forecast."""
+    unit, scale, curve = trend.value.label, trend.value.scale, trend.curve
+    tests = [(time, estimate.value / scale, estimate.std / scale) for time, estimate in trend.estimates]
+    lines: list[list[Any]] = [["test", f"{time:%Y-%m-%d}", value, std, "", ""] for time, value, std in tests]
+    lines += [["does not count", f"{time:%Y-%m-%d}", value, "", "", ""] for time, value in trend.excluded]
+    if curve is not None:
+        days = [f"{date_of_days(day):%Y-%m-%d}" for day in curve.days.tolist()]
+        past = curve.days.size - curve.days_ahead.size
+        fitted = zip(days[:past], curve.line[:past].tolist(), strict=True)
+        lines += [["fitted", day, value, "", "", ""] for day, value in fitted]
+        ahead = np.column_stack([curve.line[past:], curve.low, curve.high]).tolist()
+        band = list(zip(days[past:], ahead, strict=True))[::10]
+        lines += [["forecast", day, value, "", low, high] for day, (value, low, high) in band]
+    return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
 
 
 def make_lobe_figure(data: ReportData) -> list[Section]:

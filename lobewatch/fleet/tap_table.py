@@ -68,7 +68,7 @@ class _TableRow(msgspec.Struct, array_like=True, gc=False):
     remarks: list[_RemarkCode]
 
 
-class TapTable(NamedTuple):
+class TapTestTable(NamedTuple):
     """Tap tests of one machine as columns, oldest first."""
 
     folder: str
@@ -97,7 +97,7 @@ _get_modelled = attrgetter("static_tip_stiffness", "modal_tip_stiffness")
 
 def read_tap_table(
     key: str, path: Path, now: datetime | None = None, render_text: Callable[[str], str] = str
-) -> TapTable:
+) -> TapTestTable:
     """Read the tap tests of one machine folder named `key`. ValueError or OSError if it cannot be read.
 
     `render_text` replaces names of the library in the texts of a new summary.
@@ -110,7 +110,7 @@ def read_tap_table(
         rows = _decode_rows(contents)
     numbers: dict[tuple[str, str, str], int] = {}
     series_numbers = [numbers.setdefault(series, len(numbers) + 1) for series in map(_get_series, rows)]
-    return TapTable(
+    return TapTestTable(
         key,
         summary.name,
         [(tool, direction) for tool, direction, _ in numbers],
@@ -159,7 +159,7 @@ def _decode_rows(contents: Sequence[bytes]) -> list[_TableRow]:
 
 def read_all_tables(
     machines: Mapping[str, Path], damaged: dict[str, str], render_text: Callable[[str], str] = str
-) -> Iterator[TapTable]:
+) -> Iterator[TapTestTable]:
     """Read the tables of all machines by name. `damaged` gets the reason for each unreadable machine."""
     for key in sorted(machines):
         try:

@@ -27,8 +27,8 @@ from dsm import (
 )
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.tool_modes import (
-    ModeMatch,
     TappedTool,
+    ToolModeMatch,
     assign_mode_numbers,
     find_tapped_tools,
     select_neighbor_modes,
@@ -99,7 +99,7 @@ class InitialGuess(NamedTuple):
     """Factor on the radial stiffness of the joints (-)."""
     tilting: float
     """Factor on the tilting stiffness of the joints (-)."""
-    matches: tuple[ModeMatch, ...]
+    matches: tuple[ToolModeMatch, ...]
     """Matched modes of each tap test."""
 
 
@@ -109,7 +109,7 @@ class JointFit:
 
     taps: Sequence[TappedTool]
     """Tools with their tap tests."""
-    matches: tuple[ModeMatch, ...]
+    matches: tuple[ToolModeMatch, ...]
     """Matched modes of each tap test."""
     grouping: Grouping
     """Grouping of the springs that share a factor."""
@@ -126,7 +126,7 @@ def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
     """
     starts = _select_distinct(sorted(_generate_guesses(taps, position), key=lambda start: start.cost))
     if not starts:
-        followed = tuple(ModeMatch(0.0, ((tap.mode_number, tap.followed),)) for tap in taps)
+        followed = tuple(ToolModeMatch(0.0, ((tap.mode_number, tap.followed),)) for tap in taps)
         return _fit_model(taps, InitialGuess(0.0, 1.0, 1.0, 1.0, followed))
     best = None
     for start in starts[:MAX_FITTED_NUMBERINGS]:
@@ -187,7 +187,7 @@ def _iterate_fit(taps: Sequence[TappedTool], start: InitialGuess, position: floa
     return fitted
 
 
-def _match_all(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position: float) -> tuple[ModeMatch, ...]:
+def _match_all(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position: float) -> tuple[ToolModeMatch, ...]:
     matches = []
     for tap, spindle in zip(taps, spindles, strict=True):
         frequency, stiffness = modes_at(spindle, max(NUM_COMPARED_MODEL_MODES, tap.mode_number), position)
@@ -195,7 +195,7 @@ def _match_all(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position
     return tuple(matches)
 
 
-def _mode_numbers(matches: Sequence[ModeMatch]) -> list[list[tuple[int, float]]]:
+def _mode_numbers(matches: Sequence[ToolModeMatch]) -> list[list[tuple[int, float]]]:
     return [[(number, mode.frequency) for number, mode in match.modes] for match in matches]
 
 

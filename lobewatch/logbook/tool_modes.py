@@ -130,7 +130,7 @@ def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> Tapped
     )
 
 
-class ModeMatch(NamedTuple):
+class ToolModeMatch(NamedTuple):
     """Modes of a tap test with their numbers in the model."""
 
     cost: float
@@ -139,21 +139,21 @@ class ModeMatch(NamedTuple):
     """Numbers in the model and modes, in order."""
 
 
-def assign_mode_numbers(tap: TappedTool, frequency: Sequence[float], stiffness: Sequence[float]) -> ModeMatch:
+def assign_mode_numbers(tap: TappedTool, frequency: Sequence[float], stiffness: Sequence[float]) -> ToolModeMatch:
     """Assign model numbers to the modes of a tap test at the least cost, in the order of the model.
 
     The followed mode keeps its number. Another mode may stay without a number, at a cost. `frequency` (Hz) and
     `stiffness` (N/m) are those of the model at the tapped point.
     """
     measured = sorted([tap.followed, *select_neighbor_modes(tap)], key=lambda mode: mode.frequency)
-    best = [ModeMatch(0.0, ())] * (len(frequency) + 1)
+    best = [ToolModeMatch(0.0, ())] * (len(frequency) + 1)
     for mode in measured:
         skipped = math.inf if mode is tap.followed else UNMATCHED_MODE_COST
-        row = [ModeMatch(best[0].cost + skipped, best[0].modes)]
+        row = [ToolModeMatch(best[0].cost + skipped, best[0].modes)]
         for number, model in enumerate(zip(frequency, stiffness, strict=True), 1):
             pair = _match_cost(mode, *model) if (mode is tap.followed) == (number == tap.mode_number) else math.inf
-            matched = ModeMatch(best[number - 1].cost + pair, (*best[number - 1].modes, (number, mode)))
-            unmatched = ModeMatch(best[number].cost + skipped, best[number].modes)
+            matched = ToolModeMatch(best[number - 1].cost + pair, (*best[number - 1].modes, (number, mode)))
+            unmatched = ToolModeMatch(best[number].cost + skipped, best[number].modes)
             row.append(min(matched, unmatched, row[-1], key=lambda candidate: candidate.cost))
         best = row
     return best[-1]

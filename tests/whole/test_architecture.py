@@ -44,7 +44,14 @@ def test_the_layers_are_those_that_are_checked(contract: dict[str, list[str]]) -
 
 def test_the_nouns_are_public_names_of_where_they_are_said_to_be() -> None:
     nouns = re.findall(r"^\| `(\w+)` \| `([\w.]+)` \| .+ \| .+ \|$", PAGE, re.MULTILINE)
-    assert {"TapTest", "Logbook", "Assembly", "Verdict", "Standing"} <= {name for name, _ in nouns}
+    assert {"TapTest", "Logbook", "Assembly", "Verdict", "MachineStatus"} <= {name for name, _ in nouns}
     for name, package in nouns:
         assert isinstance(getattr(import_module(package), name), type), name
         assert name in import_module(package).__all__, name
+
+
+def test_every_place_to_look_is_there() -> None:
+    table = PAGE.partition("## Where to look")[2].partition("## Rooms")[0]
+    places = re.findall(r"`([a-z_]+/[\w/.]*)`", table)
+    assert len(places) > 60
+    assert [place for place in places if "NAME" not in place and not (ROOT / place).exists()] == []

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from acquisition import DataError
 from acquisition.file_io import make_folder, sync_folder
 from lobewatch.arrays import Floats, Indices
-from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
+from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.machine.folder_lock import FolderLock
 from lobewatch.show.terminal.output import format_csv_cell
 
@@ -38,11 +38,11 @@ class ExportOutcome(NamedTuple):
 
 EXPORT_COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *TAP_NUMBER_COLUMNS, "remarks")
 """Columns of an exported row, in order."""
-EMPTY_TABLE = TapTable("", "", (), (), (), (), (), np.empty((0, len(TAP_NUMBER_COLUMNS))))
+EMPTY_TABLE = TapTestTable("", "", (), (), (), (), (), np.empty((0, len(TAP_NUMBER_COLUMNS))))
 
 
 @contextmanager
-def open_duckdb(tables: Iterable[TapTable], purpose: str) -> Iterator[Any]:
+def open_duckdb(tables: Iterable[TapTestTable], purpose: str) -> Iterator[Any]:
     """Open a DuckDB connection in memory with the tap tests as the table `lines`.
 
     Raise DataError, which names the purpose, without DuckDB and for files that it cannot read or write.
@@ -69,7 +69,7 @@ def write_parquet(base: Any, query: str, path: Path) -> int:
     return int(base.execute(f"COPY ({query}) TO '{name}' (FORMAT parquet, COMPRESSION zstd)").fetchone()[0])
 
 
-def _table_arrays(table: TapTable) -> dict[str, NDArray[Any]]:
+def _table_arrays(table: TapTestTable) -> dict[str, NDArray[Any]]:
     """Return the columns of a table as arrays, by name."""
     n, of_series = len(table.tap_id), np.array(table.series_numbers, np.int64)
     tools, directions = (np.array([place[part] for place in table.series], object)[of_series - 1] for part in (0, 1))
@@ -96,7 +96,7 @@ _POWERS_OF_TEN = 10.0 ** np.arange(23)
 """Powers of ten that are exact floating-point numbers."""
 
 
-def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
+def write_table(tables: Iterable[TapTestTable], path: Path) -> ExportOutcome:
     """Write a file by the ending of its name, whole or not at all.
 
     DataError for an ending that is not known, and for Parquet without DuckDB.
@@ -115,7 +115,7 @@ def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
     return ExportOutcome(count, {"file": str(path)})
 
 
-def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
+def _write_sqlite(tables: Iterable[TapTestTable], path: Path) -> int:
     count = series = 0
     insert = f"INSERT INTO tap VALUES ({', '.join('?' * (4 + len(TAP_NUMBER_COLUMNS)))})"
     with closing(sqlite3.connect(path, isolation_level=None)) as base:
@@ -137,7 +137,7 @@ def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
     return count
 
 
-def _write_csv(tables: Iterable[TapTable], path: Path, *, zipped: bool = False) -> int:
+def _write_csv(tables: Iterable[TapTestTable], path: Path, *, zipped: bool = False) -> int:
     count = 0
     with path.open("wb") as file, gzip.GzipFile("", "wb", 1, file, mtime=0) if zipped else nullcontext(file) as out:
         out.write(",".join(EXPORT_COLUMNS).encode() + b"\n")
@@ -147,7 +147,7 @@ def _write_csv(tables: Iterable[TapTable], path: Path, *, zipped: bool = False) 
     return count
 
 
-def _csv_rows(table: TapTable) -> Iterator[str]:
+def _csv_rows(table: TapTestTable) -> Iterator[str]:
     begin = f"{format_csv_cell(table.folder)},{format_csv_cell(table.machine)},"
     series = [f"{format_csv_cell(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
     times = np.datetime_as_string(np.floor(table.time).astype("datetime64[s]")).tolist()
@@ -173,12 +173,12 @@ def round_significant(values: Floats, digits: Indices) -> Floats:
     return np.asarray(np.rint(values * up / down) * down / up)
 
 
-def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
+def _write_parquet(tables: Iterable[TapTestTable], path: Path) -> int:
     with open_duckdb(tables, ".parquet") as base:
         return write_parquet(base, "SELECT * FROM lines", path)
 
 
-TABLE_WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {
+TABLE_WRITERS: dict[str, Callable[[Iterable[TapTestTable], Path], int]] = {
     ".sqlite": _write_sqlite,
     ".csv": _write_csv,
     ".csv.gz": partial(_write_csv, zipped=True),
@@ -198,7 +198,7 @@ WHERE folder IN (SELECT unnest(?::VARCHAR[])) AND (lines.time IS NULL OR {differ
 """
 
 
-def append_months(tables: Iterable[TapTable], folder: Path) -> ExportOutcome:
+def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome:
     """Add missing tap tests to a folder as `month=YYYY-MM/*.parquet` (month in UTC), each file complete or not written.
 
     Folder and tap_id identify a tap test. Existing files are never changed. Raise DataError without DuckDB, for a file

@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any
 
 from acquisition import DataError
-from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTable
+from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.show.fleet.export_files import EXPORT_COLUMNS, ExportOutcome
 
 POSTGRES_TABLE = "lobewatch_taps"
@@ -59,7 +59,7 @@ PSYCOPG_LOG.addHandler(logging.NullHandler())
 PSYCOPG_LOG.propagate = False
 
 
-def upsert_table(tables: Iterable[TapTable], address: str) -> ExportOutcome:
+def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
     Rows that no longer count stay and are marked. Each transaction reads its machines while no other export writes.
@@ -130,12 +130,12 @@ def _make_table(connection: Any) -> bool:
         return bool(has_timescale)
 
 
-def _write_next(connection: Any, remaining: Iterator[TapTable]) -> tuple[int, int, int] | None:
+def _write_next(connection: Any, remaining: Iterator[TapTestTable]) -> tuple[int, int, int] | None:
     """Read the next machines and write them; None where none are left.
 
     Return the numbers of tap tests read, of rows added or changed, and of stored rows that no longer count.
     """
-    batch, count = list[TapTable](), 0
+    batch, count = list[TapTestTable](), 0
     with connection.transaction(), connection.cursor() as cursor:
         cursor.execute(EXPORT_LOCK_QUERY)
         while count < POSTGRES_BATCH_TAPS and (table := next(remaining, None)) is not None:
@@ -152,7 +152,7 @@ def _write_next(connection: Any, remaining: Iterator[TapTable]) -> tuple[int, in
     return count, written, set_aside
 
 
-def _table_rows(table: TapTable) -> Iterator[Sequence[Any]]:
+def _table_rows(table: TapTestTable) -> Iterator[Sequence[Any]]:
     """Return rows in the order of the columns."""
     series = [(tool, direction, n) for n, (tool, direction) in enumerate(table.series, 1)]
     taps = zip(table.tap_id, table.time, table.series_numbers, table.numbers.tolist(), table.remarks, strict=True)

@@ -10,35 +10,33 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+FIELD_OPTIONS = """
+    Circumstances.direction Circumstances.tool Conditions.reclamped CutEntry.at=date
+    CutEntry.chatter_frequency_hz=frequency CutEntry.has_chatter=chatter Description.averages Description.columns
+    Description.date Description.date_pattern Description.decimal Description.direction Description.force
+    Description.force_unit Description.full_scale Description.pulses Description.quantity Description.rate
+    Description.response Description.sensitivity Description.sensor Description.skip Description.spacing
+    Description.start Description.tacho Description.unit EmulationSetup.tcp LobeChart.source MaintenanceEvent.time=date
+    ModeEdits.add ModeEdits.drop ModeEdits.fix MountingVariation.bad_share=bad-clampings MountingVariation.scatter
+    MountingVariation.temperature_swing=temperature ProgramTable.depth_mm=depth ProgramTable.direction
+    ProgramTable.feed_per_tooth_mm=feed-per-tooth ProgramTable.material ProgramTable.name=save
+    ProgramTable.radial_depth_mm=radial ProgramTable.speed_rpm=speed ProgramTable.teeth ProgramTable.tool
+    ProgramTable.tool_diameter_mm=diameter ScreenServer.listen SeriesStatus.direction SeriesStatus.tool Window.hit_at
+    Window.start=window-start Window.time_constant=window Workers.jobs Workers.scheduler accept_questions.codes=accept
+    accept_settings.keys=accept acknowledge_alarms.until acquire_cut.file acquire_cut.port add_event.new_baseline
+    build_power_reading.power_kw=power calibrate_joints.mode calibrate_joints.tools=tool choose_cut.cut
+    choose_cut.program compare_lobes.cut compute_lobe_chart.method evaluate_requested.names=program
+    exclude_entry.reason find_setup_question.name=edit fit_file_modes.accept fit_file_modes.conjugate
+    list_comparison_files.beside plan_session.port record_cut.time_limit=seconds rotate_structure.degrees=askew
+    rotate_structure.direction screen.ScreenServer=screen store_recordings.keep_going
+"""
+"""Fields with the name of their option where it is another one."""
+_ENTRIES = (entry.partition("=") for entry in FIELD_OPTIONS.split())
 OPTION_NAMES: Mapping[str, str] = {
-    # acquisition.files
-    "Description.averages": "--averages",
-    "Description.columns": "--columns",
-    "Description.decimal": "--decimal",
-    "Description.force": "--force",
-    "Description.force_unit": "--force-unit",
-    "Description.full_scale": "--full-scale",
-    "Description.pulses": "--pulses",
-    "Description.quantity": "--quantity",
-    "Description.rate": "--rate",
-    "Description.response": "--response",
-    "Description.sensitivity": "--sensitivity",
-    "Description.sensor": "--sensor",
-    "Description.skip": "--skip",
-    "Description.spacing": "--spacing",
-    "Description.start": "--start",
-    "Description.tacho": "--tacho",
-    "Description.unit": "--unit",
-    # modal
-    "ModeEdits.add": "--add",
-    "ModeEdits.drop": "--drop",
-    "ModeEdits.fix": "--fix",
-    "modal.synthesize_frf": "lobewatch modes --figure",
-    "numpy.conj": "on the command line: --conjugate",
-    # lobewatch.logbook and lobewatch.fleet
-    "Description.date": "--date",
-    "Description.date_pattern": "--date-pattern",
-    "Description.direction": "--direction",
+    **{
+        field: f"--{name or field.partition('.')[2].replace('_', '-')}"
+        for field, _, name in (entry.partition("=") for entry in FIELD_OPTIONS.split())
+    },
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
     "ProgramTable.depth_mm": "--depth",
@@ -74,16 +72,23 @@ OPTION_NAMES: Mapping[str, str] = {
     "build_power_reading.power_kw": "--power",
     "choose_cut.cut": "--cut",
     "choose_cut.program": "--program",
+    "Logbook.verdicts": "lobewatch check",
+    "MachineFolder.accept": "replay --accept",
+    "MachineFolder.contents": "lobewatch history",
+    "TapSession.run": "lobewatch tap",
+    "acquisition.measure_rate": "lobewatch sensors",
+    "acquisition.scan_ports": "lobewatch ports",
     "exclude_entry": "exclude",
-    "exclude_entry.reason": "--reason",
-    "find_setup_question.name": "--edit",
+    "fit_file_modes": "lobewatch modes",
     "folder_files.make_machine_folder": "lobewatch init",
+    "folder_files.make_machine_folder.template": "lobewatch init --example",
     "folder_updates.accept_settings": "lobewatch check MACHINE --accept",
     "folder_updates.add_event": "lobewatch event",
     "folder_updates.exclude_entry": "lobewatch exclude",
     "folder_updates.store_mode_edits": "lobewatch modes MACHINE TAP",
     "folder_updates.store_cut": "observe",
     "lobes.materials_by_name": "lobewatch materials",
+    "make_machine_folder": "lobewatch init",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
     # lobewatch.measurement, lobewatch.tool, lobewatch.history
@@ -125,9 +130,15 @@ OPTION_NAMES: Mapping[str, str] = {
     "Logbook.verdicts": "lobewatch check",
     "TapSession.run": "lobewatch tap",
     "add_event.new_baseline": "--new-baseline",
+    "modal.synthesize_frf": "lobewatch modes --figure",
+    "numpy.conj": "on the command line: --conjugate",
     "operator_entries.acknowledge_alarms": "lobewatch ack",
+    "plan_session.resume=False": "--new",
     "pocket_depth.find_pocket_depths": "lobewatch suggest",
     "program_learning.find_next_cut": "lobewatch suggest",
+    "rebuild_files.rebuild_files": "lobewatch rebuild",
+    "sensor_checks.check_skew": "lobewatch sensors --skew",
+    "session.TapSession": "lobewatch tap",
 }
 """Option or command for each field or function that a message names."""
 

@@ -26,14 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.arrays import Complexes, Floats
-from acquisition.emulation.milling_cut import (
-    MillingCut,
-    ModeTables,
-    Passage,
-    ToothTables,
-    build_tables,
-    count_steps_needed,
-)
+from acquisition.emulation import milling_cut
+from acquisition.emulation.milling_cut import MillingCut, ModeTables, Passage, ToothTables
 
 MAX_STEP_COUNT_FACTOR = 1.25
 """Factor by which steps per turn may exceed those needed, to make pitches whole numbers of steps."""
@@ -41,12 +35,12 @@ MAX_STEP_COUNT_FACTOR = 1.25
 
 def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
     """Build the tables of one tooth over a turn."""
-    needed = count_steps_needed(cut) * cut.teeth
+    needed = milling_cut.count_steps_needed(cut) * cut.teeth
     number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
     steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
     off = np.max(np.abs(steps - np.rint(steps)), axis=1) / number
     single = replace(cut, teeth=1, pitch=(), runout=())
-    return build_tables([single], int(number[np.argmin(np.round(off, 9))]))
+    return milling_cut.build_tables([single], int(number[np.argmin(np.round(off, 9))]))
 
 
 def simulate_uneven_cutting(
@@ -145,7 +139,7 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
             yield number, _simulate_uneven_cut(cut, passage)
     for group in _group_cuts(cuts):
         members = [cuts[i] for i in group]
-        modes, teeth = build_tables(members, max(map(count_steps_needed, members)))
+        modes, teeth = milling_cut.build_tables(members, max(map(milling_cut.count_steps_needed, members)))
         cutting, swing = _simulate_group(members, modes, teeth, passage)
         for place, number in enumerate(group):
             steps_per_turn = len(teeth.root) * cuts[number].teeth

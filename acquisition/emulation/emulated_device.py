@@ -74,6 +74,8 @@ class SimulatedSource(ClosedOnExit):
     """Whether its scans follow the clock. They come as fast as they are read."""
     loss_detection = ""
     """Empty: no scans can be lost."""
+    fault = ""
+    """Empty: the source has no faults."""
 
     def __init__(
         self, signal: SignalFunction, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
@@ -85,11 +87,6 @@ class SimulatedSource(ClosedOnExit):
         self.events: deque[Event] = deque()
         """Events, to be added by the test."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
-
-    @property
-    def fault(self) -> str:
-        """Empty: the source has no faults."""
-        return ""
 
     def start(self) -> None:
         """Start: nothing to prepare."""
@@ -172,9 +169,8 @@ class PtyWire:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            raise DataError(
-                f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
-            ) from error
+            text = f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
+            raise DataError(text) from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)

@@ -54,9 +54,8 @@ def simulate_uneven_cutting(
     behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
     share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
     stands_out = np.array(cut.runout or np.zeros(cut.teeth))
-    thick, root, reach, push, rub = (
-        part[:, 0] for part in (tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain)
-    )
+    tables = tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain
+    thick, root, reach, push, rub = (table[:, 0] for table in tables)
     number = math.ceil(passage.cutting / step)
     depth = passage.depth_at(np.asarray((np.arange(number) + 0.5) * step))
     surface, swing = np.zeros_like(thick), np.zeros(modes.flight.shape[1], dtype=complex)
@@ -157,10 +156,8 @@ def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
     """Yield the indices of cuts to step together, all with evenly spaced teeth."""
     group: list[int] = []
     for i in sorted((i for i, cut in enumerate(cuts) if not cut.pitch), key=lambda i: cuts[i].tooth_period):
-        if group and (
-            len(group) == MAX_CUTS_PER_GROUP
-            or cuts[i].tooth_period > MAX_TOOTH_PERIOD_RATIO * cuts[group[0]].tooth_period
-        ):
+        longest = MAX_TOOTH_PERIOD_RATIO * cuts[group[0]].tooth_period if group else math.inf
+        if len(group) == MAX_CUTS_PER_GROUP or cuts[i].tooth_period > longest:
             yield group
             group = []
         group.append(i)
@@ -218,10 +215,8 @@ def _step_tooth_period(
 def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Floats:
     """Return q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), at the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
-    acceleration: Floats = np.einsum(
-        "cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis]
-    )
-    return acceleration
+    of_modes = free + gains * modes.pole.imag / modes.step[:, np.newaxis]
+    return np.asarray(np.einsum("cam,scm->sca", modes.axis, of_modes))
 
 
 def _assemble_motion(

@@ -183,12 +183,8 @@ def _check_browser() -> Finding:
     try:
         name = webbrowser.get().__class__.__name__
     except webbrowser.Error:
-        return Finding(
-            "browser",
-            "note",
-            "none here",
-            "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0",
-        )
+        cure = "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0"
+        return Finding("browser", "note", "none here", cure)
     return Finding("browser", "fine", f"there is one ({name})")
 
 

@@ -97,10 +97,8 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
     """Return the remark on a missing anti-alias filter. declared: whether there is one, None if not stated."""
     if declared:
         return []
-    filter_text = "nobody says that a filter keeps" if declared is None else "no filter keeps"
-    text = (
-        f"{filter_text} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
-    )
+    kept = "nobody says that a filter keeps" if declared is None else "no filter keeps"
+    text = f"{kept} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
     cure = "enter [daq] anti_alias = true where the device or an amplifier has one, else choose a higher rate"
     return [Remark("no-anti-alias", "", text, cure)]
 
@@ -207,9 +205,8 @@ def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[
         The device does not have exactly two channels.
     """
     if len(device.channels) != 2:
-        raise DataError(
-            f"a skew is that of two inputs; the DAQ has {len(device.channels)}: name two in [[daq.channel]]"
-        )
+        n = len(device.channels)
+        raise DataError(f"a skew is that of two inputs; the DAQ has {n}: name two in [[daq.channel]]")
     rate = check_device_rate(folder, device)
     tell(f"recording {SKEW_RECORDING_SECONDS:g} s: both inputs joined with a T-piece, noise or taps on them")
     blocks = []

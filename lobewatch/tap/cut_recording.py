@@ -157,9 +157,8 @@ class _SignalBuffer:
         codes, first = np.concatenate(self.codes), self.received - self.count
         marks = [mark for place, mark in self.marks if place > first]
         lost = sum(mark for mark in marks if mark > 0)
-        return CutSignal(
-            np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
-        )
+        values = np.asarray(codes * self.channel.scale, np.float64)
+        return CutSignal(values, self.rate, codes, self.channel, lost, -1 in marks)
 
     @property
     def level(self) -> float:
@@ -176,16 +175,16 @@ class _SignalBuffer:
         self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
 
 
+Publish = Callable[..., None]
+"""Function called with changed fields of CutState."""
+
+
 def _ignore_state(**_: Any) -> None:
     """Nobody looks."""
 
 
 def record_cut(
-    device: Device,
-    turn: float,
-    time_limit: float,
-    show: Callable[[str], None],
-    publish: Callable[..., None] = _ignore_state,
+    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = _ignore_state
 ) -> CutSignal:
     """Record the next whole cut of a started device, from the air before it to the air after it.
 
@@ -208,10 +207,8 @@ def record_cut(
             publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
         elif buffer.received >= SENSOR_CHECK_DELAY * buffer.rate:
             publish(**waiting, cut_seconds=None)
-    raise DataError(
-        f"no cut was heard in {time_limit:g} s; begin to listen with the spindle turning in air, then cut, or give "
-        "more record_cut.time_limit"
-    )
+    cure = "begin to listen with the spindle turning in air, then cut, or give more record_cut.time_limit"
+    raise DataError(f"no cut was heard in {time_limit:g} s; {cure}")
 
 
 def _make_buffer(device: Device) -> _SignalBuffer:
@@ -221,9 +218,7 @@ def _make_buffer(device: Device) -> _SignalBuffer:
     return _SignalBuffer(device.channels[rows[0]], rows[0], device.sample_rate)
 
 
-def _iterate_signals(
-    device: Device, buffer: _SignalBuffer, time_limit: float, publish: Callable[..., None]
-) -> Iterator[CutSignal]:
+def _iterate_signals(device: Device, buffer: _SignalBuffer, time_limit: float, publish: Publish) -> Iterator[CutSignal]:
     """Yield the signal so far, again and again."""
     next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
     for block in device.blocks():
@@ -248,9 +243,8 @@ def _check_sensor_signal(buffer: _SignalBuffer) -> None:
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
         raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
     if np.ptp(codes) == 0:
-        raise DeviceError(
-            "the accelerometer hears nothing at all", "is it plugged in, on the housing, and the spindle turning?"
-        )
+        cure = "is it plugged in, on the housing, and the spindle turning?"
+        raise DeviceError("the accelerometer hears nothing at all", cure)
 
 
 def _has_ended(parts: CutParts, signal: CutSignal) -> bool:
@@ -265,7 +259,7 @@ def acquire_cut(
     time_limit: float,
     description: Description,
     show: Callable[[str], None],
-    publish: Callable[..., None],
+    publish: Publish,
 ) -> CutSignal:
     """Read a cut from a file, or record one with the device of machine.toml.
 
@@ -279,9 +273,8 @@ def acquire_cut(
     if not port:
         raise ValueError(f"no port: give acquire_cut.port, acquire_cut.file, or port in [daq] of {folder.toml}")
     if port.startswith(REPLAY_PREFIX):
-        raise ValueError(
-            f"acquire_cut.port {port}: a recording of hits; give the recording of a cut with acquire_cut.file"
-        )
+        text = "a recording of hits; give the recording of a cut with acquire_cut.file"
+        raise ValueError(f"acquire_cut.port {port}: {text}")
     show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
     show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
     with open_device(folder.machine.daq, port) as device:
@@ -317,11 +310,9 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
     publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
     try:
         yield publisher
-    except KeyboardInterrupt:
-        publisher.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
-        raise
-    except (OSError, RuntimeError, ValueError) as error:
-        publisher.show(word=CutStep.FAILED, reason=format_error(error), level=None, left=None)
+    except (KeyboardInterrupt, OSError, RuntimeError, ValueError) as error:
+        reason = "Stopped at the terminal." if isinstance(error, KeyboardInterrupt) else format_error(error)
+        publisher.show(word=CutStep.FAILED, reason=reason, level=None, left=None)
         raise
 
 

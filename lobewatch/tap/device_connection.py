@@ -85,12 +85,9 @@ LEVEL_WINDOW = 0.05
 def describe_device(device: Device) -> str:
     """Describe model, serial number, firmware and loss detection, as far as known."""
     identity = device.identity
-    details = {
-        "serial number ": identity.serial,
-        "firmware ": identity.firmware,
-        "loss detection: ": device.loss_detection,
-    }
-    return ", ".join([identity.model, *(name + value for name, value in details.items() if value)])
+    texts = identity.serial, identity.firmware, device.loss_detection
+    details = zip(("serial number ", "firmware ", "loss detection: "), texts, strict=True)
+    return ", ".join([identity.model, *(name + value for name, value in details if value)])
 
 
 class LiveSignal:

@@ -68,11 +68,8 @@ class ModeFactors(NamedTuple):
 
     def apply_to(self, at_rest: Structure) -> Structure:
         """Return the structure at speed from that at rest."""
-        return Structure(
-            at_rest.frequency * self.frequency,
-            at_rest.damping_ratio * self.damping_ratio,
-            at_rest.stiffness * self.stiffness,
-        )
+        frequency, zeta, stiffness = at_rest.frequency, at_rest.damping_ratio, at_rest.stiffness
+        return Structure(frequency * self.frequency, zeta * self.damping_ratio, stiffness * self.stiffness)
 
 
 class HiddenTruth(NamedTuple):
@@ -143,9 +140,8 @@ def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spind
     damping_ratio = get_spindle_table(folder).damping_ratio
     structure = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
     softest = int(np.argmin(structure.stiffness))
-    is_moved = (structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]) & (
-        structure.frequency < MAX_EMULATED_MODE_FREQUENCY
-    )
+    is_moved = structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]
+    is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY
     is_moved[softest] = True
     return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
 
@@ -185,11 +181,8 @@ def _build_true_cut(
 
 def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
     """Return the stable depth limit by semi-discretization (m)."""
-    x, y = (
-        [Mode(*values) for values in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
-        for side in (cut.x, cut.y)
-        if side is not None
-    )
+    sides = [side for side in (cut.x, cut.y) if side is not None]
+    x, y = ([*map(Mode, side.frequency, side.damping_ratio, side.stiffness)] for side in sides)
     true_cut = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
     return program_limit(Program(true_cut, cut.speed_rpm, cut.depth), x, y).limit
 
@@ -197,18 +190,10 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
-    x, y = (
-        ModeFactors(
-            *(
-                _draw_factor(random, *prior)
-                for prior in (ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR)
-            )
-        )
-        for _ in range(2)
-    )
-    return HiddenTruth(
-        x, y, _draw_factor(random, *ROTATING_FORCE_PRIOR), 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION)
-    )
+    priors = ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR
+    x, y = (ModeFactors(*(_draw_factor(random, *prior) for prior in priors)) for _ in range(2))
+    tangential = _draw_factor(random, *ROTATING_FORCE_PRIOR)
+    return HiddenTruth(x, y, tangential, 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION))
 
 
 def draw_runout(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:

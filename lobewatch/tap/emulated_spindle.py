@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -65,12 +66,8 @@ class EmulatedMachine:
 def build_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
     """Build the structure at a position (m from the tool tip): modes and static residual of the model."""
     frequency, stiffness = modes_at(spindle, EMULATED_MODES, position)
-    return Structure(
-        frequency=frequency,
-        damping_ratio=np.full(EMULATED_MODES, damping_ratio),
-        stiffness=stiffness,
-        residual=1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness)),
-    )
+    residual = 1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness))
+    return Structure(frequency, np.full(EMULATED_MODES, damping_ratio), stiffness, residual)
 
 
 def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection) -> Structure:
@@ -85,10 +82,8 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
     c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
-        raise ValueError(
-            f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: "
-            "modes along x and y show nothing across; give another angle"
-        )
+        text = "modes along x and y show nothing across; give another angle"
+        raise ValueError(f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: {text}")
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
     return Structure(
@@ -195,18 +190,15 @@ def emulate_device(
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     inputs = get_emulated_inputs(folder, driver)
     has_clock = folder.machine.daq.digital_clock
-    return driver.emulate(
-        EmulationSetup(lambda rate: signal_of(inputs, rate), inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock)
-    )
+    signal_at = partial(signal_of, inputs)
+    return driver.emulate(EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock))
 
 
 def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
     """Return [spindle] of machine.toml. DataError if there is none."""
     if folder.machine.spindle is None:
-        raise DataError(
-            f"{folder.toml}: no model to {purpose}: "
-            "add a [spindle] table (or use folder_files.make_machine_folder.template)"
-        )
+        cure = "add a [spindle] table (or use folder_files.make_machine_folder.template)"
+        raise DataError(f"{folder.toml}: no model to {purpose}: {cure}")
     return folder.machine.spindle
 
 
@@ -217,11 +209,8 @@ def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) 
 
 def _select_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
     """Return the structure between hammer and sensor in a direction."""
-    return (
-        built
-        if axes_angle is None and direction != CROSS_TAP
-        else rotate_structure(built, axes_angle or 0.0, direction)
-    )
+    is_round = axes_angle is None and direction != CROSS_TAP
+    return built if is_round else rotate_structure(built, axes_angle or 0.0, direction)
 
 
 def _select_cross_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
@@ -257,8 +246,6 @@ def get_emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorIn
         return tuple(SensorInput(number, channel) for number, channel in enumerate(channels))
     inputs = folder.machine.daq.settings.inputs
     if not inputs:
-        raise DataError(
-            f'{folder.toml}: no sensors to emulate: give driver = "{driver.name}" in [daq] and two [[daq.channel]] '
-            "(docs/devices.md shows them)"
-        )
+        cure = f'give driver = "{driver.name}" in [daq] and two [[daq.channel]] (docs/devices.md shows them)'
+        raise DataError(f"{folder.toml}: no sensors to emulate: {cure}")
     return inputs

@@ -93,11 +93,6 @@ class TapPublisher(StatePublisher[TapState]):
 
     def show_hits(self, hits: EvaluatedHits, **changes: Any) -> None:
         """Publish the list of hits, what follows from it, and other fields."""
-        mean = hits.mean
-        self.show(
-            hits=hits.tap.taken,
-            good=hits.tap.good,
-            mean_change=mean.relative_change,
-            settled=mean.has_converged,
-            **changes,
-        )
+        tap, mean = hits.tap, hits.mean
+        changes |= {"mean_change": mean.relative_change, "settled": mean.has_converged}
+        self.show(hits=tap.taken, good=tap.good, **changes)

@@ -20,6 +20,7 @@ from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s). The trigger may be armed before."""
+EARLY_HIT_TEXT = "That hit came while the tool still moved and does not count: wait for TAP."
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -94,9 +95,7 @@ class HitLoop:
             yield None
             if search.too_early > n_early:
                 n_early = search.too_early
-                self._publisher.show(
-                    reason="That hit came while the tool still moved and does not count: wait for TAP."
-                )
+                self._publisher.show(reason=EARLY_HIT_TEXT)
             self._show_trigger_step(search, connection.sample_rate)
 
     def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
@@ -200,25 +199,18 @@ class TapPhases:
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
         self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
-        self._tap.baseline = find_quiet_part(
-            connection.signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION)
-        )
-        free = shutil.disk_usage(self._folder.path).free
-        calibration = check_calibration(connection.signal.inputs.channels, machine.daq.calibration_interval_months)
-        checks = (
+        signal, months = connection.signal, machine.daq.calibration_interval_months
+        baseline = find_quiet_part(signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION))
+        self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
+        checks = [
             *self._publisher.state.checks,
-            *_run_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),
-            calibration,
-            *self._hearing(self._tap.baseline),
-        )
+            *_run_guarded_checks(baseline, trigger.level if trigger else None, free),
+        ]
+        checks.append(check_calibration(signal.inputs.channels, months))
+        if not baseline.has_force:
+            checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
-        self._publisher.show(checks=checks, reason=" ".join(failed))
-
-    def _hearing(self, baseline: Hit) -> tuple[Check, ...]:
-        """Check the detectable band if there is no force sensor."""
-        if baseline.has_force:
-            return ()
-        return (check_detectable_band(baseline, self._folder.machine, self._tap.circumstances.tool),)
+        self._publisher.show(checks=tuple(checks), reason=" ".join(failed))
 
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
@@ -226,18 +218,15 @@ class TapPhases:
         tap.trigger = tap.trigger or trigger_from_setup(setup, connection.sample_rate)
         if tap.trigger is not None or tap.baseline is None:
             return
-        self._trial = self._trial or TrialHits(setup, tap.baseline)
-        self._take_trial_hits(connection, self._trial)
-        tap.trigger = self._trial.trigger
-        check = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
-        self._publisher.show(checks=(*self._publisher.state.checks, check))
-
-    def _take_trial_hits(self, connection: DeviceConnection, trial: TrialHits) -> None:
+        self._trial = trial = self._trial or TrialHits(setup, tap.baseline)
         asked = False
         while not trial.is_done:
             if not asked:
                 self._publisher.show(reason=f"{self._publisher.state.reason} {trial.text}".strip())
             asked = self._take_trial_hit(connection, trial)
+        tap.trigger = trial.trigger
+        check = Check("trial hits", not trial.remarks, trial.text.removesuffix("."))
+        self._publisher.show(checks=(*self._publisher.state.checks, check))
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
@@ -267,6 +256,5 @@ def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> 
     try:
         return run_self_check(baseline, level, free_bytes)
     except Exception as error:  # noqa: BLE001 - a check warns and ends no test
-        return (
-            Check("self-check", False, f"it failed ({type(error).__name__}: {error}); the test goes on without it"),
-        )
+        text = f"it failed ({type(error).__name__}: {error}); the test goes on without it"
+        return (Check("self-check", False, text),)

@@ -232,9 +232,9 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     texts += [f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
-        ProgramVerdict(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.stability.value)
+        ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)
         for verdict in verdicts
-        if (program := verdict.program)
+        if (cut := verdict.program)
     ]
     of_tool = [verdict.remarks for verdict in verdicts if verdict.program.tool == measurement.tool]
     asks_across = any(remark.code == CROSS_NOT_TAPPED_CODE for remarks in of_tool for remark in remarks)
@@ -308,13 +308,7 @@ def plan_session(
     tool, wanted = tool or machine.tap.tool, parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
-    about = Circumstances(
-        machine.machine.name,
-        datetime.now(UTC),
-        tool,
-        wanted,
-        operator,
-        folder.toml_text,
-        conditions=conditions.with_defaults(machine.tap.conditions(tool)),
-    )
+    conditions = conditions.with_defaults(machine.tap.conditions(tool))
+    what = machine.machine.name, datetime.now(UTC), tool, wanted, operator
+    about = Circumstances(*what, folder.toml_text, conditions=conditions)
     return TapSession(folder, DeviceOpener(machine.daq, port).open, about, resume=resume, accept=accept)

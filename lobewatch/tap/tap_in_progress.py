@@ -109,10 +109,8 @@ class TapInProgress:
 
     def make_setup_error(self) -> ValueError:
         """Return the error that rejects mixing hits of two set-ups."""
-        return ValueError(
-            f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
-            "begin anew with plan_session.resume=False"
-        )
+        text = f"the interrupted test {self.id} was recorded with another length, sample rate or sensor"
+        return ValueError(f"{text}; begin anew with plan_session.resume=False")
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Store a hit. It is on the disk when this returns."""
@@ -220,9 +218,8 @@ def _find_interrupted(
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            not_resumed.append(
-                f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed"
-            )
+            text = f"an interrupted test of {when} is still in {path}"
+            not_resumed.append(f"{text}; delete that folder if it is not needed")
     return newest
 
 
@@ -246,9 +243,8 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
     affect the other test.
     """
-    cross_hits = [
-        (hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None
-    ]
+    listed = zip(tap.hits, tap.flags, strict=True)
+    cross_hits = [(hit.cross_hit, flags) for hit, flags in listed if hit.cross_hit is not None]
     if not cross_hits:
         return None
     hits, driving_point_flags = [hit for hit, _ in cross_hits], [flags for _, flags in cross_hits]

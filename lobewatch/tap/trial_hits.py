@@ -148,9 +148,8 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
         return None
     too_large, percent = share < MIN_RANGE_SHARE, float(f"{100 * share:.2g}")
     wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
-    return Remark(
-        "range-too-large" if too_large else "range-too-small",
-        name,
-        f"the hits reach {percent:g} % of the range of {full:.3g} {unit}",
-        f"choose a range or a sensor of about {wanted:.2g} {unit}{'' if too_large else ', or hit softer'}",
-    )
+    text = f"the hits reach {percent:g} % of the range of {full:.3g} {unit}"
+    cure = f"choose a range or a sensor of about {wanted:.2g} {unit}"
+    if too_large:
+        return Remark("range-too-large", name, text, cure)
+    return Remark("range-too-small", name, text, f"{cure}, or hit softer")

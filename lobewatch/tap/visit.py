@@ -104,11 +104,8 @@ class TapVisit:
         missing = [direction for direction in DIRECTION_CHOICES if direction not in tapped]
         if missing:
             tap = DIRECTION_CHOICES[missing[0]]
-            instruction = (
-                "Turn hammer and accelerometer to"
-                if cross_tap is None
-                else f"{cross_tap.text} The sensor stays: hit in"
-            )
+            turn = "Turn hammer and accelerometer to"
+            instruction = f"{cross_tap.text} The sensor stays: hit in" if cross_tap else turn
             reason = f"{self._direction} is saved. {instruction} {missing[0]}, then: {tap.text}."
             choices: Sequence[Choice] = (tap, DONE_CHOICE)
             moved = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-import numpy as np
-
 from acquisition import (
     Channel,
     DataError,
@@ -29,7 +27,7 @@ from acquisition import (
 )
 from lobewatch.machine.daq_rates import apply_measured_rate, check_device_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LiveSignal, find_sensor_data
+from lobewatch.tap.device_connection import LiveSignal, collect_codes, find_sensor_data
 from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor_remarks
 from lobewatch.tap.trial_hits import TrialHits
 
@@ -209,13 +207,8 @@ def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[
         raise DataError(f"a skew is that of two inputs; the DAQ has {n}: name two in [[daq.channel]]")
     rate = check_device_rate(folder, device)
     tell(f"recording {SKEW_RECORDING_SECONDS:g} s: both inputs joined with a T-piece, noise or taps on them")
-    blocks = []
     device.start()
-    for block in device.blocks():
-        blocks.append(block.codes)
-        if sum(codes.shape[1] for codes in blocks) >= SKEW_RECORDING_SECONDS * rate:
-            break
+    (first, second), _ = collect_codes(device.blocks(), SKEW_RECORDING_SECONDS * rate)
     device.stop()
-    first, second = np.concatenate(blocks, axis=1)
     place = find_sensor_data(folder.machine.daq, port)
     return SkewCheck(measure_skew(first, second, rate), rate, device.channels[1], place)

@@ -24,7 +24,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, open_device
+from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, open_device
 from lobewatch.tap.live_curves import find_extremes
 from lobewatch.tap.state import StatePublisher
 
@@ -163,12 +163,7 @@ class _SignalBuffer:
     @property
     def level(self) -> float:
         """RMS about the mean over the newest LEVEL_WINDOW (m/s^2)."""
-        wanted, newest = round(LEVEL_WINDOW * self.rate), list[NDArray[np.int32]]()
-        for codes in reversed(self.codes):
-            newest.insert(0, codes)
-            if sum(part.size for part in newest) >= wanted:
-                break
-        return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
+        return float(np.std(get_newest_codes(self.codes, self.rate)) * abs(self.channel.scale))
 
     def forget(self) -> None:
         """Drop the signal so far."""

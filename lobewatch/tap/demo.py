@@ -24,7 +24,7 @@ from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.tap.device_connection import DeviceConnector
 from lobewatch.tap.emulated_spindle import build_structure, open_synchronized_device
 from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases
+from lobewatch.tap.hit_loop import OperatorRequests, TapPhases
 from lobewatch.tap.state import TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
@@ -176,9 +176,8 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
         folder.locked(),
     ):
         hits = EvaluatedHits(begin_tap(folder, about, resume=False), machine)
-        loop = HitLoop(hits, publisher, OperatorRequests(), guided=False)
         connector = DeviceConnector(folder, open_device, publisher, time.sleep)
-        TapPhases(folder, hits, loop, publisher, guided=False).run(connector)
+        TapPhases(folder, hits, publisher, OperatorRequests(), guided=False).run(connector)
         folder.commit(hits.tap.finish())
     return hits.tap.id
 

@@ -162,7 +162,9 @@ def emulate_machine(
     directions as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no
     spindle, or lacks the sensors of a device that does not describe them itself.
     """
-    built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
+    table, random = get_spindle_table(folder), np.random.default_rng(seed)
+    position = folder.machine.tap.position_mm / 1e3
+    built = build_structure(spindle or table.build(), table.damping_ratio, position)
     structure = _select_direction(built, axes_angle, direction)
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
@@ -200,11 +202,6 @@ def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> Spindl
         cure = "add a [spindle] table (or use folder_files.make_machine_folder.template)"
         raise DataError(f"{folder.toml}: no model to {purpose}: {cure}")
     return folder.machine.spindle
-
-
-def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
-    table = get_spindle_table(folder)
-    return build_structure(replacement or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
 def _select_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:

@@ -45,10 +45,6 @@ class EvaluatedHits:
         """Evaluate a hit, also against the mean if that has enough hits. A good one is then part of the mean."""
         return evaluate_safely(lambda: self._evaluate(hit))
 
-    def add(self, hit: Hit, verdict: HitVerdict) -> None:
-        """Store a hit. It is on the disk when this returns."""
-        self.tap.add(hit, verdict.flags, verdict.text)
-
     def undo(self) -> int | None:
         """Take back the last good hit and return its index. None if there is none."""
         good = [i for i, flags in enumerate(self.tap.flags) if not flags]

@@ -6,7 +6,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from acquisition import Block, DataError, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Trigger
 from lobewatch.machine.folder import MachineFolder
@@ -29,27 +29,14 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
     """Raised when the operator ends the test early. The hits stay stored, and the next test resumes with them."""
 
 
+@dataclass(frozen=True)
 class OperatorRequests:
     """Requests to undo or stop, made by any thread and handled by that of the test."""
 
-    def __init__(self) -> None:
-        self._undos, self._stopping = threading.Semaphore(0), threading.Event()
-
-    def undo(self) -> None:
-        """Request to take back the last good hit. Again: the one before."""
-        self._undos.release()
-
-    def stop(self) -> None:
-        self._stopping.set()
-
-    @property
-    def stopping(self) -> bool:
-        """Whether the test is to end."""
-        return self._stopping.is_set()
-
-    def take_undo(self) -> bool:
-        """Return whether one more hit is to be taken back. Each request counts once."""
-        return self._undos.acquire(blocking=False)
+    undos: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+    """Number of times that the last good hit is to be taken back."""
+    stopping: threading.Event = field(default_factory=threading.Event)
+    """Event that is set when the test is to end."""
 
 
 class HitLoop:
@@ -60,8 +47,7 @@ class HitLoop:
     ) -> None:
         """Set up the loop. guided False omits the curves and the time to take back the last hit."""
         self._hits, self._publisher, self._requests, self._guided = hits, publisher, requests, guided
-        self._verdict = TapStep.TAP
-        self._scan_count = 0
+        self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
 
     def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
@@ -81,9 +67,9 @@ class HitLoop:
 
     def handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
-        if self._requests.stopping:
+        if self._requests.stopping.is_set():
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
-        while self._requests.take_undo():
+        while self._requests.undos.acquire(blocking=False):
             self._undo()
 
     def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
@@ -139,18 +125,16 @@ class HitLoop:
         """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
         verdict = self._hits.evaluate(hit)
         self.show_verdict(verdict.flags, verdict.text)
-        self._hits.add(hit, verdict)
+        self._hits.tap.add(hit, verdict.flags, verdict.text)
         self._publisher.show_hits(self._hits)
         self.show_curves(hit)
-        outlier = None if verdict.flags else self._hits.recheck_first_hits()
-        if outlier is not None:
-            number, verdict_now = outlier
-            reason = f"Hit {number + 1} does not fit the others and counts no more. {verdict_now.text}"
-            self._show_taken_out(verdict_now.flags, reason)
+        if not verdict.flags and (outlier := self._hits.recheck_first_hits()) is not None:
+            number, now = outlier
+            reason = f"Hit {number + 1} does not fit the others and counts no more. {now.text}"
+            self._show_taken_out(now.flags, reason)
 
     def _undo(self, means: str = "") -> None:
-        number = self._hits.undo()
-        if number is not None:
+        if (number := self._hits.undo()) is not None:
             self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
@@ -170,11 +154,17 @@ class TapPhases:
     """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away."""
 
     def __init__(
-        self, folder: MachineFolder, hits: EvaluatedHits, loop: HitLoop, publisher: TapPublisher, *, guided: bool
+        self,
+        folder: MachineFolder,
+        hits: EvaluatedHits,
+        publisher: TapPublisher,
+        requests: OperatorRequests,
+        *,
+        guided: bool,
     ) -> None:
         """Set up the phases. guided False omits re-arming by decay, and the self-check if no trial hits need it."""
-        self._folder, self._hits, self._loop, self._publisher = folder, hits, loop, publisher
-        self._tap, self._guided = hits.tap, guided
+        self._folder, self._hits, self._publisher, self._tap, self._guided = folder, hits, publisher, hits.tap, guided
+        self._loop = HitLoop(hits, publisher, requests, guided=guided)
         self._trial: TrialHits | None = None
 
     def run(self, connector: DeviceConnector) -> None:
@@ -230,13 +220,11 @@ class TapPhases:
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
-        hits = self._loop.hits(connection, self._at_rest(trial.trigger))
-        hit = next(hit for hit in hits if hit is not None)
+        hit = next(filter(None, self._loop.hits(connection, self._at_rest(trial.trigger))))
         verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
-        flags = verdict.flags
-        self._loop.show_verdict(flags, verdict.text or flags.cure or trial.text, trial=True)
+        self._loop.show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
         self._loop.show_curves(hit)
-        return not flags
+        return not verdict.flags
 
     def _take(self, connection: DeviceConnection) -> None:
         trigger = self._tap.trigger

@@ -88,10 +88,7 @@ def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: fl
     """Return remarks on implausible sensitivities and ranges and on old, unknown or impossible calibrations."""
     remarks: list[Remark] = []
     for channel in channels:
-        remarks += channel_remarks(channel)
-        calibration = calibration_remark(channel, today, interval_months)
-        if calibration is not None:
-            remarks.append(calibration)
+        remarks += [*channel_remarks(channel), *filter(None, [calibration_remark(channel, today, interval_months)])]
     return remarks
 
 
@@ -222,13 +219,14 @@ def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
     highest, noise = min(MAX_DECAY_FREQUENCY_RATIO * rate, band), float(np.std(baseline.acceleration))
     detectable = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
     frequency, where = _find_expected_frequency(machine, tool)
+    damping_ratio = float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO
     if frequency is None:
         text = f"{detectable}; whether the mode of this machine lies there nobody says"
         return Check("band", True, text, is_notable=True)
     if frequency > highest:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
         return Check("band", False, f"{detectable}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
-    amplitude = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
+    amplitude = min_decay_amplitude(frequency, damping_ratio, noise / math.sqrt(min(rate / 2, band)))
     needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(amplitude, digits=2)} m/s^2"
     error = f"{needed} tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
     return Check("band", True, f"{detectable}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
@@ -255,7 +253,3 @@ def _find_expected_frequency(machine: Machine, tool: str) -> tuple[float | None,
         band = machine.mode.band_hz
         return (None, "") if band is None else (band[1], "the end of [mode] band_hz")
     return float(natural_frequencies(spindle, machine.mode.model_mode)[-1]), "by the model"
-
-
-def _get_damping_ratio(machine: Machine) -> float:
-    return float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO

@@ -15,7 +15,6 @@ from acquisition import (
     DataError,
     Device,
     DeviceError,
-    Remark,
     TapTest,
     merge_remarks,
     parse_direction,
@@ -31,7 +30,7 @@ from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceConnector, DeviceOpener
 from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases, TapStopped
+from lobewatch.tap.hit_loop import OperatorRequests, TapPhases, TapStopped
 from lobewatch.tap.state import Outcome, ProgramVerdict, TapState, TapStep
 from lobewatch.tap.tap_in_progress import CrossTapResult, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
@@ -111,11 +110,11 @@ class TapSession:
 
     def undo(self) -> None:
         """Take back the last good hit. Again: the one before."""
-        self._requests.undo()
+        self._requests.undos.release()
 
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
-        self._requests.stop()
+        self._requests.stopping.set()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Reject a choice: nothing comes after a single test.
@@ -153,8 +152,8 @@ class TapSession:
                 hits = self._begin()
                 hits.tap.reserve = reserve
                 if hits.missing:
-                    loop = HitLoop(hits, self._publisher, self._requests, guided=self._guided)
-                    TapPhases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
+                    phases = TapPhases(self._folder, hits, self._publisher, self._requests, guided=self._guided)
+                    phases.run(self._connector)
                 reserve.release()
                 return self._finish(hits)
         except TapStopped:
@@ -194,17 +193,12 @@ class TapSession:
             self._measurement = logbook.measurement(tap.id)
             outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            why = _explain_no_result(error, [remark for remark in logbook.remarks if tap.id in remark.about])
+            why = "; ".join(str(remark) for remark in logbook.remarks if tap.id in remark.about) or str(error)
+            if isinstance(error, OSError) and error.errno:
+                why = format_os_error(error)
             raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
-
-
-def _explain_no_result(error: Exception, remarks: Sequence[Remark]) -> str:
-    """Explain why a saved tap test has no result. remarks: on its file."""
-    if isinstance(error, OSError) and error.errno:
-        return format_os_error(error)
-    return "; ".join(map(str, remarks)) or str(error)
 
 
 def _to_operator_error(error: Exception) -> Exception:

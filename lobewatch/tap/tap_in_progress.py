@@ -189,11 +189,10 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 def _remove_committed(folder: MachineFolder) -> None:
     """Remove hits left behind though their tap test is committed. Keep them if its file is damaged."""
     begun = [path for path in folder.spool.iterdir() if path.is_dir()] if folder.spool.is_dir() else []
-    if begun:
-        stored = {entry.id for entry in folder.taps()}
-        for path in begun:
-            if path.name in stored:
-                shutil.rmtree(path, ignore_errors=True)
+    stored = {entry.id for entry in folder.taps()} if begun else set[str]()
+    for path in begun:
+        if path.name in stored:
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _find_interrupted(
@@ -205,8 +204,7 @@ def _find_interrupted(
         if not path.is_dir() or path.name in committed:
             continue
         hits = read_spooled_hits(path, damaged)
-        first = next(hits, None)
-        if first is None:
+        if (first := next(hits, None)) is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
@@ -252,19 +250,16 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     good, wanted = verdicts.count(HitFlags.OK), driving_point_flags.count(HitFlags.OK)
     faults = {flags.words for flags, first in zip(verdicts, driving_point_flags, strict=True) if flags and not first}
     used = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
-    if good < MIN_CROSS_TAP_HITS:
-        return _make_unsaved_result(f"of use are {used}; check the sensor along y")
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
+        if good < MIN_CROSS_TAP_HITS:
+            raise ValueError(f"of use are {used}; check the sensor along y")
         test = average_hits(new_tap_id(about), about, hits, verdicts)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
-        return _make_unsaved_result(format_os_error(error) if isinstance(error, OSError) else str(error))
+        why = format_os_error(error) if isinstance(error, OSError) else str(error)
+        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
     return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {used}.")
-
-
-def _make_unsaved_result(why: str) -> CrossTapResult:
-    return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
 
 
 def _evaluate_cross_hit(hit: Hit) -> HitVerdict:

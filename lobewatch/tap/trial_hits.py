@@ -90,10 +90,11 @@ class TrialHits:
         flags = check_hit(hit) & ~_USABLE_FLAGS
         if flags:
             return flags
-        needed = _choose_record_time(estimate_decay_time(hit), self._setup.pre_trigger_s)
+        needed = self._setup.pre_trigger_s + RECORD_TIME_CONSTANTS * estimate_decay_time(hit)
+        steps = math.ceil(min(needed, MAX_RECORD_TIME) / RECORD_TIME_STEP - 1e-9)
         self._hits.append(hit)
         if self._setup.record_s is None:
-            self._record = max(self._record, needed)
+            self._record = max(self._record, MIN_RECORD_TIME, RECORD_TIME_STEP * steps)
         return flags
 
     def _level(self) -> float:
@@ -101,8 +102,12 @@ class TrialHits:
             return self._setup.trigger_n
         noise = TRIGGER_NOISE_RATIO * float(np.std(self._baseline.signals[0]))
         if not self._hits:
-            return max(noise, FIRST_TRIGGER_RANGE_SHARE * _get_trigger_range(self._baseline))
-        peaks = [_find_trigger_peak(hit, self._offset()) for hit in self._hits]
+            channels = self._baseline.channels
+            return max(noise, FIRST_TRIGGER_RANGE_SHARE * (_get_full_scale(channels[0]) if channels else math.inf))
+        peaks = [
+            float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - self._offset())))
+            for hit in self._hits
+        ]
         level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
         return float(f"{level:.2g}")
 
@@ -111,28 +116,12 @@ class TrialHits:
         return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
 
 
-def _find_trigger_peak(hit: Hit, offset: float) -> float:
-    """Return the largest value of the triggering signal."""
-    return float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - offset)))
-
-
-def _choose_record_time(time_constant: float, before: float) -> float:
-    """Return a record length (s) with enough time constants after its pre-trigger part."""
-    needed = min(before + RECORD_TIME_CONSTANTS * time_constant, MAX_RECORD_TIME)
-    return max(MIN_RECORD_TIME, RECORD_TIME_STEP * math.ceil(needed / RECORD_TIME_STEP - 1e-9))
-
-
 def _format_time_constants(record: float, time_constant: float) -> str:
     if not math.isfinite(time_constant):
         return "the response does not fall in it: is the spindle still?"
     count = record / max(time_constant, 1e-6)
     short = "" if count >= RECORD_TIME_CONSTANTS else f", fewer than {RECORD_TIME_CONSTANTS}"
     return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
-
-
-def _get_trigger_range(hit: Hit) -> float:
-    """Return the largest value of the triggering channel (N or m/s^2)."""
-    return _get_full_scale(hit.channels[0]) if hit.channels else float("inf")
 
 
 def _get_full_scale(channel: Channel) -> float:

@@ -166,17 +166,10 @@ class DataqInfo:
 
     model: str
     """Model, a key of DATAQ_RANGES, e.g. "4108"."""
-    serial: str
-    """Serial number."""
-    firmware: str
-    """Firmware version, as the device writes it."""
     dividend: int
     """Dividend of the rate formula (Hz)."""
-
-    @property
-    def identity(self) -> DeviceIdentity:
-        """Identity in the form common to all devices."""
-        return DeviceIdentity(f"DI-{self.model}", self.serial, self.firmware)
+    identity: DeviceIdentity
+    """Identity in the form common to all devices."""
 
 
 class DataqCommandLink:
@@ -223,7 +216,8 @@ class DataqCommandLink:
                 raise ValueError(f"maker {maker!r} is not DATAQ")
             if not serial:
                 raise ValueError("it names no serial number, by which its measured sample rate is known again")
-            return DataqInfo(parse_model(model), serial[:8], firmware, int(dividend))
+            model = parse_model(model)
+            return DataqInfo(model, int(dividend), DeviceIdentity(f"DI-{model}", serial[:8], firmware))
         except ValueError as error:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
 

@@ -158,12 +158,12 @@ class DataqSource(ClosedOnExit):
         return DeviceError(text, "switch it off and on and give the same command again")
 
     def _identify(self) -> DataqInfo:
-        identity = self._commands.identify()
-        version = protocol.parse_firmware(identity.firmware)
+        device = self._commands.identify()
+        version = protocol.parse_firmware(device.identity.firmware)
         if version is not None and version < protocol.MIN_FIRMWARE_VERSION:
             remedy = f"{protocol.MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool"
-            raise DeviceError(f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}", remedy)
-        return identity
+            raise DeviceError(f"the DI-{device.model} on {self._link.port} has firmware {version:.2f}", remedy)
+        return device
 
     def _configure(self, device: DataqInfo, inputs: Sequence[SensorInput], wanted: float) -> float:
         """Configure the device and return the resulting sample rate (Hz)."""

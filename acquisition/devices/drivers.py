@@ -43,10 +43,6 @@ class SensorDataLocation:
     """Name of a skew (s) there."""
 
 
-def accept_any_settings(settings: DeviceSettings) -> None:
-    """Accept all settings."""
-
-
 def skip_serial_probe(_link: SerialLink) -> DeviceIdentity | None:
     """Probe no serial port: for a driver whose devices are on none.
 
@@ -79,7 +75,7 @@ class Driver:
     """Function that asks once who answers on an open link, None if no device of this kind does.
     `skip_serial_probe` for devices on no serial port.
     """
-    check: Callable[[DeviceSettings], None] = accept_any_settings
+    check: Callable[[DeviceSettings], None] = lambda _: None
     """Function that raises ValueError for settings that no device of this kind supports. Its sensors are checked
     already.
     """
@@ -160,12 +156,6 @@ def _open_text_board(port: str, settings: DeviceSettings) -> Device:
     return TextBoardSource(port, settings.inputs, settings.sample_rate, settings.printing)
 
 
-def _check_text_board(settings: DeviceSettings) -> None:
-    from acquisition.text_boards import check_text_board
-
-    check_text_board(settings.inputs, settings.sample_rate)
-
-
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.text_boards import TextBoardEmulator
 
@@ -193,6 +183,7 @@ def _make_library_driver(name: str, title: str) -> Driver:
     )
 
 
+_check_text_board = _import_when_called("text_boards", "check_text_board")
 BUILT_IN_DRIVERS = (
     Driver(
         "taps",
@@ -218,7 +209,7 @@ BUILT_IN_DRIVERS = (
         "a board that prints lines of numbers",
         _open_text_board,
         _import_when_called("text_boards", "probe_text_board"),
-        _check_text_board,
+        lambda settings: _check_text_board(settings.inputs, settings.sample_rate),
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,

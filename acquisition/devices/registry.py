@@ -78,7 +78,8 @@ def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
 
 def driver_failure_remark(name: str, text: str) -> Remark:
     """Return the remark on a driver whose package fails."""
-    return make_unusable_remark(Driver, name, f"the package {_find_package(name)} {text}")
+    package = " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
+    return make_unusable_remark(Driver, name, f"the package {package} {text}")
 
 
 @contextmanager
@@ -105,11 +106,6 @@ def convert_driver_errors(name: str, doing: str, kind: type[DeviceError | DataEr
         raise
     except PLUGIN_ERRORS as error:
         raise kind(str(driver_failure_remark(name, f"fails when {doing} ({format_exception_line(error)})"))) from error
-
-
-def _find_package(name: str) -> str:
-    """Return the package that brings a driver."""
-    return " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
 
 
 def _load_driver(name: str) -> Driver | Remark:
@@ -196,7 +192,6 @@ def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
         needed = 'each that is tapped along needs its own direction = "x" or "y" in [[daq.channel]]'
         raise ValueError(f"{len(directions)} channels of acceleration: {needed}")
     numbers = [sensor.number for sensor in settings.inputs]
-    for second, number in enumerate(numbers):
-        if (first := numbers.index(number)) < second:
-            text = f"channel {second + 1}: input={number} is that of channel {first + 1}; each sensor needs its own"
-            raise ValueError(text)
+    for second, number in enumerate(numbers, 1):
+        if (first := numbers.index(number) + 1) < second:
+            raise ValueError(f"channel {second}: input={number} is that of channel {first}; each sensor needs its own")

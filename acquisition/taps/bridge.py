@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -56,23 +57,14 @@ class TapsBridge:
         number: int = 0,
     ) -> None:
         self._open, self._tell, self._address = open_device, tell, address
-        self._device = open_device()
-        self._stopping = False
-        try:
-            self._listen(number)
-        except OSError:
-            self._device.close()
-            raise
-
-    @property
-    def port(self) -> str:
-        """Port that the host opens."""
-        return self._wire.port
-
-    @property
-    def device(self) -> Device:
+        self.device, self._stopping = open_device(), False
         """Device, as opened last."""
-        return self._device
+        with ExitStack() as cleanup:
+            cleanup.callback(self.device.close)
+            self._wire = TcpWire(number, address)
+            cleanup.pop_all()
+        self.port = self._wire.port
+        """Port that the host opens."""
 
     def stop(self) -> None:
         """End `run`, from another thread."""
@@ -83,28 +75,25 @@ class TapsBridge:
         try:
             while not self._stopping:
                 try:
-                    _BridgeSession(self._device, self._wire).serve(lambda: self._stopping)
+                    _BridgeSession(self.device, self._wire).serve(lambda: self._stopping)
                 except DeviceError as error:
                     self._wire.close()
-                    self._device.close()
+                    self.device.close()
                     self._tell(str(error))
                     self._wait()
         finally:
             self._wire.close()
-            self._device.close()
-
-    def _listen(self, number: int) -> None:
-        self._wire = TcpWire(number, self._address)
+            self.device.close()
 
     def _wait(self) -> None:
         """Wait until the device is back."""
         while not self._stopping:
             time.sleep(REOPEN_INTERVAL)
             try:
-                self._device = self._open()
+                self.device = self._open()
             except DeviceError:
                 continue
-            self._listen(int(self.port.rpartition(":")[2]))
+            self._wire = TcpWire(int(self.port.rpartition(":")[2]), self._address)
             self._tell("the device is back")
             return
 

@@ -13,7 +13,7 @@ import time
 import zlib
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -93,8 +93,8 @@ class DeviceStatus:
 
     def encode(self) -> bytes:
         """Encode the body."""
-        numbers = (self.samples_taken, self.samples_sent, self.buffer_peak_percent, self.overruns)
-        return _STATUS_BODY.pack(*numbers, round(self.temperature * 100))
+        *counts, temperature = astuple(self)
+        return _STATUS_BODY.pack(*counts, round(temperature * 100))
 
     @classmethod
     def decode(cls, body: bytes) -> DeviceStatus:
@@ -135,9 +135,8 @@ def decode_frame(encoded: bytes) -> Frame | None:
         raw = cobs.decode(encoded)
     except cobs.DecodeError:
         return None
-    if not _FRAME_HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != int.from_bytes(
-        raw[-4:], "little"
-    ):
+    crc = int.from_bytes(raw[-4:], "little")
+    if not _FRAME_HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != crc:
         return None
     kind, flags, session, seq = _FRAME_HEADER.unpack_from(raw)
     return Frame(kind, seq, bytes(raw[_FRAME_HEADER.size : -4]), session, flags)
@@ -191,10 +190,8 @@ def decode_data(body: bytes) -> Block:
 
 
 def _decode_words(samples: bytes, bits: int) -> Codes:
-    if bits == 16:
-        return np.frombuffer(samples, "<i2").astype(np.int32)
-    if bits == 32:
-        return np.frombuffer(samples, "<i4").astype(np.int32)
+    if bits != 24:
+        return np.frombuffer(samples, f"<i{bits // 8}").astype(np.int32)
     packed = np.frombuffer(samples, np.uint8).reshape(-1, 3)
     words = np.zeros((len(packed), 4), np.uint8)
     words[:, 1:] = packed
@@ -248,15 +245,10 @@ class EventLog:
 
     def fault(self, channels: Mapping[int, Channel]) -> str:
         """Describe the active faults in one sentence, empty if there are none. channels: by their i in INFO."""
-        return "; ".join(
-            _FAULT_TEXTS[EventKind(event.kind)].format(_sensor_name(event, channels)) for event in self._standing
-        )
-
-
-def _sensor_name(event: Event, channels: Mapping[int, Channel]) -> str:
-    if event.channel is None:
-        return "force or acceleration"
-    return channels[event.channel].quantity if event.channel in channels else f"(channel {event.channel})"
+        names: dict[int | None, str] = {number: channel.quantity for number, channel in channels.items()}
+        names[None] = "force or acceleration"
+        standing = [(event.kind, names.get(event.channel, f"(channel {event.channel})")) for event in self._standing]
+        return "; ".join(_FAULT_TEXTS[EventKind(kind)].format(name) for kind, name in standing)
 
 
 class TapsServer:

@@ -130,6 +130,8 @@ class TapsSource(ClosedOnExit):
         self._frames: deque[Frame] = deque()
         self._seq = 0
         self._events = EventLog()
+        self.events: deque[Event] = self._events.new
+        """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
         self._stream: ScanStream | None = None
         self._streaming = False
         self.status: DeviceStatus | None = None
@@ -143,11 +145,6 @@ class TapsSource(ClosedOnExit):
         except BaseException:
             self._link.close()
             raise
-
-    @property
-    def events(self) -> deque[Event]:
-        """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
-        return self._events.new
 
     @property
     def fault(self) -> str:
@@ -213,7 +210,10 @@ class TapsSource(ClosedOnExit):
         try:
             info = json.loads(body)
             channels = _parse_channels(info)
-            info["fs_choices"] = _check_rates(info["fs_choices"])
+            rates = [float(rate) for rate in info["fs_choices"]]
+            if not rates or not all(0 < rate < float("inf") for rate in rates):
+                raise ValueError(f"fs_choices={info['fs_choices']} are no sample rates > 0")
+            info["fs_choices"] = rates
             for key in ("model", "serial"):
                 if not info[key]:
                     raise ValueError(f"{key} is empty; the measured sample rate is kept by it")
@@ -272,13 +272,6 @@ class TapsSource(ClosedOnExit):
             text = frame.body[6:].decode(errors="replace")
             raise DeviceError(f"the DAQ on {self._link.port} refuses a command: {text}")
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
-
-
-def _check_rates(choices: list[float]) -> list[float]:
-    rates = [float(rate) for rate in choices]
-    if not rates or not all(0 < rate < float("inf") for rate in rates):
-        raise ValueError(f"fs_choices={choices} are no sample rates > 0")
-    return rates
 
 
 def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:

@@ -39,8 +39,7 @@ def search_ljm() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_ljm` takes, empty if the library is not installed.
     """
-    library = library_device.find_library("labjack.ljm")
-    if library is None:
+    if (library := library_device.find_library("labjack.ljm")) is None:
         return []
     constants = library.constants
     names = {constants.dtT7: "LabJack T7", constants.dtT8: "LabJack T8"}

@@ -39,8 +39,7 @@ def search_mcc172() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_mcc172` takes, empty if the library is not installed.
     """
-    library = library_device.find_library("daqhats")
-    if library is None:
+    if (library := library_device.find_library("daqhats")) is None:
         return []
     boards, identity = library.hat_list(filter_by_id=library.HatIDs.MCC_172), DeviceIdentity("MCC 172")
     return [DeviceAddress(f"mcc172:{board.address}", identity, f"{board.product_name}, 2 inputs") for board in boards]
@@ -146,8 +145,7 @@ def search_uldaq() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_uldaq` takes, empty if the library is not installed.
     """
-    library = library_device.find_library("uldaq")
-    if library is None:
+    if (library := library_device.find_library("uldaq")) is None:
         return []
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
     return [DeviceAddress(f"uldaq:{box.unique_id}", _read_uldaq_identity(box), box.product_name) for box in devices]

@@ -6,14 +6,14 @@ import contextlib
 import enum
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Block, Channel, DataError, Description, Device, DeviceError
+from acquisition.arrays import Codes
 from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
@@ -133,18 +133,15 @@ class _SignalBuffer:
     channel: Channel
     row: int
     rate: float
-
-    def __post_init__(self) -> None:
-        self.codes: list[NDArray[np.int32]] = []
-        self.marks: list[tuple[int, int]] = []
-        self.count = 0
-        self.received = 0
+    codes: list[Codes] = field(default_factory=list)
+    marks: list[tuple[int, int]] = field(default_factory=list)
+    count: int = 0
+    received: int = 0
 
     def add(self, block: Block) -> None:
         """Keep a block and drop what is too old."""
         codes = block.codes[self.row]
-        overloaded = bool(block.overload >> self.row & 1)
-        if block.lost_before or overloaded:
+        if block.lost_before or block.overload >> self.row & 1:
             self.marks.append((self.received, block.lost_before or -1))
         self.codes.append(codes)
         self.received, self.count = self.received + codes.size, self.count + codes.size
@@ -187,7 +184,11 @@ def record_cut(
     is awaited. publish: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
     detected in time, DeviceError if the sensor is dead.
     """
-    buffer, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+    row = next((i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"), None)
+    if row is None:
+        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
+    buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
+    waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
     show(BEGIN_CUT_TEXT)
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
@@ -204,13 +205,6 @@ def record_cut(
             publish(**waiting, cut_seconds=None)
     cure = "begin to listen with the spindle turning in air, then cut, or give more record_cut.time_limit"
     raise DataError(f"no cut was heard in {time_limit:g} s; {cure}")
-
-
-def _make_buffer(device: Device) -> _SignalBuffer:
-    rows = [i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"]
-    if not rows:
-        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
-    return _SignalBuffer(device.channels[rows[0]], rows[0], device.sample_rate)
 
 
 def _iterate_signals(device: Device, buffer: _SignalBuffer, time_limit: float, publish: Publish) -> Iterator[CutSignal]:

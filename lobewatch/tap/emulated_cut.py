@@ -11,16 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import Driver, EmulatorThread, SensorInput, Structure
-from acquisition.emulation import (
-    Housing,
-    HousingSignal,
-    MillingCut,
-    Passage,
-    SignalFunction,
-    make_random_housing,
-    simulate_cut,
-)
+from acquisition import Driver, EmulatorThread, SensorInput, Structure, emulation
+from acquisition.emulation import MillingCut, Passage, SignalFunction
 from dsm import Spindle
 from lobes import Cut, Program, program_limit
 from lobewatch.cuts.learning.prior_samples import ROTATING_FORCE_PRIOR
@@ -126,10 +118,13 @@ def emulate_cut(
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
-    motion, housing = simulate_cut(cut, passage), _normalize_gain(make_random_housing(random, cut.speed_rpm))
+    motion, housing = (
+        emulation.simulate_cut(cut, passage),
+        _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm)),
+    )
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
-        return map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
+        return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
 
     device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
     return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
@@ -146,7 +141,7 @@ def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spind
     return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
 
 
-def _normalize_gain(housing: Housing) -> Housing:
+def _normalize_gain(housing: emulation.Housing) -> emulation.Housing:
     """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
     largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
     return replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))

@@ -16,6 +16,7 @@ from lobewatch.machine import Machine
 from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
+from lobewatch.tap.trial_hits import CHANNEL_UNITS
 
 QUIET_PIECE_TIME = 0.01
 """Length of the pieces by which a quiet part is found (s)."""
@@ -180,11 +181,8 @@ def _check_spindle(baseline: Hit) -> Check:
 
 
 def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:
-    if baseline.channels is None:
-        return []
-    units = {"force": "N", "acceleration": "m/s^2"}
-    pairs = zip(baseline.channels, baseline.signals, strict=True)
-    return [(channel, signal, units[channel.quantity]) for channel, signal in pairs]
+    pairs = zip(baseline.channels or (), baseline.signals, strict=True)
+    return [(channel, signal, CHANNEL_UNITS[channel.quantity]) for channel, signal in pairs]
 
 
 def _check_disk(free: int) -> Check:

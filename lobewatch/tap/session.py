@@ -84,6 +84,8 @@ class TapSession:
         self._publisher, self._requests = TapPublisher(first, clock), OperatorRequests()
         self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
+        self.wakes = self._publisher.wakes
+        """Functions called after every change by the thread of the test. None may take time."""
         self.unasked: Sequence[str] = ()
         """Codes of `accept` that the finished test does not ask."""
         self.saved: Sequence[str] = ()
@@ -95,11 +97,6 @@ class TapSession:
     def state(self) -> TapState:
         """Newest state of the test, replaced and never changed."""
         return self._publisher.state
-
-    @property
-    def wakes(self) -> set[Callable[[], None]]:
-        """Functions called after every change by the thread of the test. None may take time."""
-        return self._publisher.wakes
 
     @property
     def measurement(self) -> Measurement:
@@ -236,8 +233,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
 
 
 def _format_values(measurement: Measurement, series: SeriesStatus | None) -> list[str]:
-    mode = measurement.followed
-    if mode is None:
+    if (mode := measurement.followed) is None:
         return []
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "first test of this tool and direction"

@@ -30,14 +30,8 @@ from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
-from lobewatch.tap.spool import (
-    MAX_RESUME_AGE,
-    SpooledHit,
-    clean_spool,
-    read_spooled_hits,
-    read_spooled_trigger,
-    write_setup,
-)
+from lobewatch.tap import spool
+from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
 
 
@@ -152,7 +146,7 @@ class TapInProgress:
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
         make_folder(self.folder)
         if not self.hits and self.trigger is not None:
-            write_setup(self.folder, self.trigger)
+            spool.write_setup(self.folder, self.trigger)
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
@@ -176,7 +170,7 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     DataError if the journal is damaged.
     """
     folder.refuse_damage()
-    clean_spool(folder)
+    spool.clean_spool(folder)
     _remove_committed(folder)
     damaged, not_resumed = list[Path](), list[str]()
     interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
@@ -203,13 +197,13 @@ def _find_interrupted(
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
             continue
-        hits = read_spooled_hits(path, damaged)
+        hits = spool.read_spooled_hits(path, damaged)
         if (first := next(hits, None)) is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if resume and newest is None and same and circumstances.created - about.created < MAX_RESUME_AGE:
-            newest = TapInProgress(path.name, about, path, trigger=read_spooled_trigger(path, damaged))
+        if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
+            newest = TapInProgress(path.name, about, path, trigger=spool.read_spooled_trigger(path, damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)

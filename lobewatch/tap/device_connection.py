@@ -7,21 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from acquisition import (
-    Block,
-    Device,
-    DeviceError,
-    Event,
-    EventKind,
-    FileSource,
-    Hit,
-    Remark,
-    SensorDataLocation,
-    Source,
-    find_driver,
-    find_usb_identity,
-    find_usb_port,
-)
+import acquisition
+from acquisition import Block, Device, DeviceError, Hit, find_driver, find_usb_identity
 from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
 from acquisition.devices import convert_driver_errors
@@ -51,7 +38,7 @@ class DeviceOpener:
     def open(self) -> Device:
         """Open as `open_device` does. DeviceError while the USB device is absent: no other at its port is touched."""
         if self._identity is not None and find_usb_identity(self._port) != self._identity:
-            if (port := find_usb_port(*self._identity)) is None:
+            if (port := acquisition.find_usb_port(*self._identity)) is None:
                 number = self._identity[1]
                 raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in", "plug it in")
             self._port = port
@@ -66,12 +53,12 @@ def open_device(daq: DaqTable, port: str) -> Device:
     Raises DeviceError if there is no device, DataError for a file without hits.
     """
     if port.startswith(REPLAY_PREFIX):
-        return FileSource(port.removeprefix(REPLAY_PREFIX))
+        return acquisition.FileSource(port.removeprefix(REPLAY_PREFIX))
     with convert_driver_errors(daq.driver, f"opening {port}"):
         return find_driver(daq.driver).open(port, daq.settings)
 
 
-def find_sensor_data(daq: DaqTable, port: str) -> SensorDataLocation | None:
+def find_sensor_data(daq: DaqTable, port: str) -> acquisition.SensorDataLocation | None:
     """Return the location of the sensor data in the device on a port, None if machine.toml has them."""
     return None if port.startswith(REPLAY_PREFIX) else find_driver(daq.driver).sensor_data
 
@@ -110,7 +97,7 @@ def collect_codes(blocks: Iterable[Block], count: float) -> tuple[Codes, int]:
 class LiveSignal:
     """Newest samples of force and acceleration, or of the acceleration only."""
 
-    def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+    def __init__(self, source: acquisition.Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
         """Select the inputs. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
         self.inputs = TapInputs.select(source.channels, quantity, direction)
         """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
@@ -156,12 +143,12 @@ class Button:
         self._bounce = BUTTON_BOUNCE_TIME * sample_rate
         self._moved: int | None = None
 
-    def count_presses(self, events: deque[Event]) -> int:
+    def count_presses(self, events: deque[acquisition.Event]) -> int:
         """Take all waiting events and count the presses in them."""
         count = 0
         while events:
             event = events.popleft()
-            if event.kind == EventKind.BUTTON:
+            if event.kind == acquisition.EventKind.BUTTON:
                 count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
                 self._moved = event.scan
         return count
@@ -253,7 +240,7 @@ class DeviceConnector:
         """Measure the sample rate of a device that this machine does not know yet."""
         if has_clock(device) and find_stored_rate(self._folder, device) is None:
             self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
-        remarks = list[Remark]()
+        remarks = list[acquisition.Remark]()
         check_device_rate(self._folder, device, remarks=remarks)
         if remarks:
             self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))

@@ -118,10 +118,8 @@ def emulate_cut(
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
-    motion, housing = (
-        emulation.simulate_cut(cut, passage),
-        _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm)),
-    )
+    motion = emulation.simulate_cut(cut, passage)
+    housing = _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm))
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
@@ -150,26 +148,26 @@ def _normalize_gain(housing: emulation.Housing) -> emulation.Housing:
 def _build_true_cut(
     folder: MachineFolder, setting: CutSetting, at_rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
 ) -> MillingCut:
-    coefficients = folder.machine.coefficients(setting.table)
+    coefficients, cut = folder.machine.coefficients(setting.table), setting.cut
     edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
-    edges = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS)
+    tangential_edge, radial_edge = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS).tolist()
     feed = setting.table.feed_per_tooth_mm or DEFAULT_FEED_SHARE * setting.table.tool_diameter_mm
     return MillingCut(
-        teeth=setting.cut.teeth,
-        entry_angle=setting.cut.entry_angle,
-        exit_angle=setting.cut.exit_angle,
-        tangential=setting.cut.tangential * truth.tangential,
-        radial=setting.cut.radial * truth.tangential,
-        tangential_edge=float(edges[0]),
-        radial_edge=float(edges[1]),
+        teeth=cut.teeth,
+        entry_angle=cut.entry_angle,
+        exit_angle=cut.exit_angle,
+        tangential=cut.tangential * truth.tangential,
+        radial=cut.radial * truth.tangential,
+        tangential_edge=tangential_edge,
+        radial_edge=radial_edge,
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
         speed_rpm=setting.speed_rpm * truth.speed,
         x=truth.x.apply_to(at_rest),
         y=truth.y.apply_to(at_rest),
         runout=runout,
-        helix_lag=setting.cut.helix_lag,
-        pitch=setting.cut.pitch,
+        helix_lag=cut.helix_lag,
+        pitch=cut.pitch,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )
 

@@ -12,22 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from acquisition import (
-    CROSS_TAP,
-    Block,
-    Channel,
-    DataError,
-    Driver,
-    EmulationSetup,
-    EmulatorThread,
-    HammeredStructure,
-    Hammering,
-    SensorInput,
-    Structure,
-    TapDirection,
-    TapsEmulator,
-    TapsSource,
-)
+import acquisition
+from acquisition import CROSS_TAP, Driver, HammeredStructure, SensorInput, Structure, TapDirection, TapsEmulator
 from acquisition.emulation import SignalFunction
 from dsm import Spindle, modes_at, static_stiffness
 from lobewatch.arrays import Floats
@@ -39,8 +25,8 @@ EMULATED_MODES = 8
 EMULATED_SAMPLE_RATE = 25600.0
 """Sample rate of the device (Hz)."""
 EMULATED_CHANNELS = (
-    Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
-    Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
+    acquisition.Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
+    acquisition.Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
 )
 """Channels of a 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
 SECOND_AXIS_FREQUENCY_SHIFT = 0.05
@@ -55,7 +41,7 @@ HOST_WAIT_TIME = 0.2
 class EmulatedMachine:
     """Emulated device and the true values of its first mode."""
 
-    device: EmulatorThread
+    device: acquisition.EmulatorThread
     """Emulator that serves while its context lasts."""
     frequency: float
     """True natural frequency of the first mode (Hz)."""
@@ -86,12 +72,10 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
         raise ValueError(f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: {text}")
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
-    return Structure(
-        frequency=np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible]),
-        damping_ratio=np.tile(spindle.damping_ratio, len(visible)),
-        stiffness=np.concatenate([spindle.stiffness * stiff / share for share, stiff in visible]),
-        residual=sum(spindle.residual * share / stiff for share, stiff in visible),
-    )
+    frequency = np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible])
+    stiffness = np.concatenate([spindle.stiffness * stiff / share for share, stiff in visible])
+    residual = sum(spindle.residual * share / stiff for share, stiff in visible)
+    return Structure(frequency, np.tile(spindle.damping_ratio, len(visible)), stiffness, residual)
 
 
 def set_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
@@ -103,20 +87,20 @@ def make_emulator(
     structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False
 ) -> TapsEmulator:
     """Make a TAPS/1 device on a structure that is tapped again and again."""
-    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering())
+    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random)
     return TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=realtime, tcp=tcp)
 
 
 @contextmanager
 def open_synchronized_device(
     structure: Structure, random: np.random.Generator, *, tcp: bool = False
-) -> Iterator[Callable[[], TapsSource]]:
+) -> Iterator[Callable[[], acquisition.TapsSource]]:
     """Serve a tapped structure on a TAPS/1 device that waits for its host. Yields the function that opens it.
 
     Device and host work in turns: two threads that work at once switch the interpreter at each step, and the reader of
     a port would collect data during the evaluation of a hit, most of which would be discarded.
     """
-    hammered, requested = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
+    hammered, requested = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random), threading.Semaphore()
 
     def signal(first_scan: int, n_scans: int) -> Floats:
         requested.acquire(timeout=HOST_WAIT_TIME)
@@ -126,7 +110,7 @@ def open_synchronized_device(
         yield lambda: _SynchronizedSource(device.port, requested)
 
 
-class _SynchronizedSource(TapsSource):
+class _SynchronizedSource(acquisition.TapsSource):
     """Source that requests a block when the previous one is processed. Its frames are longer than usual."""
 
     _frame_time = 0.06
@@ -135,7 +119,7 @@ class _SynchronizedSource(TapsSource):
         super().__init__(port)
         self._wanted = requested
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[acquisition.Block]:
         for block in super().blocks():
             yield block
             self._wanted.release()
@@ -170,37 +154,37 @@ def emulate_machine(
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
         cross = [_select_cross_direction(built, axes_angle, direction)] if is_crossed else []
-        return map_signal_to_inputs(inputs, HammeredStructure(structure, rate, random, Hammering(), cross), direction)
+        hammered = HammeredStructure(structure, rate, random, cross_structures=cross)
+        return map_signal_to_inputs(inputs, hammered, direction)
 
     device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
+InputsSignal = Callable[[Sequence[SensorInput], float], SignalFunction]
+"""Function that returns the signal function of sensors at a sample rate (Hz)."""
+
+
 def emulate_device(
-    folder: MachineFolder,
-    driver: Driver,
-    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
-    *,
-    realtime: bool,
-    tcp: bool,
-) -> EmulatorThread:
+    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, *, realtime: bool, tcp: bool
+) -> acquisition.EmulatorThread:
     """Make an emulated device of this kind. signal_of: function of its sensors and sample rate (Hz).
 
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
-        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
+        raise acquisition.DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     inputs = get_emulated_inputs(folder, driver)
     has_clock = folder.machine.daq.digital_clock
     signal_at = partial(signal_of, inputs)
-    return driver.emulate(EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock))
+    return driver.emulate(acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock))
 
 
 def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
     """Return [spindle] of machine.toml. DataError if there is none."""
     if folder.machine.spindle is None:
         cure = "add a [spindle] table (or use folder_files.make_machine_folder.template)"
-        raise DataError(f"{folder.toml}: no model to {purpose}: {cure}")
+        raise acquisition.DataError(f"{folder.toml}: no model to {purpose}: {cure}")
     return folder.machine.spindle
 
 
@@ -244,5 +228,5 @@ def get_emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorIn
     inputs = folder.machine.daq.settings.inputs
     if not inputs:
         cure = f'give driver = "{driver.name}" in [daq] and two [[daq.channel]] (docs/devices.md shows them)'
-        raise DataError(f"{folder.toml}: no sensors to emulate: {cure}")
+        raise acquisition.DataError(f"{folder.toml}: no sensors to emulate: {cure}")
     return inputs

@@ -154,17 +154,11 @@ class TapPhases:
     """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away."""
 
     def __init__(
-        self,
-        folder: MachineFolder,
-        hits: EvaluatedHits,
-        publisher: TapPublisher,
-        requests: OperatorRequests,
-        *,
-        guided: bool,
+        self, folder: MachineFolder, hits: EvaluatedHits, publisher: TapPublisher, asked: OperatorRequests, guided: bool
     ) -> None:
         """Set up the phases. guided False omits re-arming by decay, and the self-check if no trial hits need it."""
         self._folder, self._hits, self._publisher, self._tap, self._guided = folder, hits, publisher, hits.tap, guided
-        self._loop = HitLoop(hits, publisher, requests, guided=guided)
+        self._loop = HitLoop(hits, publisher, asked, guided=guided)
         self._trial: TrialHits | None = None
 
     def run(self, connector: DeviceConnector) -> None:
@@ -192,10 +186,8 @@ class TapPhases:
         signal, months = connection.signal, machine.daq.calibration_interval_months
         baseline = find_quiet_part(signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION))
         self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
-        checks = [
-            *self._publisher.state.checks,
-            *_run_guarded_checks(baseline, trigger.level if trigger else None, free),
-        ]
+        checks = [*self._publisher.state.checks]
+        checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
         checks.append(check_calibration(signal.inputs.channels, months))
         if not baseline.has_force:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))

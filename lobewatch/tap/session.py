@@ -7,18 +7,8 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
 
-from acquisition import (
-    CROSS_TAP,
-    UNKNOWN_CONDITIONS,
-    Circumstances,
-    Conditions,
-    DataError,
-    Device,
-    DeviceError,
-    TapTest,
-    merge_remarks,
-    parse_direction,
-)
+import acquisition
+from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, TapTest
 from acquisition.errors import PERMISSION_ERRNOS, format_os_error
 from dsm import format_with_error
 from lobewatch.logbook import Logbook
@@ -217,7 +207,8 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     standing = logbook.status(measurement.time)
     series = standing.series_of(measurement.tool, measurement.direction)
     questions = find_open_questions(measurement.remarks)
-    remarks = [*(remark for remark in measurement.remarks if remark not in questions), *merge_remarks(standing.remarks)]
+    remarks = [remark for remark in measurement.remarks if remark not in questions]
+    remarks += acquisition.merge_remarks(standing.remarks)
     remarks += [remark for remark in logbook.remarks if remark.code not in STATUS_BY_CODE]
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
     texts += [f"{remark.finding}." for remark in remarks]
@@ -258,7 +249,7 @@ def plan_session(
     operator: str = "",
     resume: bool = True,
     accept: Sequence[str] = (),
-    conditions: Conditions = UNKNOWN_CONDITIONS,
+    conditions: Conditions = acquisition.UNKNOWN_CONDITIONS,
 ) -> TapSession:
     """Plan a session of today. machine.toml supplies what is left empty.
 
@@ -295,7 +286,7 @@ def plan_session(
     port = port or machine.daq.port
     if not port:
         raise ValueError(f"no port: give plan_session.port, or port in [daq] of {folder.toml}")
-    tool, wanted = tool or machine.tap.tool, parse_direction(direction)
+    tool, wanted = tool or machine.tap.tool, acquisition.parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
     conditions = conditions.with_defaults(machine.tap.conditions(tool))

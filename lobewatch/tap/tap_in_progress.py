@@ -11,20 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import (
-    CROSS_TAP,
-    Channel,
-    Circumstances,
-    Hit,
-    HitFlags,
-    HitVerdict,
-    TapTest,
-    Trigger,
-    estimate_frf,
-    evaluate_hit,
-    new_tap_id,
-    write_hit,
-)
+import acquisition
+from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, TapTest, evaluate_hit, write_hit
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
@@ -68,7 +56,7 @@ class TapInProgress:
     """Number of each hit in the name of its file."""
     n_resumed: int = 0
     """Number of hits that an interrupted test already had."""
-    trigger: Trigger | None = None
+    trigger: acquisition.Trigger | None = None
     """Trigger settings of its hits, None until chosen."""
     baseline: Hit | None = None
     """Record at rest, None before the self-check."""
@@ -93,7 +81,7 @@ class TapInProgress:
             for i, (hit, flags, reason) in hits
         )
 
-    def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
+    def accept_device(self, sample_rate: float, channels: tuple[acquisition.Channel, ...], description: str) -> None:
         """Note the set-up of the coming hits. ValueError if earlier hits have another one."""
         earlier = self.hits[-1] if self.hits else self.baseline
         if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
@@ -153,7 +141,7 @@ class TapInProgress:
 def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
     """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
     good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
-    frf = estimate_frf(good) if good[0].has_force else None
+    frf = acquisition.estimate_frf(good) if good[0].has_force else None
     return TapTest(tap_id, about, frf, tuple(replace(hit, cross_hit=None) for hit in hits), tuple(flags))
 
 
@@ -174,7 +162,7 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     _remove_committed(folder)
     damaged, not_resumed = list[Path](), list[str]()
     interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
-    tap_id = new_tap_id(circumstances)
+    tap_id = acquisition.new_tap_id(circumstances)
     tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
     tap.damaged, tap.not_resumed = damaged, not_resumed
     return tap
@@ -248,7 +236,7 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     try:
         if good < MIN_CROSS_TAP_HITS:
             raise ValueError(f"of use are {used}; check the sensor along y")
-        test = average_hits(new_tap_id(about), about, hits, verdicts)
+        test = average_hits(acquisition.new_tap_id(about), about, hits, verdicts)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
         why = format_os_error(error) if isinstance(error, OSError) else str(error)

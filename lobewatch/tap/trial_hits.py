@@ -104,10 +104,8 @@ class TrialHits:
         if not self._hits:
             channels = self._baseline.channels
             return max(noise, FIRST_TRIGGER_RANGE_SHARE * (_get_full_scale(channels[0]) if channels else math.inf))
-        peaks = [
-            float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - self._offset())))
-            for hit in self._hits
-        ]
+        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset()) for hit in self._hits]
+        peaks = [float(np.max(signal)) for signal in signals]
         level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
         return float(f"{level:.2g}")
 

@@ -12,8 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -123,29 +122,6 @@ class EmulationSetup:
     """Whether a square wave is on digital input 0."""
 
 
-class Wire(Protocol):
-    """Emulator's end of the cable, without blocking."""
-
-    port: str
-    """Port that the host opens."""
-    pending: bytearray
-    """Bytes waiting to be sent."""
-
-    def exchange(self, timeout: float) -> bytes:
-        """Send what fits of `pending` and return what has arrived.
-
-        Parameters
-        ----------
-        timeout
-            Longest time to wait (s).
-        """
-        ...
-
-    def close(self) -> None:
-        """Hang up."""
-        ...
-
-
 class PtyWire:
     """Pseudo-terminal in raw mode.
 
@@ -175,7 +151,9 @@ class PtyWire:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
+        """Port that the host opens."""
         self.pending = bytearray()
+        """Bytes waiting to be sent."""
         if link is not None:
             link.unlink(missing_ok=True)
             link.symlink_to(self.port)
@@ -219,7 +197,9 @@ class TcpWire:
         self._host: socket.socket | None = None
         host = f"[{address}]" if ":" in address else address
         self.port = f"socket://{host}:{self._listener.getsockname()[1]}"
+        """Port that the host opens."""
         self.pending = bytearray()
+        """Bytes waiting to be sent."""
 
     @property
     def has_host(self) -> bool:
@@ -265,6 +245,10 @@ class TcpWire:
             self._host = None
 
 
+Wire = PtyWire | TcpWire
+"""Emulator's end of the cable, without blocking."""
+
+
 class EmulatorThread(ABC):
     """Thread that serves one end of a wire, whose other end opens like a real port. A context manager.
 
@@ -287,9 +271,7 @@ class EmulatorThread(ABC):
         self.serve()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.unplug()
 
     def plug_in(self) -> None:

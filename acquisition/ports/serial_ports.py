@@ -85,17 +85,17 @@ def list_serial_ports() -> list[PortInfo]:
     list of PortInfo
         Ports, sorted by name.
     """
-    ports = sorted(comports())
     return [
-        PortInfo(port.device, port.vid, port.pid, port.serial_number or "", port.description or "") for port in ports
+        PortInfo(port.device, port.vid, port.pid, port.serial_number or "", port.description or "")
+        for port in sorted(comports())
     ]
 
 
+_PLUG_IN = "plug the DAQ in and"
 NO_PORTS_REMEDIES = {
-    "linux": "plug the DAQ in and look at the last lines of `sudo dmesg`; hand it through to a container or "
-    "virtual machine",
-    "darwin": "plug the DAQ in and look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
-    "win32": "plug the DAQ in and look under Ports (COM & LPT) of the Device Manager",
+    "linux": f"{_PLUG_IN} look at the last lines of `sudo dmesg`; hand it through to a container or virtual machine",
+    "darwin": f"{_PLUG_IN} look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
+    "win32": f"{_PLUG_IN} look under Ports (COM & LPT) of the Device Manager",
 }
 """Remedy by sys.platform."""
 

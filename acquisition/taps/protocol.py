@@ -24,7 +24,7 @@ from acquisition.channel import Block, Channel
 from acquisition.source import DeviceIdentity, Event, EventKind
 
 if TYPE_CHECKING:
-    from acquisition.emulation import Wire
+    from acquisition.emulation.emulated_device import Wire
 
 MAX_FRAME = 8192
 """Longest decoded frame (bytes)."""

@@ -170,10 +170,9 @@ def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -
         The sample rate is missing, or the inputs are no columns.
     """
     if sample_rate is None:
-        raise ValueError(
-            'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '
-            "lines a second that it was made for: it is measured against the clock"
-        )
+        text = 'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate'
+        cure = "give the number of lines a second that it was made for: it is measured against the clock"
+        raise ValueError(f"{text}; {cure}")
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
         before = ", ".join(map(str, range(len(inputs) - 1)))
         last = f"the inputs {before} and {len(inputs) - 1}" if before else "input 0, and there is one alone"

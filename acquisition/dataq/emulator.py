@@ -119,19 +119,16 @@ class DataqEmulator(EmulatorThread):
             self._start()
 
     def serve_once(self) -> bool:
-        lines, self._received = protocol.split_lines(self._received + self.wire.exchange(self._wait_time()))
+        wait = 0.05
+        if self.streaming:
+            wait = 0.002 if self._realtime or not self._has_room() else 0.0
+        lines, self._received = protocol.split_lines(self._received + self.wire.exchange(wait))
         for line in [] if self._faults.ignores_commands else lines:
             self._execute(line)
         if self.streaming:
             self._stream()
         limit = self._faults.unplug_after
         return limit is None or not self.streaming or self._scan < limit
-
-    def _wait_time(self) -> float:
-        """Return how long to wait for the host (s)."""
-        if not self.streaming:
-            return 0.05
-        return 0.002 if self._realtime or not self._has_room() else 0.0
 
     def _execute(self, line: str) -> None:
         if self.streaming:

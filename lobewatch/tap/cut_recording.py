@@ -18,7 +18,7 @@ from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
 from lobewatch.arrays import Floats
-from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_detection import find_cuts
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
@@ -192,12 +192,13 @@ def record_cut(
     show(BEGIN_CUT_TEXT)
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
-        if _has_ended(parts, signal) and parts.reason:
+        has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT
+        if has_ended and parts.reason:
             buffer.forget()
             show(CUT_TOO_SHORT_TEXT)
             waiting = {"word": CutStep.AGAIN, "reason": f"{CUT_TOO_SHORT_TEXT.capitalize()}."}
             publish(**waiting, cut_seconds=None)
-        elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > MAX_CUT_SECONDS):
+        elif not parts.reason and (has_ended or parts.end - parts.begin > MAX_CUT_SECONDS):
             return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
         elif np.isfinite(parts.begin):
             publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
@@ -234,10 +235,6 @@ def _check_sensor_signal(buffer: _SignalBuffer) -> None:
     if np.ptp(codes) == 0:
         cure = "is it plugged in, on the housing, and the spindle turning?"
         raise DeviceError("the accelerometer hears nothing at all", cure)
-
-
-def _has_ended(parts: CutParts, signal: CutSignal) -> bool:
-    return bool(np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT)
 
 
 def acquire_cut(

@@ -52,6 +52,8 @@ class TrialHits:
         """Begin without hits. baseline: a record at rest."""
         self._setup, self._baseline = setup, baseline
         self._hits: list[Hit] = []
+        self._offset = float(np.mean(baseline.acceleration)) if setup.quantity == "acceleration" else 0.0
+        """Value at rest from which the trigger level counts. The acceleration may include gravity."""
         self._record = setup.record_s or MIN_RECORD_TIME
 
     @property
@@ -60,7 +62,7 @@ class TrialHits:
         rate = self._baseline.sample_rate
         samples = round(self._record * rate)
         before, quantity = round(self._setup.pre_trigger_s * rate), self._setup.quantity
-        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset())
+        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset)
 
     @property
     def is_done(self) -> bool:
@@ -104,14 +106,10 @@ class TrialHits:
         if not self._hits:
             channels = self._baseline.channels
             return max(noise, FIRST_TRIGGER_RANGE_SHARE * (_get_full_scale(channels[0]) if channels else math.inf))
-        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset()) for hit in self._hits]
+        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset) for hit in self._hits]
         peaks = [float(np.max(signal)) for signal in signals]
         level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
         return float(f"{level:.2g}")
-
-    def _offset(self) -> float:
-        """Return the value at rest from which the trigger level counts. The acceleration may include gravity."""
-        return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
 
 
 def _format_time_constants(record: float, time_constant: float) -> str:

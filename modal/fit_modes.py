@@ -132,9 +132,7 @@ def modes_from_band(
         _mode_from_fit(fit, i, covariance, beyond.degrees_of_freedom, scatter, n_hits)
         for i in range(fit.frequency.size)
     ]
-    return [
-        assess_mode(state, band, i, replace(mode, method=_method_text(state, band))) for i, mode in enumerate(modes)
-    ]
+    return [assess_mode(state, band, i, replace(m, method=_method_text(state, band))) for i, m in enumerate(modes)]
 
 
 def _mode_from_fit(

@@ -111,9 +111,7 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floa
             ways.append(_likelihood_profile(problem, best, log_covariance, index, felt < LOW_ENERGY_SHARE))
         except ArithmeticError:
             ways.append(None)
-    falling = [
-        state.log_factor for way in ways if way is not None for side in way.sides() for state in _lower_points(side)
-    ]
+    falling = [state.log_factor for way in ways if way is not None for s in way.sides() for state in _lower_points(s)]
     rivals = []
     for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
@@ -205,9 +203,7 @@ def _likelihood_profile(
             ends = low, high
     if not far:
         return Profile(ends, ((), ()))
-    below, above = (
-        tuple(_extend_profile(problem, best, end, fixed, side)) for side, end in zip((-1, 1), ends, strict=True)
-    )
+    below, above = (tuple(_extend_profile(problem, best, end, fixed, s)) for s, end in zip((-1, 1), ends, strict=True))
     return Profile(ends, (below, above))
 
 

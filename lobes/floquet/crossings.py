@@ -94,9 +94,7 @@ class _DepthSteps:
 
 
 def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
-    return _DepthSteps(
-        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_DepthSteps))
-    )
+    return _DepthSteps(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(_DepthSteps)))
 
 
 def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:

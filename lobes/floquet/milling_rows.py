@@ -106,9 +106,7 @@ def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:
     MillingRows
         Rows of both.
     """
-    columns: dict[str, Any] = {
-        name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING_FIELDS
-    }
+    columns: dict[str, Any] = {n: np.concatenate((getattr(first, n), getattr(second, n))) for n in _VARYING_FIELDS}
     return replace(first, **columns)
 
 

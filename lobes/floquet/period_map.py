@@ -261,9 +261,7 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
     apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
     cutting = [segment for segment in segments if segment.forces is not None]
     starts = np.hstack([segment.starts[apart] for segment in cutting])
-    lengths = np.hstack(
-        [np.repeat(segment.angle[apart, np.newaxis], segment.starts.shape[1], 1) for segment in cutting]
-    )
+    lengths = np.hstack([np.repeat(s.angle[apart, np.newaxis], s.starts.shape[1], 1) for s in cutting])
     forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=4)
     met = regenerated_surfaces(rows.cut.delays, sum(rows.cut.pitch_pattern), starts, lengths, forces)
     pieces = list[UnevenPiece]()

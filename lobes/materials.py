@@ -91,9 +91,8 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
     ratio = _force_ratios().get(vdi) or _force_ratios()[row["iso_group"]]
     tangential = np.mean([f.tangential(REFERENCE_CHIP_THICKNESS) for f in forces] + [t.tangential for t in tests])
-    edge = np.mean(
-        [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces] + [test.tangential_edge for test in tests]
-    )
+    edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
+    edge = np.mean(edges + [test.tangential_edge for test in tests])
     return CuttingCoefficients(
         material=row["material"],
         tangential=float(tangential),

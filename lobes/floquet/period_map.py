@@ -283,10 +283,8 @@ def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Flo
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
     at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_nodes().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
-    frame, coefficients = (
-        feed_rotation(rows.feed_angle)[..., rows.axes],
-        np.stack((rows.tangential, rows.radial), axis=1),
-    )
+    frame = feed_rotation(rows.feed_angle)[..., rows.axes]
+    coefficients = np.stack((rows.tangential, rows.radial), axis=1)
     by_share = np.einsum("rc,rmi,rnj->rcmnij", coefficients, frame, frame).reshape(len(rows), 8, -1)
     matrix = shares.reshape(*shares.shape[:2], -1, 8) @ by_share
     matrix = matrix.reshape(*matrix.shape[:2], *at.shape[1:], *[rows.axes.size] * 2)

@@ -10,28 +10,6 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-FIELD_OPTIONS = """
-    Circumstances.direction Circumstances.tool Conditions.reclamped CutEntry.at=date
-    CutEntry.chatter_frequency_hz=frequency CutEntry.has_chatter=chatter Description.averages Description.columns
-    Description.date Description.date_pattern Description.decimal Description.direction Description.force
-    Description.force_unit Description.full_scale Description.pulses Description.quantity Description.rate
-    Description.response Description.sensitivity Description.sensor Description.skip Description.spacing
-    Description.start Description.tacho Description.unit EmulationSetup.tcp LobeChart.source MaintenanceEvent.time=date
-    ModeEdits.add ModeEdits.drop ModeEdits.fix MountingVariation.bad_share=bad-clampings MountingVariation.scatter
-    MountingVariation.temperature_swing=temperature ProgramTable.depth_mm=depth ProgramTable.direction
-    ProgramTable.feed_per_tooth_mm=feed-per-tooth ProgramTable.material ProgramTable.name=save
-    ProgramTable.radial_depth_mm=radial ProgramTable.speed_rpm=speed ProgramTable.teeth ProgramTable.tool
-    ProgramTable.tool_diameter_mm=diameter ScreenServer.listen SeriesStatus.direction SeriesStatus.tool Window.hit_at
-    Window.start=window-start Window.time_constant=window Workers.jobs Workers.scheduler accept_questions.codes=accept
-    accept_settings.keys=accept acknowledge_alarms.until acquire_cut.file acquire_cut.port add_event.new_baseline
-    build_power_reading.power_kw=power calibrate_joints.mode calibrate_joints.tools=tool choose_cut.cut
-    choose_cut.program compare_lobes.cut compute_lobe_chart.method evaluate_requested.names=program
-    exclude_entry.reason find_setup_question.name=edit fit_file_modes.accept fit_file_modes.conjugate
-    list_comparison_files.beside plan_session.port record_cut.time_limit=seconds rotate_structure.degrees=askew
-    rotate_structure.direction screen.ScreenServer=screen store_recordings.keep_going
-"""
-"""Fields with the name of their option where it is another one."""
-_ENTRIES = (entry.partition("=") for entry in FIELD_OPTIONS.split())
 OPTION_NAMES: Mapping[str, str] = {
     "accept_questions.codes": "--accept",
     "accept_settings.keys": "--accept",
@@ -55,11 +33,33 @@ OPTION_NAMES: Mapping[str, str] = {
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
     "CutEntry.has_chatter": "--chatter",
+    "Description.averages": "--averages",
+    "Description.columns": "--columns",
+    "Description.date": "--date",
+    "Description.date_pattern": "--date-pattern",
+    "Description.decimal": "--decimal",
+    "Description.direction": "--direction",
+    "Description.force": "--force",
+    "Description.force_unit": "--force-unit",
+    "Description.full_scale": "--full-scale",
+    "Description.pulses": "--pulses",
+    "Description.quantity": "--quantity",
+    "Description.rate": "--rate",
+    "Description.response": "--response",
+    "Description.sensitivity": "--sensitivity",
+    "Description.sensor": "--sensor",
+    "Description.skip": "--skip",
+    "Description.spacing": "--spacing",
+    "Description.start": "--start",
+    "Description.tacho": "--tacho",
+    "Description.unit": "--unit",
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
     "EmulationSetup.tcp": "--tcp",
     "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",
+    "exclude_entry.reason": "--reason",
+    "find_setup_question.name": "--edit",
     "fit_file_modes": "lobewatch modes",
     "fit_file_modes.accept": "--accept",
     "fit_file_modes.conjugate": "--conjugate",
@@ -81,6 +81,9 @@ OPTION_NAMES: Mapping[str, str] = {
     "make_machine_folder": "lobewatch init",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "modal.synthesize_frf": "lobewatch modes --figure",
+    "ModeEdits.add": "--add",
+    "ModeEdits.drop": "--drop",
+    "ModeEdits.fix": "--fix",
     "MountingVariation.bad_share": "--bad-clampings",
     "MountingVariation.scatter": "--scatter",
     "MountingVariation.temperature_swing": "--temperature",

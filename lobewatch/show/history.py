@@ -132,9 +132,9 @@ def history_json(logbook: Logbook) -> JsonObject:
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": list(map(EXCLUDED_FIELDS, logbook.files.excluded)),
-        "events": list(map(event_json, logbook.files.events)),
-        "acknowledged": list(map(acknowledgement_json, logbook.files.acknowledgements)),
-        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.cuts],
+        "events": list(map(event_json, logbook.files.contents.events)),
+        "acknowledged": list(map(acknowledgement_json, logbook.files.contents.acknowledgements)),
+        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.contents.cuts],
     }
 
 
@@ -201,7 +201,7 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
         shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
         kind = "excluded" if cut["excluded"] else "cut"
         entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
-    for ack in logbook.files.acknowledgements:
+    for ack in logbook.files.contents.acknowledgements:
         text, time = f"{ack.alarm_id}: {ack}", _utc_text(ack.time)
         entries.append({"kind": "ack", "id": ack.alarm_id, "time": time, "text": text})
     return sorted(entries, key=lambda entry: entry["time"])

@@ -168,7 +168,7 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     if len(estimates) < MIN_TAPS_FOR_VALUE:
         return None
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
-    events = [(event.time, event.text) for event in data.analysis.files.events if event.time >= since]
+    events = [(event.time, event.text) for event in data.analysis.files.contents.events if event.time >= since]
     numbers = [estimate.value / value.scale for _, estimate in estimates]
     low, high = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]

@@ -52,8 +52,10 @@ def make_events(data: ReportData) -> list[Section]:
     """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
     files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
-    lines = [(item.time, f"{item.text}{' (new baseline)' if item.new_baseline else ''}") for item in files.events]
-    lines += [(word.time, f"{word.alarm_id} {word}") for word in files.acknowledgements]
+    lines = [
+        (item.time, f"{item.text}{' (new baseline)' if item.new_baseline else ''}") for item in files.contents.events
+    ]
+    lines += [(word.time, f"{word.alarm_id} {word}") for word in files.contents.acknowledgements]
     for row in data.excluded_rows:
         value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
         lines.append((row.time, f"tap test excluded ({reasons[row.tap_id]}){value}"))

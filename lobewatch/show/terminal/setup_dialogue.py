@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
-from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS
-from lobewatch.machine.setup_questions.sensor_questions import DAQ_QUESTION
+from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
 from lobewatch.show.terminal.output import notes
 
 

@@ -73,8 +73,6 @@ class SimulatedSource(ClosedOnExit):
     """False, as scans come as fast as they are read."""
     loss_detection = ""
     """Empty: no scans can be lost."""
-    fault = ""
-    """Empty: the source has no faults."""
 
     def __init__(
         self, signal: SignalFunction, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
@@ -86,6 +84,11 @@ class SimulatedSource(ClosedOnExit):
         self.events: deque[Event] = deque()
         """Events, to be added by the test."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
+
+    @property
+    def fault(self) -> str:
+        """Empty: the source has no faults."""
+        return ""
 
     def start(self) -> None:
         """Start: nothing to prepare."""

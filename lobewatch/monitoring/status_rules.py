@@ -135,25 +135,15 @@ def _rules_of(*codes: str) -> list[StatusRule]:
 
 
 STATUS_RULES = (
-    FREQUENCY_ALARM,
-    FREQUENCY_DECAY,
-    PROGRAM_NOT_STABLE,
-    UNREADABLE,
-    NEVER_TAPPED,
+    *(FREQUENCY_ALARM, FREQUENCY_DECAY, PROGRAM_NOT_STABLE, UNREADABLE, NEVER_TAPPED),
     *_rules_of("journal-damaged", "tap-damaged", "tap-unreadable", "tap-unlisted"),
     *_rules_of("file-damaged", "cut-damaged", "cut-unlisted"),
-    FREQUENCY_WARNING,
-    DOUBTFUL_DECAY,
+    *(FREQUENCY_WARNING, DOUBTFUL_DECAY),
     *_rules_of("frequency-jump"),
     MODE_LOST,
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of(*CLOCK_QUESTIONS, "tap-in-future"),
-    OVERDUE,
-    PROGRAM_UNKNOWN,
-    PROGRAM_DOUBTFUL,
-    FREQUENCY_ROSE,
-    VALUE_CHANGED,
-    ONE_DIRECTION,
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
@@ -162,6 +152,11 @@ LIMIT_CODES = {rule.code for rule in STATUS_RULES if rule.is_limit}
 """Codes with which an alarm is not early."""
 UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
 """Next step of a machine that cannot be read."""
+
+
+def is_alarm(remark: Remark) -> bool:
+    """Return whether a remark is an alarm."""
+    return STATUS_BY_CODE[remark.code] is StatusLevel.ALARM
 
 
 def unreadable_remark(reason: str) -> Remark:

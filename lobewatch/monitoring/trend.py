@@ -106,11 +106,8 @@ class Trend:
     @cached_property
     def forecast(self) -> Forecast | None:
         """Forecast over days since 1970; None below 8 points."""
-        return (
-            None
-            if self.past_fit is None
-            else self.past_fit.forecast(float(self.past_fit.dates[-1]) + FORECAST_HORIZON_DAYS)
-        )
+        past = self.past_fit
+        return None if past is None else past.forecast(float(past.dates[-1]) + FORECAST_HORIZON_DAYS)
 
     @cached_property
     def likeliest_shape(self) -> TrendShape | None:
@@ -191,9 +188,11 @@ def fit_trend(
     now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
-    points = _newest_points(series)
+    points, past = _newest_points(series), None
     readings = _build_readings(points, _newest_points(other) if other else (), known)
-    return Trend(points, series[0].value, readings, _fit_points(points, readings), int(days_since_epoch(now)))
+    if len(points) >= MIN_FORECAST_POINTS:
+        past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
+    return Trend(points, series[0].value, readings, past, int(days_since_epoch(now)))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
@@ -224,12 +223,6 @@ def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
     """Return 100 ln of each value over the first."""
     log, first = math.log, values[0] if values else 1.0
     return tuple([100 * log(value / first) for value in values])
-
-
-def _fit_points(points: Sequence[TrendPoint], readings: Readings) -> PastFit | None:
-    if len(points) < MIN_FORECAST_POINTS:
-        return None
-    return fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
 
 
 def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], known: SeriesScatterPrior) -> Readings:

@@ -57,20 +57,5 @@ WORKPIECE = UncertaintyCause(
     "support it and take thin = true out, or find the depth by test cuts",
 )
 
-UNCERTAINTY_CAUSES = {
-    cause.name: cause
-    for cause in (
-        TAP_TEST,
-        CLAMPING,
-        PREDICTION,
-        UNTAPPED,
-        TEST_CUTS,
-        CROSS,
-        SPEED,
-        COEFFICIENTS,
-        WEAR,
-        QUESTION,
-        WORKPIECE,
-    )
-}
+UNCERTAINTY_CAUSES = {cause.name: cause for cause in tuple(globals().values()) if isinstance(cause, UncertaintyCause)}
 """All causes by name; an unknown name is a KeyError."""

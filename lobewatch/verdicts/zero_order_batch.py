@@ -120,11 +120,8 @@ class ZeroOrderBatch:
             grid = refine_frequency_grid(grid, cut, teeth)
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            limit, frequency = (
-                find_uneven_limits(grid, loop, cut, teeth)
-                if cut.pitch
-                else _find_even_limits(grid, loop, teeth, deepest)
-            )
+            uneven = find_uneven_limits(grid, loop, cut, teeth) if cut.pitch else None
+            limit, frequency = uneven or _find_even_limits(grid, loop, teeth, deepest)
             chatter = np.where(limit < depth, frequency, chatter)
             depth = np.minimum(limit, depth)
         return depth, chatter
@@ -162,10 +159,8 @@ class ZeroOrderBatch:
             both = h[:, 0, 1] + h[:, 1, 0]
             trace, dtrace = trace + both * gxy, dtrace + both * dxy
             minor, dminor = minor - product * gxy**2, dminor - 2 * product * gxy * dxy
-        return (
-            1 + gain * trace + gain**2 * minor,
-            dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor,
-        )
+        slope = dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor
+        return 1 + gain * trace + gain**2 * minor, slope
 
     @property
     def _is_rotated(self) -> bool:
@@ -268,11 +263,8 @@ def _unwrap(angle: Floats) -> Floats:
 def is_force_constant(cut: Cut) -> bool:
     """Return whether the force is constant over the turn, so that the mean force is exact."""
     force = interval_forces(cut, 64)[0]
-    return (
-        not cut.pitch
-        and cut.helix_lag == 0
-        and bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
-    )
+    is_even = bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
+    return is_even and not cut.pitch and cut.helix_lag == 0
 
 
 def _unit_mean_forces(cut: Cut) -> tuple[Floats, Floats]:

@@ -161,9 +161,9 @@ class ShapeFits:
 
 def fit_shapes(base: LevelModel, at: Floats) -> list[ShapeFits]:
     """Fit the shapes of one, two and three columns."""
-    drawn = (partial(build_columns, span=float(at[-1])), build_pair_columns, build_triple_columns)
-    shapes = (list_single_shapes(at), list_pair_shapes(at), list_triple_shapes(at))
-    return [_fit_shapes(base, at, *kind) for kind in zip(shapes, drawn, strict=True)]
+    single = _fit_shapes(base, at, list_single_shapes(at), partial(build_columns, span=float(at[-1])))
+    pairs = _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
+    return [single, pairs, _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)]
 
 
 def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], drawn: ColumnBuilder) -> ShapeFits:

@@ -111,20 +111,15 @@ def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTa
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
 """What an alternative is good for."""
-CUT_REMEDIES = (
-    "a shorter stick-out: tap it again with it",
-    "another tool: a thicker one, or with fewer teeth",
-    "a smaller radial depth",
-)
+NEW_TOOL_REMEDIES = "a shorter stick-out: tap it again with it", "another tool: a thicker one, or with fewer teeth"
+CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "a smaller radial depth")
 """What makes a cut safe that is not, in verdicts."""
-TOOL_SPEED_REMEDIES = (
-    "a smaller diameter",
-    "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
-)
+TOOL_DATA_REMEDY = "tool_material and cutting_speed_m_min in its [[tool]], where it bears more"
+TOOL_SPEED_REMEDIES = ("a smaller diameter", TOOL_DATA_REMEDY)
 """What makes a tool one that the spindle is slow enough for ..."""
 MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """... where max_speed_rpm holds it down."""
-FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
+FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_DATA_REMEDY)
 """... or where a program is set to run at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
@@ -226,17 +221,17 @@ def _recommend_setting(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
     """Build the recommendation of a setting, evaluated as a program."""
-    case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
-    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": result.samples.cuts[0].direction}
-    program = msgspec.structs.replace(table, **at)
+    case, (speed, depth) = search.case, (setting.speed_rpm, setting.depth_mm)
+    result = search.results[speed, depth]
+    milled = result.samples.cuts[0].direction
+    program = msgspec.structs.replace(table, speed_rpm=speed, depth_mm=depth, direction=milled)
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
-        return Recommendation(table, search.case.any_direction, reason=reason, alternatives=others)
+        return Recommendation(table, case.any_direction, reason=reason, alternatives=others)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
-    return Recommendation(
-        program, search.case.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
-    )
+    feed = _feed_range(search, table)
+    return Recommendation(program, case.any_direction, setting, verdict, "", (), others, feed, remarks)
 
 
 def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
@@ -277,4 +272,4 @@ def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, 
     probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)
     verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))
+    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES))

@@ -242,7 +242,7 @@ class SettingSearch:
         depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
         program = sample_program(self.case.at(speed, depth_mm))
-        limit = program.median.limit
+        limit = program.worst.limit.limit
         if limit < depth * (1 + MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
         grown = program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)

@@ -260,9 +260,6 @@ def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange,
     if median.tangential_range is None or median.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
         return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
-    force, ratio = median.tangential, median.radial / median.tangential
-    tangential, direction = (
-        (limit / force for limit in median.tangential_range),
-        (limit / ratio for limit in median.ratio_range),
-    )
-    return FactorRange(*tangential), FactorRange(*direction)
+    ratio = median.radial / median.tangential
+    tangential = FactorRange(*(limit / median.tangential for limit in median.tangential_range))
+    return tangential, FactorRange(*(limit / ratio for limit in median.ratio_range))

@@ -157,9 +157,8 @@ def _build_parts(
     step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
     first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
-    entry, leaving = _find_entry_and_exit(
-        power[slice(*stretch)], MAX_PAUSE_TIME * sample_rate / step, MAX_ENTRY_TIME * sample_rate / step
-    )
+    pause, most = MAX_PAUSE_TIME * sample_rate / step, MAX_ENTRY_TIME * sample_rate / step
+    entry, leaving = _find_entry_and_exit(power[slice(*stretch)], pause, most)
     steady = max(first, begin + step + entry * step), last - leaving * step
     if steady[1] - steady[0] >= longest:
         first, last = steady
@@ -206,14 +205,10 @@ def _loudness(power: Floats) -> Floats:
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
     half_window = N_QUIET_PIECES // 2
-    quiet = int(
-        np.argmin(
-            scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)[half_window:-half_window]
-        )
-    )
-    least = np.minimum(
-        np.quantile(smooth, MIN_AIR_SHARE, axis=0), np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)
-    )
+    level = scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)
+    quiet = int(np.argmin(level[half_window:-half_window]))
+    quietest = np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)
+    least = np.minimum(np.quantile(smooth, MIN_AIR_SHARE, axis=0), quietest)
     return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
 
 
@@ -245,7 +240,6 @@ def _has_knock(signal: Floats, step: int) -> bool:
     """Whether single pieces stand out of those around them: a hammer, a dropped part."""
     count = signal.size // step
     peak = np.max(np.abs(signal[: count * step].reshape(count, step)), axis=1)
-    wide = np.lib.stride_tricks.sliding_window_view(
-        np.pad(peak, N_KNOCK_NEIGHBORS, mode="reflect"), 2 * N_KNOCK_NEIGHBORS + 1
-    )
+    padded = np.pad(peak, N_KNOCK_NEIGHBORS, mode="reflect")
+    wide = np.lib.stride_tricks.sliding_window_view(padded, 2 * N_KNOCK_NEIGHBORS + 1)
     return bool(np.any(peak > KNOCK_PEAK_RATIO * np.quantile(wide, KNOCK_PEAK_QUANTILE, axis=1)))

@@ -93,9 +93,8 @@ class SpectralPeaks:
 
     def frequency_error(self, bin_width: float) -> Floats:
         """Return the standard error of each frequency (Hz), shape (n,); bin_width: of the spectrum (Hz)."""
-        return np.asarray(
-            bin_width * np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR)
-        )
+        error = np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR)
+        return np.asarray(bin_width * error)
 
 
 def compute_spectrum(signal: Floats, sample_rate: float) -> Spectrum:
@@ -138,9 +137,8 @@ def remove_skirts(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:
 
 def join_peaks(axes: Sequence[SpectralPeaks]) -> SpectralPeaks:
     """Join the peaks of several axes."""
-    return SpectralPeaks(
-        *(np.concatenate([getattr(peaks, name) for peaks in axes]) for name in ("frequency", "amplitude", "clearness"))
-    )
+    parts = zip(*((peaks.frequency, peaks.amplitude, peaks.clearness) for peaks in axes), strict=True)
+    return SpectralPeaks(*map(np.concatenate, parts))
 
 
 def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPeaks:

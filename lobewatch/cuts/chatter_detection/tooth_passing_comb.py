@@ -56,7 +56,8 @@ def find_comb(
     """
     peaks = peaks.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
-    for images in (_folded_images(peaks, sample_rate)[:1], *([_folded_images(peaks, sample_rate)] if few else [])):
+    folded = _folded_images(peaks, sample_rate)
+    for images in (folded[:1], folded) if few else (folded[:1],):
         best = _find_best_comb(peaks, images, bin_width, frequency, tolerance)
         if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
             return _comb_speed(best, peaks, bin_width)
@@ -77,9 +78,8 @@ def find_distant_comb(
         if comb is None or comb.share < MIN_COMB_SHARE:
             continue
         order = np.round(peaks.frequency / comb.frequency).astype(int)
-        common = int(
-            np.gcd.reduce(order[np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width])
-        )
+        is_near = np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width
+        common = int(np.gcd.reduce(order[is_near]))
         ranked = round(comb.share, 1), common == teeth, comb.frequency
         if common and teeth % common == 0 and ranked > rank:
             best, rank = comb, ranked
@@ -228,9 +228,9 @@ def find_comb_by_sum(
     between = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
     rarest = MAX_COMB_CHANCE if np.mean(levels) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
     likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / tolerance, 1.0)
-    if SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, above[between]) > rarest or _is_partial_comb(
-        levels, above[between], teeth
-    ):
+    noise = above[between]
+    chance = SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, noise)
+    if chance > rarest or _is_partial_comb(levels, noise, teeth):
         return None
     weak = join_peaks([find_peaks(spectrum, WEAK_PEAK_POWER) for spectrum in spectra])
     return refine_comb(float(tried[best]), weak[weak.frequency < (highest + 0.5) * tried[best]], first.bin_width)
@@ -241,9 +241,8 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):
         above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
-        above[spectrum.power <= MAX_AIR_POWER_RATIO * quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)] = (
-            0.0
-        )
+        power = quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)
+        above[spectrum.power <= MAX_AIR_POWER_RATIO * power] = 0.0
         total += np.clip(above, 0.0, MAX_HARMONIC_LEVEL)
     return total / len(spectra)
 
@@ -251,18 +250,15 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
 def _is_partial_comb(levels: Floats, values: Floats, teeth: int) -> bool:
     """Return whether the harmonics share an order that the teeth do not: the comb belongs to another frequency."""
     orders = np.arange(1, levels.size + 1)
-    return any(
-        _sum_chance(levels[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
-    )
+    parts = [part for part in orders[1:] if teeth % part]
+    return any(_sum_chance(levels[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in parts)
 
 
 def _sum_chance(levels: Floats, values: Floats) -> float:
     """Return how often random values have a sum as large."""
     count, level = levels.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
-    share = (
-        np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)
-        / values.size
-    )
+    places = np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int)
+    share = np.bincount(places, minlength=level.size) / values.size
     louder = np.maximum(np.cumsum(share[::-1])[::-1], np.exp(-(10 ** (MIN_HARMONIC_LEVEL + level))))
     share = np.append(1.0, louder[1:]) - np.append(louder[1:], 0.0)
     size = N_SUM_LEVELS * count + 1

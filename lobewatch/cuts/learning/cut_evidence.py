@@ -42,9 +42,8 @@ class PowerEvidence:
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
     """Estimate Kt from the drive power of a cut in a material."""
     of_edges = power.edge_share / (1 + power.edge_share)
-    common = math.hypot(
-        DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
-    )
+    edge_spread = EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD
+    common = math.hypot(DRIVE_POWER_SPREAD, edge_spread * of_edges)
     median, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
     return PowerEvidence(power.tangential / cut.tangential / median, common, math.hypot(POWER_READING_SPREAD, scatter))
 

@@ -184,9 +184,8 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
-        _, loudest = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond]).fastest_growth(
-            rows.speed_rpm[beyond], cut.depth
-        )
+        unstable = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond])
+        _, loudest = unstable.fastest_growth(rows.speed_rpm[beyond], cut.depth)
         frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
     teeth = 1 / rows.tooth_period
     base, at_limit = (fold_frequency(part, teeth) for part in (frequency, at_limit))
@@ -206,9 +205,8 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
     if cut.has_frequency:
         at_limit = ZeroOrderBatch.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
-    return CutPrediction(
-        excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), np.pi - angle < FLIP_ANGLE_TOLERANCE
-    )
+    is_flip = np.pi - angle < FLIP_ANGLE_TOLERANCE
+    return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), is_flip)
 
 
 class ExpectedChatter(NamedTuple):

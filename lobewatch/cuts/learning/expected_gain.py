@@ -59,9 +59,8 @@ class CutGrid:
 def list_speeds(low: float, high: float) -> Floats:
     """List the speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
     number = max(int(np.log(high / low) / SPEED_GRID_STEP) + 1, 2)
-    return np.unique(
-        np.clip(np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM, low, high)
-    )
+    speeds = np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM
+    return np.unique(np.clip(speeds, low, high))
 
 
 def floor_depth(depth: float) -> float:
@@ -127,18 +126,14 @@ class LimitCharts:
         """Compute the limits of samples at speed."""
         rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
-        fed = [
-            ZeroOrderBatch.of(rows.with_feed_angle(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles
-        ]
+        batches = (ZeroOrderBatch.of(rows.with_feed_angle(angle)) for angle in grid.feed_angles)
+        fed = [batch.limits(grid.speeds, deepest) for batch in batches]
         worst = np.argmin([limit for limit, _ in fed], axis=0)[np.newaxis]
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True))
         limit = np.minimum(limit * grid.zero_order_trust, grid.max_depths)
         order = np.argsort(-limit, axis=0, kind="stable")
-        depth = (
-            np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING)
-            * TRIED_DEPTH_STEP_MM
-            / 1e3
-        )
+        steps = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING)
+        depth = steps * TRIED_DEPTH_STEP_MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
         teeth = grid.cut.repeats_per_turn * grid.speeds / 60
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
@@ -154,12 +149,8 @@ class LimitCharts:
     def is_label_wrong(self, cut: CutEvidence) -> Flags:
         """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
-        excess = np.log(cut.depth / self.limits[:, row])
-        return np.asarray(
-            excess < -MAX_LABEL_DEVIATION * LIMIT_SPREAD
-            if cut.has_chatter
-            else excess > MAX_LABEL_DEVIATION * LIMIT_SPREAD
-        )
+        excess = np.log(cut.depth / self.limits[:, row]) * (-1 if cut.has_chatter else 1)
+        return np.asarray(excess > MAX_LABEL_DEVIATION * LIMIT_SPREAD)
 
     def expected_gains(self, weights: Floats, best: float | Floats) -> Floats:
         """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
@@ -178,20 +169,15 @@ class LimitCharts:
     def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
         """Yield candidate speeds, by their place, and depths (m)."""
         gains = self.expected_gains(np.full(len(self.limits), 1 / len(self.limits)), best)
-        places = list[int]()
+        places, speeds = list[int](), self.grid.speeds
         for row in np.argsort(-gains).tolist():
-            if all(
-                abs(np.log(self.grid.speeds[row] / self.grid.speeds[place])) > MIN_CANDIDATE_DISTANCE
-                for place in places
-            ):
+            if all(abs(np.log(speeds[row] / speeds[place])) > MIN_CANDIDATE_DISTANCE for place in places):
                 places.append(row)
             if len(places) == MAX_CANDIDATE_SPEEDS:
                 break
         for row in places:
-            depths = {
-                floor_depth(float(np.quantile(self.limits[:, row], 1 - chance)))
-                for chance in TRIED_STABLE_PROBABILITIES
-            }
+            limits = [float(np.quantile(self.limits[:, row], 1 - chance)) for chance in TRIED_STABLE_PROBABILITIES]
+            depths = set(map(floor_depth, limits))
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
@@ -214,10 +200,8 @@ class LimitCharts:
         expected = self.frequencies[places, row]
         wide = FREQUENCY_ERROR_FACTOR * CHATTER_FREQUENCY_SPREAD * self.typical_frequency
         gains = []
-        for frequency in (
-            expected[int(share * places.size)]
-            for share in (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
-        ):
+        shares = (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
+        for frequency in (expected[int(share * places.size)] for share in shares):
             near = np.exp(-(((expected - frequency) / wide) ** 2) / 2)
             weights = np.zeros(len(self.limits))
             weights[places] = near / np.sum(near) if np.sum(near) > 0 else 1 / places.size

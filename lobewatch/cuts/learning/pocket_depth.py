@@ -63,12 +63,10 @@ class PocketDepth:
             wanted = first if math.isinf(self.chatter_depth) else self.chatter_depth / 2
         elif math.isinf(self.chatter_depth):
             wanted = 2 * self.stable_depth
+        elif self.chatter_depth > MIN_DEPTH_RATIO * self.stable_depth:
+            wanted = math.sqrt(self.stable_depth * self.chatter_depth)
         else:
-            wanted = (
-                math.sqrt(self.stable_depth * self.chatter_depth)
-                if self.chatter_depth > MIN_DEPTH_RATIO * self.stable_depth
-                else self.stable_depth
-            )
+            wanted = self.stable_depth
         wanted = round_down_depth_mm(1e3 * min(wanted, self.max_depth)) / 1e3
         return wanted if wanted > self.stable_depth else None
 
@@ -93,13 +91,9 @@ def choose_first_depth(table: ProgramTable) -> float:
 
 def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> Verdict:
     """Set the stability of a program without a limit from test cuts at its speed; doubtful at best."""
-    program = verdict.program
-    at_speed = [
-        cut
-        for cut in _find_own_cuts(program, assembly, machine, cuts)
-        if abs(cut.speed_rpm / program.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE
-    ]
-    depth = program.depth_mm / 1e3
+    program, depth = verdict.program, verdict.program.depth_mm / 1e3
+    own = _find_own_cuts(program, assembly, machine, cuts)
+    at_speed = [cut for cut in own if abs(cut.speed_rpm / program.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE]
     chattering = [cut for cut in at_speed if cut.has_chatter and cut.depth <= depth]
     stable = [cut for cut in at_speed if not cut.has_chatter and cut.depth >= depth]
     if not chattering and not stable:

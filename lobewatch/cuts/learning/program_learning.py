@@ -7,14 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lobewatch.cuts.learning import label_check
 from lobewatch.cuts.learning.cut_evidence import CutEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
-from lobewatch.cuts.learning.label_check import (
-    Contradiction,
-    InconsistentCut,
-    find_inconsistent_cuts,
-    is_power_inconsistent,
-)
+from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
 from lobewatch.machine import Machine, ProgramTable
@@ -78,19 +74,19 @@ def learn_program(
     table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
 ) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    start = build_prior(
-        build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
-    )
+    at_rest = build_median_row(build_program(table, machine), assembly)
+    start = build_prior(at_rest, uncertainty_of(assembly, table, machine))
     posterior, odd_powers = start, []
     for cut in collect_tool_evidence(cuts, table, assembly, machine):
         evidence = posterior.predict(cut)
-        if is_power_inconsistent(evidence):
+        if label_check.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
             evidence = replace(evidence, cut=replace(cut, power=None))
         posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
     own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    return LearningResult(table, start, posterior, (*find_inconsistent_cuts(posterior), *odd_powers), own_cuts)
+    inconsistent = (*label_check.find_inconsistent_cuts(posterior), *odd_powers)
+    return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 
 def find_next_cut(
@@ -153,8 +149,7 @@ def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvid
 
 def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
     """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
-    pairs = [
-        (interpolate_frequency(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series
-    ]
+    known = [series for series in assembly.series.values() if series]
+    pairs = [(interpolate_frequency(series, cut.at), series[-1].frequency) for series in known]
     ratios = [before / now for before, now in pairs if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0

@@ -49,19 +49,16 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Seque
         return NO_TEST_CUTS
     learning = learn_program(table, tool, machine, cuts)
     remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
-    return (
-        _build_spindle(learning, tool, machine, remarks) if learning.accepted_cuts else SpindleAtSpeed(remarks=remarks)
-    )
+    has_learned = len(learning.accepted_cuts) > 0
+    return _build_spindle(learning, tool, machine, remarks) if has_learned else SpindleAtSpeed(remarks=remarks)
 
 
 def _build_spindle(
     learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
 ) -> SpindleAtSpeed:
     """Build the spindle at speed from a learning result."""
-    at_rest, samples = (
-        build_median_row(build_program(learning.program, machine), tool),
-        learning.posterior.draw(N_PROGRAM_SAMPLES),
-    )
+    at_rest = build_median_row(build_program(learning.program, machine), tool)
+    samples = learning.posterior.draw(N_PROGRAM_SAMPLES)
     rows = samples.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
     parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
     median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
@@ -97,9 +94,8 @@ def _build_spindle(
 
 def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
     """Return 95 % half-widths of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
-    relative = [
-        np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
-    ]
+    widths = [np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 for part in parts]
+    relative = [width / np.mean(part, axis=0) for width, part in zip(widths, parts, strict=True)]
     return np.stack([*relative, np.std(turned, axis=0) * 2], axis=1)
 
 

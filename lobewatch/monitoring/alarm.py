@@ -45,21 +45,12 @@ class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "t
 
     def to_row(self, now: datetime) -> dict[str, Any]:
         """Return the fields for other programs; times are ISO 8601, `acknowledged` is null if it is not."""
-        word = self.acknowledgement if self.is_acknowledged(now) else None
-        return {
-            "id": self.id,
-            "code": self.code,
-            "about": self.about,
-            "raised_by": self.triggered_by,
-            "raised": self.triggered_at.isoformat(),
-            "acknowledged": word
-            and {
-                "time": word.time.isoformat(),
-                "operator": word.operator,
-                "until": word.until and word.until.isoformat(),
-                "note": word.note,
-            },
-        }
+        word, acknowledged = self.acknowledgement, None
+        if word is not None and word.is_active_at(now):
+            until = word.until and word.until.isoformat()
+            acknowledged = {"time": word.time.isoformat(), "operator": word.operator, "until": until, "note": word.note}
+        row = {"id": self.id, "code": self.code, "about": self.about, "raised_by": self.triggered_by}
+        return row | {"raised": self.triggered_at.isoformat(), "acknowledged": acknowledged}
 
 
 class TriggeredAlarm(NamedTuple):
@@ -75,12 +66,11 @@ class TriggeredAlarm(NamedTuple):
     def build_alarm(self, acknowledgements: Iterable[Acknowledgement], baseline: datetime | None) -> Alarm:
         """Build the alarm, with its newest acknowledgement since it was triggered."""
         code, about = self.remark.code, self.remark.about
-        given = [
-            word
-            for word in acknowledgements
-            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest
-        ]
-        return Alarm(code, about, self.tap_id, self.time, given[-1] if given else None)
+        given = None
+        for word in acknowledgements:
+            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest:
+                given = word
+        return Alarm(code, about, self.tap_id, self.time, given)
 
 
 def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -199,23 +199,18 @@ def assess_status(
     series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
     left = rules.count_days_left(newest.time, interval, now)
     alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
-    return _build_status(now, remarks, rules.next_tap_step(newest.time, interval), series, newest.time, left, alarms)
+    status = _build_status(now, remarks, rules.next_tap_step(newest.time, interval), alarms)
+    return replace(status, series=tuple(series), last_tap=newest.time, days_left=left)
 
 
 def _build_status(
-    now: datetime,
-    remarks: Sequence[Remark],
-    default_step: str = "",
-    series: Sequence[SeriesStatus] = (),
-    last_tap: datetime | None = None,
-    left: float | None = None,
-    alarms: Sequence[Alarm] = (),
+    now: datetime, remarks: Sequence[Remark], default_step: str = "", alarms: Sequence[Alarm] = ()
 ) -> MachineStatus:
     """Build the status from its remarks; default_step: next step where no remark has one."""
     ordered, alarms = rules.sort_by_severity(remarks), rules.sort_by_severity(alarms)
     acknowledged = add_acknowledgements(ordered, alarms, now)
     step = rules.find_next_step(ordered, default_step)
-    return MachineStatus(now, ordered, step, acknowledged, alarms, tuple(series), last_tap, left)
+    return MachineStatus(now, ordered, step, acknowledged, alarms)
 
 
 def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:

@@ -59,13 +59,7 @@ class Readings:
 
     def since(self, begin: int) -> Self:
         """Return the points from one on."""
-        y, operators, temperature, other = (
-            self.y[begin:],
-            self.operators[begin:],
-            self.temperature,
-            self.other_direction,
-        )
-        optional = self.temperature, self.other_direction
+        y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
         temperature, other = (None if values is None else values[begin:] for values in optional)
         return replace(self, y=y, temperature=temperature, operators=operators, other_direction=other)
 

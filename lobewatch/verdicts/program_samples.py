@@ -130,14 +130,10 @@ class ProgramSamples:
         """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
-        speeds, frequencies, stiffnesses = (np.repeat(factor, len(self.rows)) for factor in factors)
-        changed = replace(
-            rows,
-            speed_rpm=rows.speed_rpm * speeds,
-            frequency=rows.frequency * frequencies[:, np.newaxis],
-            stiffness=rows.stiffness * stiffnesses[:, np.newaxis],
-        )
-        return replace(self, rows=changed)
+        n, f, k = (np.repeat(factor, len(self.rows))[:, np.newaxis] for factor in factors)
+        speed_rpm = rows.speed_rpm * n[:, 0]
+        rows = replace(rows, speed_rpm=speed_rpm, frequency=rows.frequency * f, stiffness=rows.stiffness * k)
+        return replace(self, rows=rows)
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:

@@ -190,7 +190,7 @@ def recommend(
         setting = search.best if depth_mm is None else search.fastest_window(depth_mm)
     others = tuple(_list_alternatives(search, setting, present_rpm))
     if setting is None:
-        reason, cures = _explain_no_setting(search, depth_mm, present_rpm if is_set else None)
+        reason, cures = _explain_gap(search, depth_mm, present_rpm if is_set else None)
         feed = _feed_range(search, table)
         return Recommendation(table, either, reason=reason, remedies=cures, alternatives=others, feed_mm=feed)
     return _recommend_setting(search, table, setting, others)
@@ -253,9 +253,7 @@ def _list_alternatives(
             yield Alternative(what, other)
 
 
-def _explain_no_setting(
-    search: SettingSearch, depth_mm: float | None, set_rpm: float | None
-) -> tuple[str, tuple[str, ...]]:
+def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
     """Explain why there is no setting, with remedies."""
     if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
         return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from lobes import Cut, MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
+from lobes import MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt
@@ -205,23 +204,21 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
         rates = speeds * np.minimum(deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe)
         thinkable = rates >= MIN_REMOVAL_SHARE * best
         wanted = scipy.ndimage.maximum_filter1d(thinkable, 4 * steps + 1)
-        limit = _limits_by_multipliers(spindle, cuts, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
+        limit = _limits_by_multipliers(case, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
     return LikelyDepths(speeds, around(limit))
 
 
-def _limits_by_multipliers(
-    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
-) -> Floats:
+def _limits_by_multipliers(case: ProgramCase, speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags) -> Floats:
     """Return limits (mm) by multipliers where wanted (n,), interpolated; else by the zero-order approximation.
 
     by_cut: limits by the zero-order approximation (cuts, n).
     """
     places = np.unique(np.append(np.arange(0, speeds.size, COARSE_SPEED_STEPS), speeds.size - 1))
     places = places[wanted[places]]
-    patterns = spindle.principal_directions.sign_patterns
-    systems = [build_milling_system(spindle.x, spindle.y, vectors) for vectors in patterns]
+    x, y, patterns = case.spindle.x, case.spindle.y, case.spindle.principal_directions.sign_patterns
+    systems = [build_milling_system(x, y, vectors) for vectors in patterns]
     worst, true = np.argsort(by_cut[:, places], axis=0)[:N_LIKELY_FEEDS], deepest[places].copy()
-    for (i, cut), system in itertools.product(enumerate(cuts), systems):
+    for (i, cut), system in itertools.product(enumerate(case.cuts), systems):
         here = np.flatnonzero(np.any(worst == i, axis=0))
         rows = rows_at_speeds(system, cut, speeds[places[here]])
         limit = _first_crossing(rows, np.min(by_cut[:, places[here]], axis=0), deepest[places[here]])

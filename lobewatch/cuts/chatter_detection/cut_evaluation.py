@@ -6,7 +6,6 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -143,14 +142,14 @@ def _evaluate_axis(
 
 
 def _find_speed(
-    spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
+    spectra: Spectra, quiet: Spectra, teeth: int, commanded: float, measured_rpm: float | None
 ) -> SpindleSpeed | CutEvaluation:
     """Find the spindle speed, or return the evaluation of a cut without one; commanded in Hz."""
     if measured_rpm is None:
         speed = spindle_speed.find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if speed is not None:
             return speed
-        distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded, None)
+        distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded, None, None)
         if np.isfinite(distant):
             return _speed_not_found(spectra[0], distant)
         return _evaluate_without_air(spectra, teeth, commanded)
@@ -160,7 +159,7 @@ def _find_speed(
     return speed or _speed_not_found(spectra[0], np.nan)
 
 
-def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
+def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> CutEvaluation:
     """Evaluate the speed only, where there is no air or it sounds like the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     speed = spindle_speed.find_speed_of_spectra(spectra, silence, teeth, commanded)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from lobewatch.arrays import Flags, Floats, Indices, Integers
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, find_peaks, fold_frequency
 
 N_STEADINESS_PARTS = 4
 """Parts that a cut is divided into."""
@@ -134,7 +133,7 @@ def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
     return np.asarray(np.clip(places, 0, last))
 
 
-def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
+def find_cut_peaks(spectra: Spectra, air: Spectra) -> SpectralPeaks:
     """Find the peaks of all axes that are not in air, without skirts."""
     peaks = [spectral.remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     return spectral.join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(peaks, air, strict=True)])
@@ -161,7 +160,7 @@ def classify_peaks(
     upper = comb & (peaks.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
     loudest = float(np.max(peaks.amplitude[upper], initial=0.0))
     is_bounded = (peaks.amplitude <= MAX_FOLDED_AMPLITUDE * loudest) | is_undersampled(spectrum, turning, teeth)
-    back = _is_near_folded(peaks, spectrum, turning, teeth, unsteady) & is_bounded & ~(comb | foreign)
+    back = _is_folded(peaks, spectrum, turning, teeth, unsteady) & is_bounded & ~(comb | foreign)
     kept = comb & (order > 1)
     tooth = (order[kept] % teeth).astype(np.int64)
     left = _remove_wavering(peaks[~(comb | foreign | back)], peaks[kept], spectrum.bin_width, turning.frequency)
@@ -176,9 +175,7 @@ def _remove_wavering(left: SpectralPeaks, comb: SpectralPeaks, bin_width: float,
     return left[away > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * bin_width]
 
 
-def _is_near_folded(
-    peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
-) -> Flags:
+def _is_folded(peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float) -> Flags:
     """Whether peaks lie where harmonics of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)

@@ -65,6 +65,10 @@ class Spectrum:
         return np.asarray(np.interp(frequency, self.frequency, scipy.ndimage.maximum_filter1d(self.power, wide)))
 
 
+Spectra = Sequence[Spectrum]
+"""Spectra of all axes."""
+
+
 @dataclass(frozen=True, eq=False)
 class SpectralPeaks:
     """Single frequencies in a spectrum."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy
 
@@ -12,7 +10,7 @@ from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
 from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, fold_frequency
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, fold_frequency
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, find_comb, find_comb_by_sum
 
 COMB_SPEED_TOLERANCE = 0.05
@@ -72,9 +70,7 @@ def find_spindle_speed(
     return find_speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
 
 
-def find_speed_of_spectra(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
-) -> SpindleSpeed | None:
+def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
     """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
     peaks, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
@@ -84,9 +80,7 @@ def find_speed_of_spectra(
     return summed if rival.agreeing >= voted.agreeing else voted
 
 
-def _find_speed_by_peaks(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
-) -> SpindleSpeed | None:
+def _find_speed_by_peaks(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
     """Find the speed by peaks clear of the noise."""
     peaks = [spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     of_cut, first = find_cut_peaks(spectra, air), spectra[0]
@@ -122,8 +116,8 @@ def find_speed_by_votes(
     turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < VOTE_SPEED_TOLERANCE]
     near = np.any(np.abs(grid[:, np.newaxis] - turning) < OWN_PEAK_TOLERANCE * spectrum.bin_width, axis=1)
     best = int(np.argmax(votes))
-    known_speed = int(np.argmax(np.where(near, votes, 0.0)))
-    best = known_speed if near[known_speed] and votes[known_speed] > MIN_OWN_PEAK_VOTES * votes[best] else best
+    known = int(np.argmax(np.where(near, votes, 0.0)))
+    best = known if near[known] and votes[known] > MIN_OWN_PEAK_VOTES * votes[best] else best
     speed = refine_speed(float(grid[best]), loudest, spectrum.bin_width)
     if speed.misfit > MAX_SPEED_MISFIT:
         rivals = [refine_speed(frequency, loudest, bin_width) for frequency in grid[_vote_peaks(votes)].tolist()]
@@ -180,7 +174,7 @@ speaks of pulses that were counted wrong; chosen."""
 
 
 def check_tachometer_speed(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, measured: float
+    spectra: Spectra, air: Spectra, teeth: int, commanded: float, measured: float
 ) -> tuple[SpindleSpeed | None, float]:
     """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
@@ -192,12 +186,12 @@ def check_tachometer_speed(
     at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
     if at_set is not None:
         return None, at_set.frequency
-    known_speed = find_speed_of_spectra(spectra, air, teeth, measured)
-    if known_speed is not None and abs(known_speed.frequency / measured - 1) > TACHOMETER_TOLERANCE:
-        return None, known_speed.frequency
-    if not is_near and (known_speed is None or is_pulse_multiple(measured / commanded)):
+    known = find_speed_of_spectra(spectra, air, teeth, measured)
+    if known is not None and abs(known.frequency / measured - 1) > TACHOMETER_TOLERANCE:
+        return None, known.frequency
+    if not is_near and (known is None or is_pulse_multiple(measured / commanded)):
         return None, commanded
-    return known_speed or _use_tachometer_speed(spectra, air, measured), np.nan
+    return known or _use_tachometer_speed(spectra, air, measured), np.nan
 
 
 def is_pulse_multiple(ratio: float) -> bool:
@@ -206,7 +200,7 @@ def is_pulse_multiple(ratio: float) -> bool:
     return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
 
 
-def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
+def _use_tachometer_speed(spectra: Spectra, air: Spectra, measured: float) -> SpindleSpeed | None:
     """Return the speed of the tachometer if some peaks are its harmonics, else None."""
     peaks, bin_width = find_cut_peaks(spectra, air), spectra[0].bin_width
     n_own = int(np.count_nonzero(fold_frequency(peaks.frequency, measured) < PEAK_TOLERANCE * bin_width))
@@ -223,35 +217,30 @@ MIN_DISTANT_SHARE = 0.5
 
 
 def find_distant_speed(
-    spectra: Sequence[Spectrum],
-    air: Sequence[Spectrum],
-    teeth: int,
-    commanded: float,
-    known_speed: SpindleSpeed | None,
-    other_peaks: SpectralPeaks | None = None,
+    spectra: Spectra, air: Spectra, teeth: int, commanded: float, known: SpindleSpeed | None, left: SpectralPeaks | None
 ) -> float:
     """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    known_speed: the speed that was found; other_peaks: peaks that are no harmonics of it. Only a comb whose
+    known: the speed that was found; left: peaks that are no harmonics of it. Only a comb whose
     harmonics they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of
     period two makes; the mains hum at harmonics of theirs.
     """
     peaks, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth
     clearest = combs.find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
-    if known_speed is None or other_peaks is None:
+    if known is None or left is None:
         return np.nan if clearest is None else clearest.frequency
-    hums = [hum for hum in HUM_FREQUENCIES if not _is_mains_speed(known_speed, hum)]
+    hums = [hum for hum in HUM_FREQUENCIES if not _is_mains_speed(known, hum)]
     mains = [find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in hums]
-    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known_speed.agreeing]
+    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known.agreeing]
     centres = combs.list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
     sums = (find_comb_by_sum(spectra, air, peaks, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
     loudest = peaks.loudest(MAX_COMB_PEAKS)
     width = first.bin_width
-    agreeing = refine_speed(known_speed.frequency, loudest, width).agreeing
+    agreeing = refine_speed(known.frequency, loudest, width).agreeing
     summed = [comb for comb in sums if comb and refine_speed(comb.frequency, loudest, width).agreeing > agreeing]
     found = (*plain, *summed)
-    better = [comb.frequency for comb in found if _is_better_comb(comb, known_speed, other_peaks, width)]
+    better = [comb.frequency for comb in found if _is_better_comb(comb, known, left, width)]
     return max(better, key=lambda frequency: _rank_comb(frequency, loudest, width)) if better else np.nan
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import scipy
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency, join_peaks
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, find_peaks, fold_frequency, join_peaks
 
 COMB_TOLERANCE = 1.2
 """Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""
@@ -58,7 +57,7 @@ def find_comb(
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
     folded = _folded_images(peaks, sample_rate)
     for images in (folded[:1], folded) if few else (folded[:1],):
-        best = _find_best_comb(peaks, images, bin_width, frequency, tolerance)
+        best = _pick_comb(peaks, images, bin_width, frequency, tolerance)
         if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
             return _comb_speed(best, peaks, bin_width)
     return None
@@ -104,7 +103,7 @@ def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
     return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
-def _find_best_comb(
+def _pick_comb(
     peaks: SpectralPeaks, images: Floats, bin_width: float, frequency: float, tolerance: float
 ) -> Comb | None:
     weight, best, most = np.minimum(np.log10(peaks.clearness), MAX_PEAK_WEIGHT), None, 0.0
@@ -197,27 +196,27 @@ WEAK_PEAK_POWER = 4.0
 
 
 def find_comb_by_sum(
-    spectra: Sequence[Spectrum],
-    air: Sequence[Spectrum],
+    spectra: Spectra,
+    air: Spectra,
     peaks: SpectralPeaks,
     teeth: int,
-    frequency: float,
+    center: float,
     tolerance: float,
-    usual: float = 1.0,
+    usual: float = 1,
 ) -> SpindleSpeed | None:
-    """Find the comb within `tolerance` (relative) of a frequency (Hz) that is loudest over the noise, or None.
+    """Find the comb within `tolerance` (relative) of a center frequency (Hz) that is loudest over the noise, or None.
 
     spectra and air: of each axis; what is no louder than in air does not count. peaks: those that stand clear, of
     all axes; where they are many, they settle it, and there is one on a harmonic of anything. The mean over all axes
     of log10 of power over noise is summed over the harmonics (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It
     is a comb where as many frequencies that are no harmonics would have that sum less often than once in ten
-    thousand, over all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
+    thousand, over all that are tried as near to the center as it is, or up to `usual` from it, relative.
     """
     if len(peaks) >= MAX_COMB_PEAKS * len(spectra):
         return None
     first, above = spectra[0], _mean_level(spectra, air)
-    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (frequency * (1 + tolerance))))
-    lowest, most = (1 - tolerance) * frequency, (1 + tolerance) * frequency
+    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (center * (1 + tolerance))))
+    lowest, most = (1 - tolerance) * center, (1 + tolerance) * center
     tried = np.arange(lowest, most, SUM_FREQUENCY_STEP * first.bin_width / max(highest, 1))
     parts = np.array([np.interp(k * tried, first.frequency, above) for k in range(1, highest + 1)])
     best = int(np.argmax(np.sum(parts, axis=0)))
@@ -227,7 +226,7 @@ def find_comb_by_sum(
     inside = (first.frequency > lowest) & (first.frequency < highest * most)
     between = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
     rarest = MAX_COMB_CHANCE if np.mean(levels) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
-    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / tolerance, 1.0)
+    likely = min(max(abs(float(tried[best]) / center - 1), usual) / tolerance, 1.0)
     noise = above[between]
     chance = SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, noise)
     if chance > rarest or _is_partial_comb(levels, noise, teeth):
@@ -236,7 +235,7 @@ def find_comb_by_sum(
     return refine_comb(float(tried[best]), weak[weak.frequency < (highest + 0.5) * tried[best]], first.bin_width)
 
 
-def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
+def _mean_level(spectra: Spectra, air: Spectra) -> Floats:
     """Return log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, the mean of all axes; 0 where it is air."""
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):

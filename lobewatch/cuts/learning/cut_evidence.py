@@ -10,8 +10,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lobes import Cut
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.cut_entry import CutEntry, CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
+
+CutEntries = Sequence[CutEntry]
+"""Test cuts of a machine as in its journal, oldest first."""
 
 DRIVE_POWER_SPREAD = 0.15
 """Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency

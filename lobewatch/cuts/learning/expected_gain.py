@@ -15,8 +15,8 @@ from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
-from modal import Mode
 
 SPEED_GRID_STEP = 0.008
 """Relative step of the speeds that are checked."""
@@ -28,8 +28,6 @@ N_COMPARED_SPEEDS = 80
 """Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
 """Least and largest ratio of true limit to the zero-order limit that is believed; chosen."""
-
-TipModes = Sequence[Mode] | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lobewatch.cuts.learning import label_check
-from lobewatch.cuts.learning.cut_evidence import CutEvidence, estimate_force_by_power
+from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
 from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
@@ -70,14 +69,12 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
     return find_by_name({table.name: table for table in machine.program}, name)
 
 
-def learn_program(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
-) -> LearningResult:
+def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    at_rest = build_median_row(build_program(table, machine), assembly)
-    start = build_prior(at_rest, uncertainty_of(assembly, table, machine))
+    at_rest = build_median_row(build_program(table, machine), tool)
+    start = build_prior(at_rest, uncertainty_of(tool, table, machine))
     posterior, odd_powers = start, []
-    for cut in collect_tool_evidence(cuts, table, assembly, machine):
+    for cut in collect_tool_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
         if label_check.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
@@ -89,32 +86,30 @@ def learn_program(
     return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 
-def find_next_cut(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
-) -> NextCut:
+def find_next_cut(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries, most: int) -> NextCut:
     """Find the next test cut of a program, of `most` cuts."""
-    learning = learn_program(table, assembly, machine, cuts)
+    learning = learn_program(table, tool, machine, cuts)
     left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
     if not left or reach.is_empty:
         return NextCut(learning, None, left, reach)
-    grid = build_cut_grid(table, assembly, machine)
+    grid = build_cut_grid(table, tool, machine)
     cut = suggest_cut(learning.posterior, grid, learning.own_cuts, left, learning.rejected_cuts, table.depth_mm / 1e3)
     return NextCut(learning, cut, left, reach)
 
 
-def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:
+def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> CutGrid:
     """Build the grid of speeds and the depths that tool and drive allow."""
     reach = CutRange.of(machine, table)
     speeds = reach.speeds(SPEED_GRID_STEP)
     deepest = reach.depth_limits(speeds) / 1e3
     cut, angles = machine.build_cut(table), tuple(FEED_ANGLES[feed] for feed in table.feed_axes)
-    trust = compare_zero_order(assembly.x, assembly.y, cut, angles, speeds, reach.deepest_mm / 1e3)
+    trust = compare_zero_order(tool.x, tool.y, cut, angles, speeds, reach.deepest_mm / 1e3)
     return CutGrid(cut, angles, speeds, deepest, trust)
 
 
 def collect_tool_evidence(
-    cuts: Sequence[CutEntry], table: ProgramTable, assembly: Assembly, machine: Machine
+    cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
     """Collect the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
@@ -126,11 +121,11 @@ def collect_tool_evidence(
         material = entry.coefficients, entry.cut.tangential, entry.cut.radial
         if material not in materials:
             materials.append(material)
-        evidence.append(_build_evidence(entry, materials.index(material), assembly))
+        evidence.append(_build_evidence(entry, materials.index(material), tool))
     return tuple(evidence)
 
 
-def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvidence:
+def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
     feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
     return CutEvidence(
         cut=cut.cut,
@@ -141,15 +136,15 @@ def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvid
         feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
         material=material,
         speed_found=cut.by != "ear",
-        frequency_ratio=_frequency_ratio(cut, assembly),
+        frequency_ratio=_frequency_ratio(cut, tool),
         id=cut.id,
         power=None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter),
     )
 
 
-def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
+def _frequency_ratio(cut: CutEntry, tool: Assembly) -> float:
     """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
-    known = [series for series in assembly.series.values() if series]
+    known = [series for series in tool.series.values() if series]
     pairs = [(interpolate_frequency(series, cut.at), series[-1].frequency) for series in known]
     ratios = [before / now for before, now in pairs if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0

@@ -11,12 +11,12 @@ import numpy as np
 from acquisition import DataError, Remark
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.cut_evidence import CutEntries
 from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
 from lobewatch.cuts.learning.posterior import Posterior
 from lobewatch.cuts.learning.program_learning import LearningResult, learn_program
 from lobewatch.machine import CutTable, Machine, ProgramTable
-from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 from lobewatch.verdicts.program_case import build_program
@@ -30,9 +30,7 @@ INTERVAL_QUANTILES = (0.025, 0.975)
 """Quantiles that 95 % of samples lie between."""
 
 
-def evaluate_at_speed(
-    table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
-) -> Verdict:
+def evaluate_at_speed(table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: CutEntries) -> Verdict:
     """Evaluate a program, at speed as far as cuts have been learned from."""
     posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
     verdict = evaluate_program(table, tool, machine, posterior)
@@ -41,7 +39,7 @@ def evaluate_at_speed(
     return apply_test_cuts(verdict, tool, machine, cuts)
 
 
-def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> SpindleAtSpeed:
+def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> SpindleAtSpeed:
     """Learn the spindle at speed from the cuts of a program; nothing for the reference cut."""
     if not isinstance(table, ProgramTable) or not tool.directions:
         return NO_TEST_CUTS

@@ -192,14 +192,12 @@ def count_days_left(newest: datetime, interval_days: float, now: datetime) -> fl
     return interval_days - (now - newest) / timedelta(days=1)
 
 
-def date_remarks(
-    tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
-) -> Iterator[Remark]:
-    """Yield remarks by date: a test is overdue, or in the future; path: of the folder."""
-    left = count_days_left(newest, interval_days, now)
+def date_remarks(tap_id: str, newest: datetime, days: float, now: datetime, path: Path | str) -> Iterator[Remark]:
+    """Yield remarks by date: a test is overdue, or in the future; days: tap interval; path: of the folder."""
+    left = count_days_left(newest, days, now)
     if left < 0:
-        days = math.ceil(-left)
-        yield OVERDUE.remark("", days=f"{days} day{'s' if days > 1 else ''}")
+        late = math.ceil(-left)
+        yield OVERDUE.remark("", days=f"{late} day{'s' if late > 1 else ''}")
     yield from future_tap_remarks(tap_id, newest, now, path)
 
 

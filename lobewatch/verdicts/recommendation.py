@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
@@ -193,7 +193,7 @@ def recommend(
         reason, cures = _explain_gap(search, depth_mm, present_rpm if is_set else None)
         feed = _feed_range(search, table)
         return Recommendation(table, either, reason=reason, remedies=cures, alternatives=others, feed_mm=feed)
-    return _recommend_setting(search, table, setting, others)
+    return replace(_recommend_setting(search, table, setting), alternatives=others)
 
 
 def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
@@ -217,9 +217,7 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
 
 
-def _recommend_setting(
-    search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
-) -> Recommendation:
+def _recommend_setting(search: SettingSearch, table: ProgramTable, setting: Setting) -> Recommendation:
     """Build the recommendation of a setting, evaluated as a program."""
     case, (speed, depth) = search.case, (setting.speed_rpm, setting.depth_mm)
     result = search.results[speed, depth]
@@ -228,10 +226,10 @@ def _recommend_setting(
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
-        return Recommendation(table, case.any_direction, reason=reason, alternatives=others)
+        return Recommendation(table, case.any_direction, reason=reason)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
     feed = _feed_range(search, table)
-    return Recommendation(program, case.any_direction, setting, verdict, "", (), others, feed, remarks)
+    return Recommendation(program, case.any_direction, setting, verdict, feed_mm=feed, remarks=remarks)
 
 
 def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
@@ -240,13 +238,11 @@ def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, floa
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
-def _list_alternatives(
-    search: SettingSearch, setting: Setting | None, present_rpm: float | None
-) -> Iterator[Alternative]:
+def _list_alternatives(search: SettingSearch, setting: Setting | None, own_rpm: float | None) -> Iterator[Alternative]:
     places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
     wanted = {MAX_REMOVAL_LABEL: search.best}
-    if present_rpm is not None:
-        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
+    if own_rpm is not None:
+        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(own_rpm, search.cut_range.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
@@ -255,12 +251,12 @@ def _list_alternatives(
 
 def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
     """Explain why there is no setting, with remedies."""
-    if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
-        return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES
-    if set_rpm is not None:
-        return f"no safe depth at {set_rpm:g} rpm", _list_remedies(search, depth_mm)
+    reach = search.cut_range
+    if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
+        return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    return f"no safe {named} in {search.cut_range.text}", _list_remedies(search, depth_mm)
+    reason = f"no safe {named} in {reach.text}" if set_rpm is None else f"no safe depth at {set_rpm:g} rpm"
+    return reason, _list_remedies(search, depth_mm)
 
 
 def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:

@@ -68,14 +68,10 @@ def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) ->
     lowest = lobes.minimum.depth
     if not math.isfinite(lowest):
         return []
-    candidates = [
-        SpeedPocket(
-            min(max(pocket.speed_rpm, low), high),
-            (max(pocket.from_rpm * (1 + width), low), min(pocket.to_rpm * (1 - width), high)),
-            pocket.depth / lowest,
-        )
-        for pocket in rank_pockets(find_pockets(lobes, MAX_POCKET_GAIN * lowest), speeds.size, "removal")
-    ]
+    candidates = []
+    for pocket in rank_pockets(find_pockets(lobes, MAX_POCKET_GAIN * lowest), speeds.size, "removal"):
+        window = max(pocket.from_rpm * (1 + width), low), min(pocket.to_rpm * (1 - width), high)
+        candidates.append(SpeedPocket(min(max(pocket.speed_rpm, low), high), window, pocket.depth / lowest))
     return [pocket for pocket in candidates if pocket.contains(pocket.speed_rpm)][:N_SPEED_POCKETS]
 
 

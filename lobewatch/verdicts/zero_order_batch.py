@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -64,23 +63,6 @@ NEWTON_STEPS = 14
 """Steps of the search for a root."""
 CONSTANT_FORCE_TOLERANCE = 1e-6
 """Change of the force over the turn, relative to its mean, that is none."""
-
-
-class ModeColumns(NamedTuple):
-    """One mode of each spindle, shape (r, 1) each."""
-
-    frequency: Floats
-    """Natural frequency (rad/s)."""
-    damping_ratio: Floats
-    """Damping ratio (-)."""
-    stiffness: Floats
-    """Modal stiffness (N/m)."""
-    displacement: Floats
-    """Share of its coordinate that the tip shows (-)."""
-    velocity: Floats
-    """Share of its velocity over the natural frequency that the tip shows (-)."""
-    coupling: Floats
-    """Product of its parts in the direction of the force and that of the displacement (-)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,28 +152,32 @@ class ZeroOrderBatch:
     def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:
         """Return the receptance from one direction to another at frequencies (rad/s) (r, k)."""
         total = np.zeros(frequency.shape, np.complex128)
-        for mode in self._modes(force, shown):
-            r = frequency / mode.frequency
-            elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
-            share = mode.coupling / (mode.stiffness * (elastic * elastic + damped * damped))
-            total.real += (mode.displacement * elastic + moving * damped) * share
-            total.imag += (moving * elastic - mode.displacement * damped) * share
+        for natural, zeta, stiffness, place, velocity, coupling in self._modes(force, shown):
+            r = frequency / natural
+            elastic, damped, moving = 1 - r * r, 2 * zeta * r, velocity * r
+            share = coupling / (stiffness * (elastic * elastic + damped * damped))
+            total.real += (place * elastic + moving * damped) * share
+            total.imag += (moving * elastic - place * damped) * share
         return total
 
     def _receptance_with_derivative(self, s: Complexes, force: int, shown: int) -> tuple[Complexes, Complexes]:
         """Return the receptance from one direction to another at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
-        for mode in self._modes(force, shown):
-            r = s / mode.frequency
-            flexible = 1 / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
-            part = (mode.displacement + mode.velocity * r) * flexible
-            total += mode.coupling * part
-            bend = part * (2 * mode.stiffness * (mode.damping_ratio + r))
-            slope += mode.coupling * (mode.velocity - bend) * flexible / mode.frequency
+        for natural, zeta, stiffness, place, velocity, coupling in self._modes(force, shown):
+            r = s / natural
+            flexible = 1 / (stiffness * (1 + (2 * zeta + r) * r))
+            part = (place + velocity * r) * flexible
+            total += coupling * part
+            bend = part * (2 * stiffness * (zeta + r))
+            slope += coupling * (velocity - bend) * flexible / natural
         return total, slope
 
-    def _modes(self, force: int, shown: int) -> Iterator[ModeColumns]:
-        """Yield the modes that a force in one direction moves in another."""
+    def _modes(self, force: int, shown: int) -> Iterator[list[Floats]]:
+        """Yield the modes that a force in one direction moves in another, shape (r, 1) each.
+
+        Natural frequency (rad/s), damping ratio, stiffness (N/m), the shares of its coordinate and of its velocity over
+        the natural frequency that the tip shows, and the product of its parts in both directions.
+        """
         place, velocity = self.rows.tip_participation
         axes, vector = self.rows.axes.tolist(), self.rows.vector
         if force not in axes or shown not in axes:
@@ -199,7 +185,7 @@ class ZeroOrderBatch:
         share = vector[..., axes.index(force)] * vector[..., axes.index(shown)]
         parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity, share
         for k in np.flatnonzero(np.any(share, axis=0)):
-            yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
+            yield [part[:, k, np.newaxis] for part in parts]
 
     def _frequency_grid(self) -> Floats:
         """Return rising frequencies (Hz), dense near the natural ones, shape (r, k)."""

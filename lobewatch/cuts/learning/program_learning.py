@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +13,9 @@ from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, comp
 from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
-from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import find_by_name
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency
@@ -110,30 +110,28 @@ def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> Cut
 
 def collect_tool_evidence(
     cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine
-) -> tuple[CutEvidence, ...]:
-    """Collect the usable cuts of the same tool, oldest first."""
+) -> Iterator[CutEvidence]:
+    """Yield the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
-    evidence = []
     for entry in cuts:
         if entry.tool != table.tool or not entry.is_usable:
             continue
         material = entry.coefficients, entry.cut.tangential, entry.cut.radial
         if material not in materials:
             materials.append(material)
-        evidence.append(_build_evidence(entry, materials.index(material), tool))
-    return tuple(evidence)
+        yield _build_evidence(entry, materials.index(material), tool)
 
 
 def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
-    feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
+    angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
     return CutEvidence(
         cut=cut.cut,
         speed_rpm=cut.speed_rpm,
         depth=cut.depth,
         verdict=cut.word,
         frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
-        feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
+        feed_angles=tuple(angles),
         material=material,
         speed_found=cut.by != "ear",
         frequency_ratio=_frequency_ratio(cut, tool),

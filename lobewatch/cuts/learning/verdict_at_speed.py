@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from acquisition import DataError, Remark
+from acquisition import DataError
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.cut_evidence import CutEntries
@@ -47,13 +48,11 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: CutEn
         return NO_TEST_CUTS
     learning = learn_program(table, tool, machine, cuts)
     remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
-    has_learned = len(learning.accepted_cuts) > 0
-    return _build_spindle(learning, tool, machine, remarks) if has_learned else SpindleAtSpeed(remarks=remarks)
+    spindle = _build_spindle(learning, tool, machine) if learning.accepted_cuts else NO_TEST_CUTS
+    return replace(spindle, remarks=remarks)
 
 
-def _build_spindle(
-    learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
-) -> SpindleAtSpeed:
+def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -> SpindleAtSpeed:
     """Build the spindle at speed from a learning result."""
     at_rest = build_median_row(build_program(learning.program, machine), tool)
     samples = learning.posterior.draw(N_PROGRAM_SAMPLES)
@@ -62,26 +61,21 @@ def _build_spindle(
     median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
     force, direction = (samples.ratios()[name] for name in ("tangential", "ratio"))
     push, ratio = float(np.mean(force)), float(np.mean(direction))
-    left = LearnedSamples(
-        frequency=parts[0] / median[0],
-        damping_ratio=parts[1] / median[1],
-        stiffness=parts[2] / median[2],
-        phase_change=phases,
-        tangential=force / np.mean(force),
-        ratio=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
+    frequency, damping, stiffness = (part / mean for part, mean in zip(parts, median, strict=True))
+    direction_over_mean = direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape)
+    left = LearnedSamples(frequency, damping, stiffness, phases, force / np.mean(force), direction_over_mean)
+    uncertainty = Uncertainty(
+        modes={TEST_CUTS.name: _half_widths(parts, phases)},
+        tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
+        speed=machine.doubt.speed_percent / 100,
+        tangential=_factor_range(force),
+        ratio=_factor_range(direction),
+        axes=tool.principal_directions,
+        learned=left,
     )
     return SpindleAtSpeed(
         n_cuts=len(learning.accepted_cuts),
-        remarks=remarks,
-        uncertainty=Uncertainty(
-            modes={TEST_CUTS.name: _half_widths(parts, phases)},
-            tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
-            speed=machine.doubt.speed_percent / 100,
-            tangential=_factor_range(force),
-            ratio=_factor_range(direction),
-            axes=tool.principal_directions,
-            learned=left,
-        ),
+        uncertainty=uncertainty,
         factors=np.stack(median, axis=1),
         tangential=float(at_rest.tangential[0]) * push / 1e6,
         radial=float(at_rest.radial[0]) * push * ratio / 1e6,

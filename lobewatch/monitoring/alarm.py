@@ -35,10 +35,6 @@ class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "t
         """Name of the alarm for people and other programs, without blanks."""
         return format_alarm_id(self.code, self.about, self.triggered_by)
 
-    def is_about(self, remark: Remark) -> bool:
-        """Return whether it belongs to a remark."""
-        return (self.code, self.about) == (remark.code, remark.about)
-
     def is_acknowledged(self, now: datetime) -> bool:
         """Return whether it is acknowledged at a time."""
         return self.acknowledgement is not None and self.acknowledgement.is_active_at(now)
@@ -75,12 +71,10 @@ class TriggeredAlarm(NamedTuple):
 
 def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:
     """Add acknowledgements to the text of remarks."""
-    return tuple(_add_acknowledgement(remark, alarms, now) for remark in remarks)
-
-
-def _add_acknowledgement(remark: Remark, alarms: Sequence[Alarm], now: datetime) -> Remark:
-    words = [alarm.acknowledgement for alarm in alarms if alarm.is_about(remark) and alarm.is_acknowledged(now)]
-    return replace(remark, text=f"{remark.text} ({words[0]})") if words else remark
+    active = [alarm for alarm in reversed(alarms) if alarm.is_acknowledged(now)]
+    words = {(alarm.code, alarm.about): alarm.acknowledgement for alarm in active}
+    known = [(remark, words.get((remark.code, remark.about))) for remark in remarks]
+    return tuple(replace(remark, text=f"{remark.text} ({word})") if word else remark for remark, word in known)
 
 
 def select_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:

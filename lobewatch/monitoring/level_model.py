@@ -65,35 +65,34 @@ class LevelModel:
             product, square = self._change(kind, n, k)
             with np.errstate(invalid="ignore", divide="ignore"):
                 return np.asarray(product / np.sqrt(square))
-        sums, root = _change_without_level(kind, n, k)
+        length = (n - k).astype(np.float64)
+        sums = length if kind == "step" else length * (length - 1) / 2
         product = self._tail(0, kind, n, k)
         product -= sums * self._levels[1][n[:, 0]]
         with np.errstate(invalid="ignore", divide="ignore"):
-            product /= root
+            product /= np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums)
         return product
 
     def t_statistic(self, lean: Floats, n: Indices) -> Floats:
         """Return Student's t of changes that explain this much in the first n, shape (r,) each."""
-        total = self._residual_squares_up_to[n]
-        left = np.maximum(total - lean**2, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
-        return np.asarray(lean / np.sqrt((left + self._prior_squares) / self.freedom(n)))
+        return np.asarray(lean / np.sqrt(self._point_variance(lean**2, n)))
 
     def freedom(self, n: Indices) -> Floats:
         """Return the degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
-    @property
-    def _prior_squares(self) -> float:
-        """Sum of squares that is known beforehand."""
-        return self.scatter_prior.freedom * self.scatter_prior.percent**2
+    def _point_variance(self, explained: Floats, n: Indices) -> Floats:
+        """Return the variance of a point in the first n, where a change explains this sum of squares, shape (r,)."""
+        total, prior = self._residual_squares_up_to[n], self.scatter_prior
+        left = np.maximum(total - explained, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        return np.asarray((left + prior.freedom * prior.percent**2) / self.freedom(n))
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
         """Return size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
         until = np.array([n])
         product, square = (float(part[0, 0]) for part in self._change(kind, until[:, np.newaxis], np.array([k])))
-        size, total = product / square, float(self._residual_squares_up_to[n])
-        left = max(total - size * product, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
-        return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
+        size = product / square
+        return size, float(np.sqrt(self._point_variance(np.array([size * product]), until)[0] / square))
 
     def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
         """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
@@ -233,14 +232,6 @@ def _change_square(kind: str, length: Indices) -> Floats:
     """Return the squared norm of the column of a change over some points."""
     points = length.astype(np.float64)
     return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
-
-
-def _change_without_level(kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
-    """Return sums and root squares of change columns orthogonal to the level, shape (r, m) each."""
-    length = (n - k).astype(np.float64)
-    sums = length if kind == "step" else length * (length - 1) / 2
-    with np.errstate(invalid="ignore"):
-        return sums, np.asarray(np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums))
 
 
 def _cumulative_sums(values: Floats) -> Floats:

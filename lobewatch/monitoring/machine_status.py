@@ -35,14 +35,10 @@ RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (r
 """What is said of a drop as that of bearings that run in; it triggers an alarm like any other."""
 
 
-def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
-    """Remark on a newest test that does not show the followed mode."""
+def _newest_remarks(name: str, newest: HistoryRow, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
+    """Remark on a newest test without the followed mode, and a frequency drop that has reached a limit."""
     if not newest.frequency.is_known and newest.direction != CROSS_TAP:
         yield rules.MODE_LOST.remark(name)
-
-
-def _drop_limit_remarks(name: str, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
-    """Remark on a frequency drop that has reached a limit of machine.toml."""
     if drop.value >= limits.frequency_alarm_percent:
         yield rules.FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
     elif drop.value >= limits.frequency_warn_percent:
@@ -226,9 +222,9 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
-    of_limits = [*_drop_limit_remarks(name, drop, machine.limits)]
+    of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
     of_watch = [*_trend_remarks(name, trend, path)] if trend else []
-    remarks = [*_lost_mode_remarks(name, newest), *of_limits, *of_watch, *_value_change_remarks(name, series)]
+    remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
     pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
     raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]

@@ -178,21 +178,18 @@ class Trend:
 
 
 def fit_trend(
-    series: Sequence[TapValue],
-    now: datetime,
-    other: Sequence[TapValue] = (),
-    known: SeriesScatterPrior = NO_SERIES_PRIOR,
+    taps: Sequence[TapValue], now: datetime, other: Sequence[TapValue] = (), known: SeriesScatterPrior = NO_SERIES_PRIOR
 ) -> Trend:
-    """Fit the trend of a series, oldest first, with at least one value.
+    """Fit the trend of a series of taps, oldest first, with at least one value.
 
     now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
-    points, past = _newest_points(series), None
+    points, past = _newest_points(taps), None
     readings = _build_readings(points, _newest_points(other) if other else (), known)
     if len(points) >= MIN_FORECAST_POINTS:
         past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
-    return Trend(points, series[0].value, readings, past, int(days_since_epoch(now)))
+    return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:

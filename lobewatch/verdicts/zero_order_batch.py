@@ -77,7 +77,9 @@ class ZeroOrderBatch:
     @classmethod
     def of(cls, rows: MillingRows) -> ZeroOrderBatch:
         """Build the batch from rows, each fed in its own direction."""
-        tangential, radial = _unit_mean_forces(rows.cut)
+        unit = replace(rows.cut, tangential=1.0, radial=0.0, feed_angle=0.0)
+        tangential = mean_force(unit)
+        radial = mean_force(replace(unit, radial=1.0)) - tangential
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, rotate_to_machine(force, rows.feed_angle))
 
@@ -251,9 +253,3 @@ def is_force_constant(cut: Cut) -> bool:
     force = interval_forces(cut, 64)[0]
     is_even = bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
     return is_even and not cut.pitch and cut.helix_lag == 0
-
-
-def _unit_mean_forces(cut: Cut) -> tuple[Floats, Floats]:
-    """Return the mean force matrices for Kt = 1 and for Kr = 1, in the frame of the feed."""
-    first = mean_force(replace(cut, tangential=1.0, radial=0.0, feed_angle=0.0))
-    return first, mean_force(replace(cut, tangential=1.0, radial=1.0, feed_angle=0.0)) - first

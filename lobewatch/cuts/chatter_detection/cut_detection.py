@@ -150,22 +150,20 @@ def _loudness_threshold(level: Floats) -> float:
     return threshold
 
 
-def _build_parts(
-    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
-) -> CutParts:
+def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, rate: float, size: int) -> CutParts:
     """Build entry, steady part and exit of a stretch of pieces, with its fault; size: of a piece (samples)."""
-    step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
+    step, longest = size // 2, round(MAX_CUT_TIME * rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
-    first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
-    pause, most = MAX_PAUSE_TIME * sample_rate / step, MAX_ENTRY_TIME * sample_rate / step
+    first, last = begin + step + round(CUT_SETTLING_TIME * rate), end - size
+    pause, most = MAX_PAUSE_TIME * rate / step, MAX_ENTRY_TIME * rate / step
     entry, leaving = _find_entry_and_exit(power[slice(*stretch)], pause, most)
     steady = max(first, begin + step + entry * step), last - leaving * step
     if steady[1] - steady[0] >= longest:
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
-    times = (place / sample_rate for place in (begin, end, first, last))
+    times = (place / rate for place in (begin, end, first, last))
     parts = CutParts("", air, settled, *times)
-    return parts._replace(reason=_find_cut_fault(axes, parts, sample_rate, step))
+    return parts._replace(reason=_find_cut_fault(axes, parts, rate, step))
 
 
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:

@@ -204,7 +204,8 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
     end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
     end_power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
-    still = min(end_power / _chatter_power(chatter), 1.0)
+    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
+    still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = replace(sound, energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
@@ -215,12 +216,6 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
         return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
-
-
-def _chatter_power(chatter: ChatterPeaks) -> float:
-    """Return the power of the peak that names the chatter."""
-    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
-    return float(chatter.peaks.amplitude[at] ** 2)
 
 
 def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:

@@ -103,12 +103,10 @@ def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
     return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
-def _pick_comb(
-    peaks: SpectralPeaks, images: Floats, bin_width: float, frequency: float, tolerance: float
-) -> Comb | None:
+def _pick_comb(peaks: SpectralPeaks, images: Floats, width: float, frequency: float, tolerance: float) -> Comb | None:
     weight, best, most = np.minimum(np.log10(peaks.clearness), MAX_PEAK_WEIGHT), None, 0.0
     for candidate in _candidate_frequencies(peaks, frequency, tolerance):
-        comb = _fit_comb(float(candidate), peaks, images, bin_width)
+        comb = _fit_comb(float(candidate), peaks, images, width)
         score = float(np.sum(weight[comb.is_member]))
         if score > most and abs(comb.frequency / frequency - 1) <= tolerance:
             best, most = comb, score
@@ -148,9 +146,7 @@ def _peak_error(peaks: SpectralPeaks, bin_width: float) -> Floats:
     return np.hypot(peaks.frequency_error(bin_width), COMB_SPEED_WAVER * peaks.frequency)
 
 
-def _comb_chance(
-    comb: Comb, peaks: SpectralPeaks, images: Floats, bin_width: float, teeth: int, tolerance: float
-) -> float:
+def _comb_chance(comb: Comb, peaks: SpectralPeaks, images: Floats, width: float, teeth: int, tolerance: float) -> float:
     """Return how many of all combs tried would have as many harmonics among random peaks.
 
     Harmonics of tooth passing alone are this much rarer.
@@ -159,9 +155,9 @@ def _comb_chance(
     if orders.size < MIN_COMB_HARMONICS:
         return np.inf
     spacing = comb.frequency * (1 if np.any(orders % teeth) else teeth)
-    near = min(2 * COMB_TOLERANCE * bin_width / spacing * len(images), 1.0)
-    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * bin_width), 1.0)
-    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * bin_width))).size
+    near = min(2 * COMB_TOLERANCE * width / spacing * len(images), 1.0)
+    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * width), 1.0)
+    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * width))).size
     return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
 
 

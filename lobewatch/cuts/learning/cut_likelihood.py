@@ -227,10 +227,8 @@ def predict_chatter(setting: CutSetting, assembly: Assembly, speed_rpm: float) -
     axes = FEED_ANGLES.values() if setting.feed == "both" else (FEED_ANGLES[setting.feed],)
     cuts = [replace(setting.cut, feed_angle=angle) for angle in axes]
     depth, speed = np.array([[setting.depth]]), np.array([speed_rpm])
-    multipliers = []
-    for cut in cuts:
-        rows = rows_at_speeds(system, cut, speed)
-        multipliers.append(largest_multipliers(rows, depth, count_pieces(rows, setting.depth))[0])
+    fed = [rows_at_speeds(system, cut, speed) for cut in cuts]
+    multipliers = [largest_multipliers(rows, depth, count_pieces(rows, setting.depth))[0] for rows in fed]
     worst = int(np.argmax([abs(multiplier[0]) for multiplier in multipliers]))
     repeats = np.array([setting.cut.repeats_per_turn * speed_rpm / 60])
     frequency = loudest_chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], repeats)

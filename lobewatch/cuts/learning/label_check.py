@@ -12,7 +12,6 @@ import numpy as np
 from acquisition import Remark
 from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD
 from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
 
 MAX_WRONG_PROBABILITY = 0.5
@@ -63,7 +62,7 @@ def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
     wrong = wrong_label_probability(evidence)
     if np.isfinite(cut.frequency) and cut.has_chatter:
-        reach = MAX_FREQUENCY_DEVIATION * CHATTER_FREQUENCY_SPREAD * cut.frequency
+        reach = MAX_FREQUENCY_DEVIATION * cut_likelihood.CHATTER_FREQUENCY_SPREAD * cut.frequency
         near = np.any(prediction.frequency_distances(cut) < reach, axis=0)
         likelihood = cut_likelihood.log_likelihood(cut, prediction, _repeats_of(cut, evidence.prior))
         others = weights * np.exp(-cut.weight * likelihood)

@@ -9,7 +9,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence
-from lobewatch.cuts.learning.program_learning import collect_tool_evidence
+from lobewatch.cuts.learning.program_learning import collect_evidence
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import geometry_key
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
@@ -106,6 +106,6 @@ def apply_test_cuts(verdict: Verdict, tool: Assembly, machine: Machine, cuts: Cu
 def _find_own_cuts(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> list[CutEvidence]:
     """Find the cuts of this program, at speeds corrected for the change of the natural frequency."""
     shape = geometry_key(machine.build_cut(table))
-    evidence = collect_tool_evidence(cuts, table, tool, machine)
+    evidence = collect_evidence(cuts, table, tool, machine)
     own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]
     return [replace(cut, speed_rpm=cut.speed_rpm / cut.frequency_ratio) for cut in own]

@@ -72,7 +72,8 @@ class Posterior:
     @property
     def weights(self) -> Floats:
         """Weight of each sample, sum 1, shape (r,)."""
-        return _normalize_weights(self.log_weight)
+        weights = np.exp(self.log_weight - np.max(self.log_weight))
+        return np.asarray(weights / np.sum(weights))
 
     @property
     def effective_size(self) -> float:
@@ -158,11 +159,6 @@ def _cut_log_likelihood(
     word = cut_likelihood.log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
     power = cut_likelihood.power_log_likelihood(cut, samples.force_factors(cut.material), before)
     return cut.weight * word + power
-
-
-def _normalize_weights(log_weight: Floats) -> Floats:
-    weights = np.exp(log_weight - np.max(log_weight))
-    return np.asarray(weights / np.sum(weights))
 
 
 def _refresh(posterior: Posterior) -> Posterior:

@@ -70,7 +70,8 @@ class SpindleSamples:
         """
         at_rest = self.at_rest
         tangential, ratio = self._coefficient_factors(0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
-        frequency, sides, soft = self._frequency_factors(), self._side_factors(), np.mean(self._flexibility(), axis=0)
+        frequency, sides = self._frequency_factors(), self._side_factors()
+        soft = np.mean(1 / (2 * at_rest.damping_ratio * at_rest.stiffness), axis=0)
         values = {"tangential": tangential, "ratio": ratio}
         for axis, side in enumerate("xy"):
             modes = np.flatnonzero(at_rest.axes[at_rest.direction] == axis)
@@ -105,10 +106,6 @@ class SpindleSamples:
     def _material_index(self, material: int) -> int:
         """Place of the first number of a material."""
         return _count_spindle_numbers(self.at_rest) + NUMBERS_PER_MATERIAL * material
-
-    def _flexibility(self) -> Floats:
-        """How far each mode gives way at its natural frequency, at rest (m/N), shape (r, n)."""
-        return np.asarray(1 / (2 * self.at_rest.damping_ratio * self.at_rest.stiffness))
 
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""

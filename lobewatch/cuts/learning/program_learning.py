@@ -74,7 +74,7 @@ def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: C
     at_rest = build_median_row(build_program(table, machine), tool)
     start = build_prior(at_rest, uncertainty_of(tool, table, machine))
     posterior, odd_powers = start, []
-    for cut in collect_tool_evidence(cuts, table, tool, machine):
+    for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
         if label_check.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
@@ -108,9 +108,7 @@ def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> Cut
     return CutGrid(cut, angles, speeds, deepest, trust)
 
 
-def collect_tool_evidence(
-    cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine
-) -> Iterator[CutEvidence]:
+def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine) -> Iterator[CutEvidence]:
     """Yield the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]

@@ -155,8 +155,7 @@ def _merge_directions(
     n = np.flatnonzero(np.isfinite(together.score)) + 1
     last, fell, middle = shared[n - 1], together.is_step[n - 1], together.point[n - 1]
     own, mean = base.change_sizes(fell, last + 1, shared[middle]), common.change_sizes(fell, n, middle)
-    shares = own * mean >= MIN_SHARED_CHANGE * mean**2
-    counts = shares & ~(together.score[n - 1] <= alone.score[last])
+    counts = (own * mean >= MIN_SHARED_CHANGE * mean**2) & ~(together.score[n - 1] <= alone.score[last])
     merged = LikeliestChange(alone.score.copy(), alone.is_step.copy(), alone.point.copy())
     for values, part in zip(merged, (together.score[n - 1], fell, shared[middle]), strict=True):
         values[last[counts]] = part[counts]

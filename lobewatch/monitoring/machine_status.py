@@ -186,8 +186,7 @@ def assess_status(
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
-    asked = {row.tap_id: row.questions for row in history.rows}
-    remarks += question_remarks(asked, path, [row.tap_id for row in rows])
+    remarks += question_remarks({row.tap_id: row.questions for row in history.rows}, path, [row.tap_id for row in rows])
     programs = [*_program_remarks(rows, machine)]
     raised += [_trigger_program_alarm(remark, rows) for remark in programs if rules.is_alarm(remark)]
     remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]
@@ -205,8 +204,7 @@ def _build_status(
     """Build the status from its remarks; default_step: next step where no remark has one."""
     ordered, alarms = rules.sort_by_severity(remarks), rules.sort_by_severity(alarms)
     acknowledged = add_acknowledgements(ordered, alarms, now)
-    step = rules.find_next_step(ordered, default_step)
-    return MachineStatus(now, ordered, step, acknowledged, alarms)
+    return MachineStatus(now, ordered, rules.find_next_step(ordered, default_step), acknowledged, alarms)
 
 
 def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:

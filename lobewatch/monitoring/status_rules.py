@@ -173,8 +173,7 @@ def worst_status(ordered: Sequence[Remark]) -> StatusLevel:
 
 def is_early_alarm(ordered: Sequence[Remark]) -> bool:
     """Return whether the only alarm is a detected drop short of every limit and program."""
-    codes = {remark.code for remark in ordered}
-    return worst_status(ordered) is ALARM and codes.isdisjoint(LIMIT_CODES)
+    return worst_status(ordered) is ALARM and {remark.code for remark in ordered}.isdisjoint(LIMIT_CODES)
 
 
 def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:

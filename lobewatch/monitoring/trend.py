@@ -167,8 +167,7 @@ class Trend:
         """Whether the open drop began among the first points and has slowed down since, as new bearings run in."""
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
-        fallen = self.start - float(self.past_fit.fitted[-1])
-        mean = fallen / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
+        mean = (self.start - float(self.past_fit.fitted[-1])) / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
         return -self.past_fit.rate.value < MAX_RUN_IN_RATE * mean
 
     @property

@@ -67,8 +67,7 @@ def list_pair_shapes(at: Floats) -> list[TrendShape]:
     """List all shapes of two columns."""
     ramps, steps = [0.0, *at[1:-3].tolist()], at[2:-1].tolist()
     slopes = [TrendShape("slopes", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
-    crashes = [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
-    return slopes + crashes
+    return slopes + [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
 
 
 def list_triple_shapes(at: Floats) -> list[TrendShape]:
@@ -108,8 +107,7 @@ def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
 
 def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
     """Build the columns of three-column shapes, shape (j, 3, d): the line, and both dates."""
-    line = np.broadcast_to(at, (len(shapes), 1, at.size))
-    return np.concatenate([line, build_pair_columns(shapes, at)], axis=1)
+    return np.concatenate([np.broadcast_to(at, (len(shapes), 1, at.size)), build_pair_columns(shapes, at)], axis=1)
 
 
 RATE_STEP = 1e-6

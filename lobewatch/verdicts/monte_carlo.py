@@ -168,8 +168,7 @@ def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
     below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
     around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
-    near = (samples.limits <= below) | around
-    chatters = _find_chattering(samples, near, around, limits, depth)
+    chatters = _find_chattering(samples, (samples.limits <= below) | around, around, limits, depth)
     return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, axes_ratio)
 
 

@@ -105,8 +105,7 @@ def propose_pitch(
     search = PitchSearch(case, verdict.samples, limits)
     unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
     if present := machine.build_cut(table).pitch:
-        pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
-        unequal.append(search.evaluate(pattern)[0])
+        unequal.append(search.evaluate(PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is"))[0])
     band = verdict.limit, verdict.limit_low, verdict.limit_high
     evaluation = _build_evaluation(equal, verdict.stability, band, limits, limits)
     return PitchProposal(verdict, evaluation, tuple(sorted(unequal, key=lambda judged: -judged.low)), half_wave)

@@ -160,8 +160,7 @@ def find_worst_limit(case: ProgramCase) -> WorstLimit:
     patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
     limits = [lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
     worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    deepest = MAX_PROGRAM_DEPTH_RATIO * case.depth
-    depths = [min(limit.limit, deepest) for limit in limits]
+    depths = [min(limit.limit, MAX_PROGRAM_DEPTH_RATIO * case.depth) for limit in limits]
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
 
 

@@ -262,8 +262,7 @@ def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float |
 def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
     """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
-    speed = float(likely.speeds[int(np.argmax(likely.depths))])
-    probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)
+    probe = search.case.at(float(likely.speeds[int(np.argmax(likely.depths))]), depth_mm or DEPTH_STEP_MM)
     verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
     return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES))

@@ -202,8 +202,7 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     if not all(map(is_force_constant, cuts)):
         best = np.max(speeds * around(limit))
         rates = speeds * np.minimum(deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe)
-        thinkable = rates >= MIN_REMOVAL_SHARE * best
-        wanted = scipy.ndimage.maximum_filter1d(thinkable, 4 * steps + 1)
+        wanted = scipy.ndimage.maximum_filter1d(rates >= MIN_REMOVAL_SHARE * best, 4 * steps + 1)
         limit = _limits_by_multipliers(case, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
     return LikelyDepths(speeds, around(limit))
 

@@ -57,8 +57,7 @@ def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: Stiffness
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over both speeds, the frequency drop and half of it."""
-    speeds = [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR]
-    return _sweep(samples, speeds, [0, drop, drop / 2, 0], stiffness_at)
+    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at)
 
 
 def _sweep(samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness: StiffnessAt) -> ProgramSamples:
@@ -69,8 +68,7 @@ def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
     """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
-    steps = np.arange(MAX_WINDOW_STEPS + 1.0)
-    ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * steps) for sign in (-1, 1))
+    ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * np.arange(MAX_WINDOW_STEPS + 1.0)) for sign in (-1, 1))
     slow, fast = (_last_stable_ratio(near, hardest, ratio, depth) for ratio in ratios)
     slowest = math.ceil(max(speed * slow, reach.low_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
     fastest = math.floor(min(speed * fast, reach.high_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
@@ -79,8 +77,7 @@ def find_speed_window(
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
     """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
-    fallen = _sweep(hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at)
-    grown = fallen.critical_growth(depth)
+    grown = _sweep(hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at).critical_growth(depth)
     return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
 
 

@@ -214,8 +214,7 @@ def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, 
     if assembly.predicted:
         percents = given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent
         sizes = [percent / 100 for percent in percents]
-        predicted = np.array([(*sizes, abs(np.radians(mode.phase_deg))) for mode in (*x, *y)])
-        widths = {causes.PREDICTION.name: predicted}
+        widths = {causes.PREDICTION.name: np.array([(*sizes, abs(np.radians(mode.phase_deg))) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = np.vstack([np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides])
@@ -240,8 +239,7 @@ def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Sc
 def _tap_error(mode: Mode) -> Floats:
     """Return the 95 % error of the tap test, relative, of the phase in rad; 0 where it is unknown."""
     values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
-    error = np.append(mode.standard_error, mode.phase_deg_std)
-    return np.asarray(np.nan_to_num(mode.quantile() * error / values))
+    return np.asarray(np.nan_to_num(mode.quantile() * np.append(mode.standard_error, mode.phase_deg_std) / values))
 
 
 def _tap_correlation(mode: Mode) -> Floats:

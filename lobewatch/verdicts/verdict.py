@@ -174,8 +174,7 @@ def evaluate_program(
         return replace(unknown, remarks=(*unknown.remarks, *program_remarks.tool_limit_remarks(table, machine)))
     if not tool.directions:
         return _unknown_verdict(table, tool.remarks, tool, speed_pocket_remarks(table, table.name, tool, machine))
-    on_model = tool.predicted or machine.tap.position_mm > 0
-    if asked := find_program_questions(machine, table, on_model):
+    if asked := find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0):
         return _unknown_verdict(table, tuple(doubted.remark for doubted in asked), tool)
     case = ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed)
     return _build_verdict(case, result or run_monte_carlo(case))

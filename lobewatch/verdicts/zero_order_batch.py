@@ -170,8 +170,7 @@ class ZeroOrderBatch:
             flexible = 1 / (stiffness * (1 + (2 * zeta + r) * r))
             part = (place + velocity * r) * flexible
             total += coupling * part
-            bend = part * (2 * stiffness * (zeta + r))
-            slope += coupling * (velocity - bend) * flexible / natural
+            slope += coupling * (velocity - part * (2 * stiffness * (zeta + r))) * flexible / natural
         return total, slope
 
     def _modes(self, force: int, shown: int) -> Iterator[list[Floats]]:
@@ -205,8 +204,7 @@ class ZeroOrderBatch:
             gxy = self._receptance(2 * np.pi * grid, 0, 1)
             half, product = half + (h[:, 0, 1] + h[:, 1, 0]) * gxy / 2, product - gxy**2
         root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * product)
-        jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
-        root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
+        root[:, 1:] *= np.cumprod(np.where(np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0, -1.0, 1.0), axis=1)
         return [half + root, half - root]
 
 
@@ -215,7 +213,9 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
 
     A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
-    turn = 0.5 - _unwrap(np.angle(loop)) / np.pi
+    angle = np.angle(loop)
+    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(np.diff(angle, axis=1) / (2 * np.pi)), axis=1)
+    turn = 0.5 - angle / np.pi
     low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)
     depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     steps = np.flatnonzero(np.any(low, axis=0))
@@ -239,13 +239,6 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
     row, speed, step, share = row[lowest], speed[lowest], step[lowest], share[lowest]
     frequency[row, speed] = grid[row, step] + share * (grid[row, step + 1] - grid[row, step])
     return depth, frequency
-
-
-def _unwrap(angle: Floats) -> Floats:
-    """Unwrap angles (r, k)."""
-    step = np.diff(angle, axis=1)
-    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(step / (2 * np.pi)), axis=1)
-    return angle
 
 
 def is_force_constant(cut: Cut) -> bool:

@@ -105,8 +105,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
         return [CutParts("no-cut")]
     is_loud = np.zeros(sounds.size, dtype=np.bool_)
     is_loud[sounds] = _find_loud_pieces([_piece_power(axis[sounds], sample_rate) for axis in pieces])
-    loud = _find_stretches(is_loud)
-    joined = _join_stretches(loud, MAX_PAUSE_TIME * sample_rate / step)
+    joined = _join_stretches(_find_stretches(is_loud), MAX_PAUSE_TIME * sample_rate / step)
     stretches = [(first, last) for first, last in joined if (last - first) * step > MAX_KNOCK_TIME * sample_rate]
     if not stretches:
         return [CutParts("no-cut")]
@@ -115,8 +114,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     cuts = [_build_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
     least = MIN_CUT_LENGTH_SHARE * (longest.end - longest.begin)
-    kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
-    return kept or [longest]
+    return [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least] or [longest]
 
 
 def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
@@ -133,8 +131,7 @@ def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
 
 def _loudness_step(level: Floats, is_loud: Flags) -> float:
     """By how much what is loud is louder than what is not, in the mean."""
-    is_split = np.any(is_loud) and not np.all(is_loud)
-    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
+    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if np.any(is_loud) and not np.all(is_loud) else 0.0
 
 
 def _loudness_threshold(level: Floats) -> float:
@@ -161,8 +158,7 @@ def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: sli
     if steady[1] - steady[0] >= longest:
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
-    times = (place / rate for place in (begin, end, first, last))
-    parts = CutParts("", air, settled, *times)
+    parts = CutParts("", air, settled, *(place / rate for place in (begin, end, first, last)))
     return parts._replace(reason=_find_cut_fault(axes, parts, rate, step))
 
 

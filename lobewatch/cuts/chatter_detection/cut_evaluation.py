@@ -195,8 +195,7 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
     if peaks is None or speed is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
-    is_undersampled = classification.is_undersampled(spectrum, speed, teeth)
-    if is_undersampled and n_harmonics < classification.MIN_TOOTH_HARMONICS:
+    if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return replace(sound, verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
         return _evaluate_without_chatter(sound, teeth, immersion)
@@ -225,8 +224,7 @@ def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float
     power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))
-    limits = MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power)
-    is_odd = uneven > max(limits)
+    is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))
     is_loud = immersion < SLOT_IMMERSION and np.sum(power[~tooth]) > MAX_RUNOUT_ENERGY * np.sum(power[tooth])
     return replace(sound, verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 

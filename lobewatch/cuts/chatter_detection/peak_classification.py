@@ -171,8 +171,7 @@ def _remove_wavering(left: SpectralPeaks, comb: SpectralPeaks, bin_width: float,
     """Remove faint peaks next to spindle harmonics, caused by a speed that wavers quickly."""
     if left.energy > MAX_WAVERING_ENERGY * comb.energy:
         return left
-    away = fold_frequency(left.frequency, turn)
-    return left[away > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * bin_width]
+    return left[fold_frequency(left.frequency, turn) > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * bin_width]
 
 
 def _is_folded(peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float) -> Flags:
@@ -233,8 +232,7 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
     score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
     best = families[int(np.argmax(score))]
     top = int(np.argmax(np.where(best, named, 0.0)))
-    error = float(left.frequency_error(bin_width)[top])
-    return ChatterPeaks(float(left.frequency[top]), error, left[best & part])
+    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[best & part])
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:

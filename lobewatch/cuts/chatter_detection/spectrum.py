@@ -122,12 +122,10 @@ def compute_spectra(signal: Floats, sample_rate: float) -> list[Spectrum]:
 
 def _noise_level(power: Floats) -> Floats:
     """Return the mean noise power, from the quiet bins of each neighborhood (power of noise is exponential)."""
-    count = max(power.size // (PADDING_FACTOR * NOISE_BINS), 2)
-    blocks = np.array_split(power, count)
+    blocks = np.array_split(power, max(power.size // (PADDING_FACTOR * NOISE_BINS), 2))
     level = np.array([np.quantile(block, NOISE_QUANTILE) for block in blocks]) / -np.log(1 - NOISE_QUANTILE)
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
-    least = np.finfo(np.float64).tiny
-    return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
+    return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), np.finfo(np.float64).tiny))
 
 
 def remove_skirts(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:

@@ -76,8 +76,7 @@ def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded:
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         return voted or summed
-    rival = refine_speed(summed.frequency, peaks, spectra[0].bin_width)
-    return summed if rival.agreeing >= voted.agreeing else voted
+    return summed if refine_speed(summed.frequency, peaks, spectra[0].bin_width).agreeing >= voted.agreeing else voted
 
 
 def _find_speed_by_peaks(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
@@ -160,8 +159,7 @@ def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
 def _smooth_votes(votes: Floats, width: float) -> Floats:
     """Spread each vote over its neighbors; width: standard deviation in grid steps."""
     reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
-    spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    return np.convolve(votes, spread, "same")
+    return np.convolve(votes, np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2), "same")
 
 
 TACHOMETER_TOLERANCE = 2e-3
@@ -239,8 +237,7 @@ def find_distant_speed(
     width = first.bin_width
     agreeing = refine_speed(known.frequency, loudest, width).agreeing
     summed = [comb for comb in sums if comb and refine_speed(comb.frequency, loudest, width).agreeing > agreeing]
-    found = (*plain, *summed)
-    better = [comb.frequency for comb in found if _is_better_comb(comb, known, left, width)]
+    better = [comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, known, left, width)]
     return max(better, key=lambda frequency: _rank_comb(frequency, loudest, width)) if better else np.nan
 
 

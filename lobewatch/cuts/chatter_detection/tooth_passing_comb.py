@@ -192,13 +192,7 @@ WEAK_PEAK_POWER = 4.0
 
 
 def find_comb_by_sum(
-    spectra: Spectra,
-    air: Spectra,
-    peaks: SpectralPeaks,
-    teeth: int,
-    center: float,
-    tolerance: float,
-    usual: float = 1,
+    spectra: Spectra, air: Spectra, peaks: SpectralPeaks, teeth: int, center: float, tolerance: float, usual: float = 1
 ) -> SpindleSpeed | None:
     """Find the comb within `tolerance` (relative) of a center frequency (Hz) that is loudest over the noise, or None.
 

@@ -160,8 +160,7 @@ def max_log_likelihood(cut: CutEvidence) -> float:
 
 def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
     """Return the likelihood of recorded kind and frequency if the cut chatters."""
-    alike = prediction.is_flip == (cut.verdict == "flip")
-    kind = np.where(alike, 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
+    kind = np.where(prediction.is_flip == (cut.verdict == "flip"), 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
     wide = CHATTER_FREQUENCY_SPREAD * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
     distances = prediction.frequency_distances(cut)
     near = np.exp(-((distances / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
@@ -187,8 +186,7 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
         unstable = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond])
         _, loudest = unstable.fastest_growth(rows.speed_rpm[beyond], cut.depth)
         frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
-    teeth = 1 / rows.tooth_period
-    base, at_limit = (fold_frequency(part, teeth) for part in (frequency, at_limit))
+    base, at_limit = (fold_frequency(part, 1 / rows.tooth_period) for part in (frequency, at_limit))
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
 
 

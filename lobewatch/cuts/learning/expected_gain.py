@@ -138,11 +138,9 @@ class LimitCharts:
 
     def true_best_rates(self, cuts: Sequence[CutEvidence]) -> Floats:
         """Return the largest removal rate (rpm m) of cuts that are truly stable in each sample, shape (r,)."""
-        best = np.zeros(len(self.limits))
-        for cut in cuts:
-            if not cut.has_chatter:
-                best = np.maximum(best, np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth))
-        return best
+        stable = [cut for cut in cuts if not cut.has_chatter]
+        rates = [np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth) for cut in stable]
+        return np.asarray(np.max([np.zeros(len(self.limits)), *rates], axis=0))
 
     def is_label_wrong(self, cut: CutEvidence) -> Flags:
         """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
@@ -157,8 +155,7 @@ class LimitCharts:
         order, rates = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
         gain = np.zeros(rates.shape)
         for value in np.unique(best):
-            stable = np.cumsum((weights * (best == value))[order], axis=0)
-            gain += stable * np.maximum(rates - value, 0.0)
+            gain += np.cumsum((weights * (best == value))[order], axis=0) * np.maximum(rates - value, 0.0)
         likely = np.cumsum(weights[order], axis=0) > MIN_STABLE_PROBABILITY
         best_gains = np.zeros(speeds.shape)
         best_gains[speeds] = np.max(likely * gain, axis=0, initial=0.0)
@@ -175,8 +172,7 @@ class LimitCharts:
                 break
         for row in places:
             limits = [float(np.quantile(self.limits[:, row], 1 - chance)) for chance in TRIED_STABLE_PROBABILITIES]
-            depths = set(map(floor_depth, limits))
-            yield from ((row, depth) for depth in sorted(depths) if depth > 0)
+            yield from ((row, depth) for depth in sorted(set(map(floor_depth, limits))) if depth > 0)
 
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
         """Return the worth of a cut (rpm m): its own gain, and that of the best next cut."""

@@ -78,8 +78,7 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
     cut, before = evidence.cut, evidence.prior
     if cut.power is None:
         return False
-    force = before.samples.force_factors(cut.material)
-    distance, variance = cut_likelihood.power_distance(cut, force, before.cuts)
+    distance, variance = cut_likelihood.power_distance(cut, before.samples.force_factors(cut.material), before.cuts)
     mean = np.sum(before.weights * distance)
     spread = np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance)
     return bool(abs(mean) > MAX_FREQUENCY_DEVIATION * spread)

@@ -157,8 +157,7 @@ def _cut_log_likelihood(
 ) -> Floats:
     """Return the log likelihood of one cut after those before it; an old cut counts less."""
     word = cut_likelihood.log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    power = cut_likelihood.power_log_likelihood(cut, samples.force_factors(cut.material), before)
-    return cut.weight * word + power
+    return cut.weight * word + cut_likelihood.power_log_likelihood(cut, samples.force_factors(cut.material), before)
 
 
 def _refresh(posterior: Posterior) -> Posterior:
@@ -171,8 +170,7 @@ def _refresh(posterior: Posterior) -> Posterior:
     value = _joint_log_density(samples[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
     samples = samples[chosen[copies]]
     for _ in range(N_MARKOV_MOVES):
-        step = random.standard_normal(samples.normal.shape) @ root.T
-        moved = replace(samples, normal=samples.normal + step)
+        moved = replace(samples, normal=samples.normal + random.standard_normal(samples.normal.shape) @ root.T)
         least = value + np.log(random.uniform(size=len(samples)))
         moved_value = _joint_log_density(moved, cuts, least)
         taken = moved_value > least

@@ -132,8 +132,7 @@ def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     size = count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL
-    normal = np.random.default_rng((seed, 2)).standard_normal(size)
-    return SpindleSamples(normal, at_rest, uncertainty)
+    return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty)
 
 
 def _count_spindle_numbers(rows: MillingRows) -> int:
@@ -151,8 +150,7 @@ def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) ->
     ends = np.sort([rejected.low, rejected.high, 0.0, 1 / median])
     width = max(rejected.high - rejected.low, 1e-9)
     near, anywhere = np.clip((ends - rejected.low) / width, 0, 1), np.clip(ends * median, 0, 1)
-    below = (1 - OPEN_FORCE_RATIO_SHARE) * near + OPEN_FORCE_RATIO_SHARE * anywhere
-    return np.asarray(np.interp(share, below, ends))
+    return np.asarray(np.interp(share, (1 - OPEN_FORCE_RATIO_SHARE) * near + OPEN_FORCE_RATIO_SHARE * anywhere, ends))
 
 
 @cache

@@ -71,8 +71,7 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 
 def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    at_rest = build_median_row(build_program(table, machine), tool)
-    start = build_prior(at_rest, uncertainty_of(tool, table, machine))
+    start = build_prior(build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine))
     posterior, odd_powers = start, []
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)

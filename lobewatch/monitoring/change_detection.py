@@ -137,7 +137,7 @@ def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
     """Find the likeliest drop and rise up to each point."""
     first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
     n, last = base.y.size, np.arange(first - 1, base.y.size)
-    drops, rises = (LikeliestChange(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp)) for _ in "dr")
+    drops, rises = (LikeliestChange(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp)) for _ in range(2))
     if last.size:
         for every, judged in zip((drops, rises), _find_likeliest_changes(base, last), strict=True):
             for values, part in zip(every, judged, strict=True):

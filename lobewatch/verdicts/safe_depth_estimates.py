@@ -222,8 +222,7 @@ def _limits_by_multipliers(case: ProgramCase, speeds: Floats, by_cut: Floats, de
         rows = rows_at_speeds(system, cut, speeds[places[here]])
         limit = _first_crossing(rows, np.min(by_cut[:, places[here]], axis=0), deepest[places[here]])
         true[here] = np.minimum(true[here], limit)
-    between = np.interp(np.log(speeds), np.log(speeds[places]), true)
-    return np.asarray(np.where(wanted, between, np.min(by_cut, axis=0)))
+    return np.asarray(np.where(wanted, np.interp(np.log(speeds), np.log(speeds[places]), true), np.min(by_cut, axis=0)))
 
 
 def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
@@ -232,8 +231,7 @@ def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
     mean: limit by the zero-order approximation (mm) (r,); most: depth up to which it matters.
     """
     ends = np.minimum(mean * TRIED_ZERO_ORDER_SHARES[-1], most)[:, np.newaxis]
-    tried = np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis])
-    limit = _interpolate_crossing(rows, tried)
+    limit = _interpolate_crossing(rows, np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis]))
     beyond = np.flatnonzero(np.isinf(limit) & (ends[:, 0] < most))
     further = ends[beyond] * (1 - FURTHER_DEPTH_SHARES) + most[beyond, np.newaxis] * FURTHER_DEPTH_SHARES
     limit[beyond] = _interpolate_crossing(rows[beyond], further)

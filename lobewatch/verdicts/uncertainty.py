@@ -203,8 +203,7 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
     """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
-    said = table.wear if isinstance(table, ProgramTable) else None
-    return WEAR_FACTORS[said or machine.doubt.wear]
+    return WEAR_FACTORS[(table.wear if isinstance(table, ProgramTable) else None) or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:

@@ -129,8 +129,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
 
 def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
     """Return the bins within a reach of some, none beyond the last; shape (n, 2 reach + 1)."""
-    places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
-    return np.asarray(np.clip(places, 0, last))
+    return np.asarray(np.clip(np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1), 0, last))
 
 
 def find_cut_peaks(spectra: Spectra, air: Spectra) -> SpectralPeaks:

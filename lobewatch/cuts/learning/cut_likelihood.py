@@ -171,8 +171,7 @@ def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats
 
 def _folded_chatter(cut: CutEvidence) -> Floats:
     """Return the chatter frequency, or that of period two, folded by the teeth (Hz)."""
-    chatter = cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2
-    return fold_frequency(chatter, cut.tooth_frequency)
+    return fold_frequency(cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2, cut.tooth_frequency)
 
 
 def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:

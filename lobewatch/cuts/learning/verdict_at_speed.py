@@ -48,8 +48,7 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: CutEn
         return NO_TEST_CUTS
     learning = learn_program(table, tool, machine, cuts)
     remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
-    spindle = _build_spindle(learning, tool, machine) if learning.accepted_cuts else NO_TEST_CUTS
-    return replace(spindle, remarks=remarks)
+    return replace(_build_spindle(learning, tool, machine) if learning.accepted_cuts else NO_TEST_CUTS, remarks=remarks)
 
 
 def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -> SpindleAtSpeed:
@@ -64,15 +63,10 @@ def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -
     frequency, damping, stiffness = (part / mean for part, mean in zip(parts, median, strict=True))
     direction_over_mean = direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape)
     left = LearnedSamples(frequency, damping, stiffness, phases, force / np.mean(force), direction_over_mean)
-    uncertainty = Uncertainty(
-        modes={TEST_CUTS.name: _half_widths(parts, phases)},
-        tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
-        speed=machine.doubt.speed_percent / 100,
-        tangential=_factor_range(force),
-        ratio=_factor_range(direction),
-        axes=tool.principal_directions,
-        learned=left,
-    )
+    widths = {TEST_CUTS.name: _half_widths(parts, phases)}
+    mixing, speed = np.tile(np.eye(4), (at_rest.direction.size, 1, 1)), machine.doubt.speed_percent / 100
+    ranges, axes = (_factor_range(force), _factor_range(direction)), tool.principal_directions
+    uncertainty = Uncertainty(widths, mixing, speed, *ranges, axes=axes, learned=left)
     return SpindleAtSpeed(
         n_cuts=len(learning.accepted_cuts),
         uncertainty=uncertainty,

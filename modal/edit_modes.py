@@ -28,7 +28,7 @@ EDITED_MODE_DISTANCE = 0.01
 SAME_MODE_HALF_WIDTHS = 0.25
 """Distance up to which a mode to be added exists already (half-power half-widths); chosen."""
 TRIAL_DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03)
-"""Damping ratios that the fit of an added mode starts from, beside those of LSCF poles near it."""
+"""Start values of the damping ratio of an added mode, in addition to LSCF poles near it."""
 MAX_ADDED_MODE_SHIFT = 0.05
 """Largest relative shift of an added mode from the given frequency, within its half-width; chosen."""
 LONE_MODE_DAMPING = 0.02

@@ -64,7 +64,7 @@ FLEXIBILITY_TOLERANCE = 0.35
 
 @dataclass(frozen=True, eq=False)
 class StabilisationChart:
-    """Poles of all model orders that decay and lie inside the band, lower orders first."""
+    """Poles of all model orders that decay and are inside the band, lower orders first."""
 
     order: Integers
     """Order of the model: its number of poles, shape (k,)."""
@@ -79,7 +79,7 @@ class StabilisationChart:
 
     @property
     def stable(self) -> Flags:
-        """Whether the order below has the same pole, shape (k,)."""
+        """True for each pole that the order below has, too, shape (k,)."""
         return self.previous >= 0
 
 
@@ -165,7 +165,7 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
 
 
 def _is_inside_band(model: _LscfModel, poles: Complexes) -> Flags:
-    """Return which poles decay and lie in the band."""
+    """Return which poles decay and are in the band."""
     size = np.abs(poles)
     return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
 

@@ -41,7 +41,7 @@ class DataqTraits:
     firmware: str = "1.35"
     """Answer to `info 2`. Some devices answer in hexadecimal hundredths, "87"."""
     trailing_nul: bool = False
-    """Whether lines end with CR NUL instead of CR."""
+    """True if lines end with CR NUL instead of CR."""
     digital_word: int = 0x7F00
     """Word of the digital inputs, pulled up if nothing is connected."""
     clock_hz: float | None = None
@@ -49,9 +49,9 @@ class DataqTraits:
     bits: int = 16
     """Resolution (bits). The lower bits of each word are 0. The devices have fewer than 16 at high rates."""
     is_multiplexed: bool = False
-    """Whether inputs are converted one after the other within a scan."""
+    """True if inputs are converted one after the other within a scan."""
     echoes_stop: bool = False
-    """Whether a `stop` that ends scanning is echoed."""
+    """True if a `stop` that ends scanning is echoed."""
     stop_delay: float = 0.0
     """Silence before that echo and before the remaining data (s)."""
 
@@ -61,7 +61,7 @@ class DataqFaults:
     """Faults of an emulated DATAQ device. All are off by default."""
 
     halved_rate: bool = False
-    """Whether scans come at half the rate of the formula."""
+    """True if scans come at half the rate of the formula."""
     drop_at: int | None = None
     """Byte of the stream at which bytes are lost."""
     drop_bytes: int = 64
@@ -73,9 +73,9 @@ class DataqFaults:
     overflow_after: int | None = None
     """Number of scans after which its buffer overflows, once."""
     streaming_at_connect: bool = False
-    """Whether an earlier program has left it scanning."""
+    """True if an earlier program has left it scanning."""
     ignores_commands: bool = False
-    """Whether it ignores all commands."""
+    """True if it ignores all commands."""
 
 
 class DataqEmulator(EmulatorThread):
@@ -120,7 +120,7 @@ class DataqEmulator(EmulatorThread):
         self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}
         self._received = b""
         self.streaming = False
-        """Whether it is scanning."""
+        """True if it is scanning."""
         self._may_overflow = True
         if self._faults.streaming_at_connect:
             self._start()

@@ -1,4 +1,4 @@
-"""Command protocol of the DATAQ DI-1120, 2108, 2108-P, 4108, 4208 and 4718B on their virtual serial port.
+"""Command protocol of DATAQ DI-1120, 2108, 2108-P, 4108, 4208 and 4718B on a virtual serial port.
 
 Commands are lower-case ASCII ending with CR. The device echoes them while it is not scanning. Scans are a bare stream
 of little-endian 16-bit words, one per entry of the scan list, without header, counter or checksum.

@@ -66,7 +66,7 @@ class DataqSource(ClosedOnExit):
     """
 
     follows_clock = True
-    """Whether its scans follow the clock."""
+    """True, as scans follow the clock."""
     fault = ""
     """Empty: the device reports no faults."""
 

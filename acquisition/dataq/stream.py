@@ -33,7 +33,7 @@ class DigitalClock:
         self.restart()
 
     def restart(self) -> None:
-        """Start anew: the following scans do not join the earlier ones."""
+        """Restart: the following scans do not join the earlier ones."""
         self._high = True
         self._edge: int | None = None
         self._waited = 0

@@ -24,9 +24,9 @@ class DeviceSettings:
     inputs: tuple[SensorInput, ...] = ()
     """Sensors of a device that does not describe them itself."""
     loss_detection: bool = True
-    """Whether to detect lost scans."""
+    """True to detect lost scans."""
     digital_clock: bool = False
-    """Whether a square wave on digital input 0 shows the loss of whole scans."""
+    """True if a square wave on digital input 0 shows the loss of whole scans."""
     printing: OutputFormat | None = None
     """Output format of a board, None for volts in lines."""
 
@@ -92,13 +92,13 @@ class Driver:
     emulate: Callable[[EmulationSetup], EmulatorThread] | None = None
     """Function that emulates a device of this kind."""
     emulates_fast: bool = False
-    """Whether the emulated device can tell the host that its scans do not follow the clock."""
+    """True if the emulated device can tell the host that its scans do not follow the clock."""
     search: Callable[[], Sequence[DeviceAddress]] | None = None
     """Function that lists devices of this kind that are on no serial port, none if its library is not installed."""
     prints_samples: bool = False
-    """Whether such a device prints its samples, as [daq.printing] says."""
+    """True if such a device prints its samples, as [daq.printing] says."""
     is_hardware_tested: bool = True
-    """Whether a user has reported that it works on hardware."""
+    """True if a user has reported that it works on hardware."""
     extra: str = ""
     """Name of the lobewatch extra that installs its library, empty if it needs none."""
 

@@ -22,7 +22,7 @@ class DeviceAnswer:
     identity: DeviceIdentity
     """Model, serial number and firmware."""
     is_hardware_tested: bool = True
-    """Whether a user has reported that the driver works on hardware."""
+    """True if a user has reported that the driver works on hardware."""
 
 
 def probe_port(

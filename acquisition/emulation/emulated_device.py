@@ -71,7 +71,7 @@ class SimulatedSource(ClosedOnExit):
     identity = DeviceIdentity("simulation")
     """Identity that it reports."""
     follows_clock = False
-    """Whether its scans follow the clock. They come as fast as they are read."""
+    """False, as scans come as fast as they are read."""
     loss_detection = ""
     """Empty: no scans can be lost."""
 
@@ -119,11 +119,11 @@ class EmulationSetup:
     sample_rate: float
     """Sample rate of a device that has only one (Hz)."""
     realtime: bool = True
-    """Whether it sends by the clock. False sends as fast as the host reads."""
+    """True if it sends by the clock. False sends as fast as the host reads."""
     tcp: bool = False
-    """Whether it serves a TCP port of this computer instead of a pseudo-terminal."""
+    """True if it serves a TCP port of this computer instead of a pseudo-terminal."""
     digital_clock: bool = False
-    """Whether a square wave is on digital input 0."""
+    """True if a square wave is on digital input 0."""
 
 
 class Wire(Protocol):
@@ -227,7 +227,7 @@ class TcpWire:
 
     @property
     def has_host(self) -> bool:
-        """Whether a host is connected."""
+        """True if a host is connected."""
         return self._host is not None
 
     def exchange(self, timeout: float) -> bytes:

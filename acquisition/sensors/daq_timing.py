@@ -48,7 +48,7 @@ class MeasuredRate:
 
     @property
     def is_accurate(self) -> bool:
-        """Whether the standard error is at most 0.05 %."""
+        """True if the standard error is at most 0.05 %."""
         return self.std <= ACCURATE_RATE_STD * self.rate
 
 

@@ -41,7 +41,7 @@ class MassCalibration:
     phase: float
     """Phase of a against F over the band, without the sign (deg)."""
     inverted: bool
-    """Whether force and acceleration have opposite signs."""
+    """True if force and acceleration have opposite signs."""
     flatness: float
     """Relative change of F/(m a) from low frequency to the end of the band."""
     band: tuple[float, float]
@@ -55,12 +55,12 @@ class MassCalibration:
 
     @property
     def agrees(self) -> bool:
-        """Whether both sensitivities together are right within 5 %, signs included."""
+        """True if both sensitivities together are right within 5 %, signs included."""
         return self.sizes_agree and not self.inverted
 
     @property
     def sizes_agree(self) -> bool:
-        """Whether both sensitivities together are right within 5 %, signs ignored."""
+        """True if both sensitivities together are right within 5 %, signs ignored."""
         return abs(self.ratio - 1) <= MAX_SENSITIVITY_DEVIATION
 
     @property

@@ -52,9 +52,9 @@ class TapsFaults:
     noise_every: int | None = None
     """Period at which noise before a frame damages it."""
     noise_at_start: bool = False
-    """Whether noise precedes the first answer."""
+    """True if noise precedes the first answer."""
     start_streaming: bool = False
-    """Whether the device streams already when the host connects."""
+    """True if the device streams already when the host connects."""
     cut_infos: int = 0
     """Number of INFO answers that lack their second half."""
     overload: int = 0

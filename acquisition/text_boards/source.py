@@ -83,7 +83,7 @@ class TextBoardSource(ClosedOnExit):
     """
 
     follows_clock = True
-    """Whether its scans follow the clock. Its rate is known by measurement only."""
+    """True, as scans follow the clock. Their rate is known by measurement only."""
     fault = ""
     """Empty: the board reports no faults."""
 

@@ -46,7 +46,7 @@ class NameCalibration:
     full_scales: tuple[float, ...]
     """Full scale of each input (V, or m/s^2 for a device that measures acceleration itself)."""
     is_accelerometer: bool
-    """Whether the device measures acceleration itself."""
+    """True if the device measures acceleration itself."""
 
 
 def parse_name_calibration(name: str) -> NameCalibration | None:

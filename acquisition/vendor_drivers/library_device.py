@@ -122,7 +122,7 @@ class LibraryDevice(ClosedOnExit):
     loss_detection: str
     """Method by which lost scans are detected, in two words."""
     follows_clock: bool = True
-    """Whether its scans follow the clock."""
+    """True if its scans follow the clock."""
     events: deque[Event] = field(default_factory=deque)
     """Events at the device. Such a device has no button."""
     _running: bool = False

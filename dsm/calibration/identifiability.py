@@ -1,4 +1,4 @@
-"""Identifiability: whether the measured modes determine the stiffness of each group, by profile likelihood."""
+"""Check by profile likelihood whether the measured modes determine the stiffness of each group."""
 
 from __future__ import annotations
 

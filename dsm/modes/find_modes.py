@@ -18,7 +18,7 @@ from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
 
 MODE_INTERVAL_WIDTH = 2e-10
-"""Relative half-width, in w^2 (w if spinning), of the interval in which each mode is proved to lie."""
+"""Relative half-width, in w^2 (w if spinning), of the interval that is proved to contain each mode."""
 MODE_ROUNDING = 1024 * np.finfo(np.float64).eps
 """Half-width from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
 MAX_MODE_INTERVAL = 0.1

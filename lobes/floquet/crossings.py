@@ -79,7 +79,7 @@ class _DepthSteps:
 
     @property
     def may_hide(self) -> Flags:
-        """Whether growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
+        """True if growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 

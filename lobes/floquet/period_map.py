@@ -169,7 +169,7 @@ class PeriodMap:
     """Map over one tooth period, applied piece by piece: each piece maps z and its own w to the new ones."""
 
     pieces: tuple[tuple[bool, Floats], ...]
-    """Whether teeth cut, and the matrix, shape (r, d, m, m): m = 2n + nodes p in the cut, 2n else."""
+    """Pieces: True if teeth cut, and the matrix, shape (r, d, m, m); m = 2n + nodes p in the cut, else 2n."""
     modes: int
     """Number of modes n."""
     nodes: int

@@ -1,4 +1,4 @@
-"""lobewatch history."""
+"""Command `lobewatch history`: list the tap tests and events of a machine."""
 
 from __future__ import annotations
 

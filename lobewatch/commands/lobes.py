@@ -1,4 +1,4 @@
-"""lobewatch lobes."""
+"""Command `lobewatch lobes`: stability lobes and stable pockets of a tool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch ports."""
+"""Command `lobewatch ports`: list serial ports and the devices on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch suggest."""
+"""Command `lobewatch suggest`: suggest the next test cut."""
 
 from __future__ import annotations
 

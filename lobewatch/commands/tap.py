@@ -1,4 +1,4 @@
-"""lobewatch tap."""
+"""Command `lobewatch tap`: run a live tap test."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class StoredDevice(msgspec.Struct, frozen=True):
 
     @property
     def is_altered(self) -> bool:
-        """Whether the CRC is wrong."""
+        """True if the CRC is wrong."""
         return self.crc not in (0, self.computed_crc)
 
     @property

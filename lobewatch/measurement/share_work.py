@@ -169,7 +169,7 @@ class Workers:
 
     @property
     def use_other_processes(self) -> bool:
-        """Whether other processes do the work."""
+        """True if other processes do the work."""
         return self.jobs > 1 or bool(self.scheduler)
 
     @property

@@ -87,7 +87,7 @@ class TapFit:
     remarks: tuple[Remark, ...] = ()
     """Remarks on doubtful modes, and why there are none."""
     failed: bool = False
-    """Whether the fit was impossible."""
+    """True if the fit was impossible."""
 
 
 @cache

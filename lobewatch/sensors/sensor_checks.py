@@ -50,7 +50,7 @@ class SensorList:
     measured_rate: MeasuredRate | None
     """Measured sample rate, None if the device has no clock or the measurement failed."""
     replaces_nominal: bool
-    """Whether the measured rate is used."""
+    """True if the measured rate is used."""
     remarks: tuple[Remark, ...]
     """Remarks on implausible sensitivities, ranges, dates and rates."""
 

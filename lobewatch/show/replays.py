@@ -1,4 +1,4 @@
-"""Show replays of recorded files, previews of them, and rebuilds, with their progress."""
+"""Show replays, replay previews and rebuilds, with their progress."""
 
 from __future__ import annotations
 
@@ -290,7 +290,7 @@ class MachineRebuild(NamedTuple):
     n_taps: int
     """Number of tap tests in the new history."""
     is_saved: bool
-    """Whether the new history is on disk."""
+    """True if the new history is on disk."""
     remarks: Sequence[Remark]
     """Remarks on the machine after the rebuild."""
 

@@ -1,4 +1,4 @@
-"""Show sensors, their checks, and what was found of the computer."""
+"""Show sensors, sensor checks and the computer check."""
 
 from __future__ import annotations
 

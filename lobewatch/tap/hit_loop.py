@@ -43,7 +43,7 @@ class OperatorRequests:
 
     @property
     def stopping(self) -> bool:
-        """Whether the test is to end."""
+        """True if the test is to end."""
         return self._stopping.is_set()
 
     def take_undo(self) -> bool:
@@ -256,7 +256,7 @@ class TapPhases:
         self._loop.take_hits(connection, self._at_rest(trigger))
 
     def _at_rest(self, trigger: Trigger) -> Trigger:
-        """Return a trigger that is armed only at rest, if somebody taps by hand."""
+        """Return a trigger that is armed only at rest, if a person taps by hand."""
         if not self._guided or self._tap.baseline is None:
             return trigger
         return replace(trigger, rest_rms=estimate_resting_rms(self._tap.baseline, trigger.pre_trigger))

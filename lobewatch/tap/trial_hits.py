@@ -64,7 +64,7 @@ class TrialHits:
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is open: two hits of the chosen length, or three."""
+        """True if nothing is open: two hits of the chosen length, or three."""
         length = self.trigger.n_samples
         return len(self._hits) >= MAX_TRIAL_HITS or sum(hit.acceleration.size == length for hit in self._hits) >= 2
 

@@ -1,4 +1,4 @@
-"""Visit to a machine: tap tests in x, in y, then as the operator chooses, run by one thread."""
+"""Visit to a machine: tap tests in x, in y, then as the operator chooses."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class TapVisit:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether no test runs and a choice is awaited."""
+        """True if no test runs and a choice is awaited."""
         return self._pause is not None and bool(self._pause.choices)
 
     def undo(self) -> None:

@@ -106,7 +106,7 @@ class Assembly:
     taps: Mapping[str, str]
     """Tap test by direction; empty for a prediction."""
     predicted: bool
-    """Whether the model predicts the tool."""
+    """True if the model predicts the tool."""
     remarks: tuple[Remark, ...]
     """Remarks on missing and doubtful results."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
@@ -122,7 +122,7 @@ class Assembly:
 
     @property
     def is_complete(self) -> bool:
-        """Whether both directions are known from tap tests without open questions."""
+        """True if both directions are known from tap tests without open questions."""
         return len(self.directions) == 2 and not self.questions
 
     @property

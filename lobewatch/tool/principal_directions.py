@@ -56,7 +56,7 @@ class PrincipalDirections:
     stiffness: Floats
     """Measured stiffness (N/m), shape (n,)."""
     is_y: Flags
-    """Whether each mode was measured in y, shape (n,)."""
+    """True for each mode measured in y, shape (n,)."""
     pairs: tuple[ModePair, ...]
     """Modes of x with those of y that belong to them."""
     max_cross_share: Floats
@@ -69,7 +69,7 @@ class PrincipalDirections:
 
     @property
     def are_uncertain(self) -> bool:
-        """Whether the directions are uncertain."""
+        """True if the directions are uncertain."""
         return bool(np.any(self.max_cross_share)) or any(pair.max_rotation or pair.sign >= 0 for pair in self.pairs)
 
     @property

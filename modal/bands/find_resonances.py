@@ -90,7 +90,7 @@ def find_resonances(frf: Frf) -> list[Resonance]:
 
 
 def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[Resonance]:
-    """Add resonances that stand out of the residual of a fit to the known ones, by rising frequency.
+    """Add resonances that exceed the residual of a fit to the known ones, by rising frequency.
 
     residual: the measured FRF less all that was fitted. Residual peaks at known resonances and single lines (hum)
     are ignored.

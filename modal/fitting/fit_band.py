@@ -34,7 +34,7 @@ class ProjectedBand:
 
     @cached_property
     def _free(self) -> Flags:
-        """Whether each frequency and damping ratio may move, (2 m,)."""
+        """True for each frequency and damping ratio that is free, (2 m,)."""
         return np.tile(~self.held, 2)
 
     @cached_property

@@ -59,7 +59,7 @@ MAX_MATCH_DISTANCE = 4.0
 DOUBTFUL_MATCH_DISTANCE = 2.5
 """Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
-"""Largest relative change of frequency of a mode that is alike otherwise."""
+"""Largest relative change of frequency of an otherwise unchanged mode."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
 """Distance of the second nearest mode over that of the nearest below which it is a rival."""
 

@@ -34,7 +34,7 @@ def codes_of(tree: ast.AST) -> Iterator[str]:
 
 
 def homes() -> dict[str, set[str]]:
-    """The modules that give each code."""
+    """Return the modules that give each code."""
     found: dict[str, set[str]] = defaultdict(set)
     for file, tree in trees():
         for code in codes_of(tree):

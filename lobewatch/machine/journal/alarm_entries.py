@@ -1,4 +1,4 @@
-"""Journal lines for acknowledged alarms and fleet scatter. Imports no numpy, as `lobewatch status` must start fast."""
+"""Journal lines for acknowledged alarms and fleet scatter, without numpy for a fast start."""
 
 from __future__ import annotations
 

@@ -84,12 +84,12 @@ class CutEntry:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the cut counts for learning."""
+        """True if the cut counts for learning."""
         return not self.excluded and self.word != "cannot tell"
 
     @property
     def has_chatter(self) -> bool:
-        """Whether chatter of any kind was detected."""
+        """True if chatter of any kind was detected."""
         return self.word in ("chatter", "flip")
 
     @property

@@ -26,7 +26,7 @@ class MaintenanceEvent:
     text: str
     """Description of the work."""
     new_baseline: bool
-    """Whether later tap tests are compared with none before it."""
+    """True if later tap tests are compared with none before it."""
 
 
 def read_events(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent, ...]:

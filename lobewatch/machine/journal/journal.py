@@ -1,4 +1,4 @@
-"""Journal of a machine: a line for each commit, in two files that prove each other.
+"""Journal of a machine: one line per commit, in two files that verify each other.
 
 A line is JSON with the SHA-256 of the line before it (`previous`), its number (`number`) and a CRC-32 (`crc`). It is
 written to journal.jsonl, which is the commit, then to journal.copy.jsonl: after a crash the copy may be one line
@@ -42,7 +42,7 @@ class JournalReading:
     torn: bytes = b""
     """Rest of a line in journal.jsonl after a crash."""
     is_clean: bool = False
-    """Whether both files contain exactly these lines."""
+    """True if both files contain exactly these lines."""
 
     @cached_property
     def entries(self) -> list[JournalEntry]:

@@ -147,7 +147,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     wear: ToolWear | None = None
     """Allowed tool wear; None: that of [doubt]."""
     thin: bool = False
-    """Whether the cut wall is flexible: then the verdict is never stable."""
+    """True if the cut wall is flexible: then the verdict is never stable."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -158,7 +158,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
 
     @property
     def is_incomplete(self) -> bool:
-        """Whether speed or depth is requested."""
+        """True if speed or depth is requested."""
         return math.isnan(self.speed_rpm) or math.isnan(self.depth_mm)
 
     @property

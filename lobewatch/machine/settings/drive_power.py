@@ -64,7 +64,7 @@ class CutPower:
     edge_share: float
     """Power of the edge forces over that of chip formation (-)."""
     edge_known: bool
-    """Whether Kte is known; otherwise it is `DEFAULT_EDGE_LENGTH` times Kt."""
+    """True if Kte is known; otherwise it is `DEFAULT_EDGE_LENGTH` times Kt."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class PowerReading:
 
     @property
     def is_edge_known(self) -> bool:
-        """Whether Kte is known."""
+        """True if Kte is known."""
         return math.isfinite(self.tangential_edge)
 
     def at(self, speed_rpm: float) -> CutPower:

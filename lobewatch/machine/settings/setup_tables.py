@@ -24,7 +24,7 @@ from acquisition.text_boards import FrameFormat, OutputFormat
 from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
-"""How an accelerometer is fixed."""
+"""Mounting of an accelerometer."""
 SENSOR_MASS_STD_RATIO = 0.02
 """Relative standard error of the sensor mass from a data sheet or a scale; chosen."""
 CABLE_MASS_SHARE, CABLE_MASS_STD_RATIO = 0.5, 0.25
@@ -74,7 +74,7 @@ class TapTable(TomlTable, frozen=True):
     tool: str = "reference"
     """Name of the tapped tool."""
     hammer: Literal["force", "none"] = "force"
-    """Whether the hammer measures force; with "none" the acceleration detects hits, and K stays unknown."""
+    """Force sensor of the hammer; with "none" the acceleration detects hits, and K stays unknown."""
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
     """Number of good hits."""
     record_s: Positive | None = None
@@ -249,15 +249,15 @@ class DaqTable(TomlTable, frozen=True):
     sample_rate_hz: Positive | None = None
     """Sample rate (Hz); None: that of the driver."""
     loss_detection: bool = True
-    """Whether to detect lost scans."""
+    """True to detect lost scans."""
     digital_clock: bool = False
-    """Whether a square wave on digital input 0 reveals lost scans."""
+    """True if a square wave on digital input 0 reveals lost scans."""
     accept_measured_rate: bool = False
-    """Whether to use the measured sample rate if it differs from the nominal one."""
+    """True to use the measured sample rate if it differs from the nominal one."""
     calibration_interval_months: Positive = 12.0
     """Calibration interval of the sensors (months)."""
     anti_alias: bool | None = None
-    """Whether the DAQ has an anti-aliasing filter; None if unknown."""
+    """True if the DAQ has an anti-aliasing filter; None if unknown."""
     printing: PrintingTable | None = None
     """Output format of a board with driver = "lines"."""
     channel: tuple[ChannelTable, ...] = ()

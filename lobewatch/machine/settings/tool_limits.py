@@ -151,17 +151,17 @@ class ToolLimits:
 
     @property
     def is_empty(self) -> bool:
-        """Whether the tool allows no speed of the spindle."""
+        """True if the tool allows no speed of the spindle."""
         return self.low_rpm > self.high_rpm
 
     @property
     def is_capped(self) -> bool:
-        """Whether max_speed_rpm of the [[tool]] sets the highest speed."""
+        """True if max_speed_rpm of the [[tool]] sets the highest speed."""
         return self.high_rpm == self.tool.max_speed_rpm
 
     @property
     def is_guessed(self) -> bool:
-        """Whether the speeds are only those of the spindle or of the fastest tool."""
+        """True if the speeds are only those of the spindle or of the fastest tool."""
         speed = self.cutting_speed_m_min
         return speed is None or (speed.low == 0 and speed.source != USER_SOURCE)
 

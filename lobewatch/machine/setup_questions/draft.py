@@ -105,7 +105,7 @@ class MachineDraft:
 
     @property
     def needs_sensors(self) -> bool:
-        """Whether the DAQ does not describe its sensors."""
+        """True if the DAQ does not describe its sensors."""
         return find_driver(self.table("daq").get("driver", "taps")).sensor_data is None
 
     @property
@@ -118,7 +118,7 @@ class MachineDraft:
 
     @property
     def has_no_force_sensor(self) -> bool:
-        """Whether no hammer measures force."""
+        """True if no hammer measures force."""
         return self.table("tap").get("hammer") == "none"
 
     def checked(self) -> Self:

@@ -1,4 +1,4 @@
-"""Show recorded cuts: chatter or not, speed, and what the verdict rests on."""
+"""Show recorded cuts: verdict, speed and evidence."""
 
 from __future__ import annotations
 

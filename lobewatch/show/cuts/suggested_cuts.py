@@ -1,4 +1,4 @@
-"""Show the next test cut to make and what test cuts have taught."""
+"""Show the next test cut and the results of the test cuts so far."""
 
 from __future__ import annotations
 

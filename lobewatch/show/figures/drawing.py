@@ -1,4 +1,4 @@
-"""Shared by all figures: style, axes, files, and labels that do not overlap."""
+"""Style, axes, files and label placement of all figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a series: values over time with what was done, and the frequency response now and then."""
+"""Plot series over time with events, and frequency responses then and now."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class ProgramAdvice:
 
     @property
     def is_no_longer_stable(self) -> bool:
-        """Whether the program chatters now and did not at first."""
+        """True if the program chatters now and did not at first."""
         return self.verdict.is_stable is False and self.first_verdict is not None and bool(self.first_verdict.is_stable)
 
 

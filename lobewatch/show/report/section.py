@@ -96,7 +96,7 @@ class Paragraph(NamedTuple):
     text: str
     """Text; an empty one is not shown."""
     is_small: bool = False
-    """Whether it is shown in small letters, as a note."""
+    """True if it is shown in small letters, as a note."""
 
 
 class BulletList(NamedTuple):
@@ -161,9 +161,9 @@ class Section(NamedTuple):
     parts: Sequence[SectionPart]
     """Parts below the heading, from the top."""
     is_framed: bool = True
-    """Whether blank lines surround it in the file, without any effect on the page."""
+    """True if blank lines surround it in the file, without any effect on the page."""
     has_plot: bool = False
-    """Whether the page needs the plot script."""
+    """True if the page needs the plot script."""
 
 
 def make_figure_section(heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Section:

@@ -1,4 +1,4 @@
-"""Tables of JSON keys: which attribute of a record each key of a JSON object is taken from."""
+"""Tables of JSON keys and the record attributes they are read from."""
 
 from __future__ import annotations
 

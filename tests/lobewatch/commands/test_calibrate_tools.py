@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from acquisition import Circumstances, DataError, Frf, TapTest, new_tap_id
 from dsm import Spindle, modes_at, receptance
-from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from tests.lobewatch.commands.invoke import invoke
 
 LINES = np.arange(4.0, 6000.0, 4.0)
 LOSS = 0.058
@@ -71,7 +71,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> MachineFolder:
 
 def run(folder: MachineFolder, *arguments: object) -> Result:
     words = ["calibrate", str(folder.path), *map(str, arguments)]
-    return CliRunner().invoke(app, words, catch_exceptions=False)
+    return invoke(words)
 
 
 def two(folder: MachineFolder, *arguments: object) -> Result:

@@ -20,13 +20,14 @@ from acquisition import Conditions, DataError
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.show.fleet.export_files import round_significant
+from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["export", *map(str, arguments)], catch_exceptions=False)
+    return invoke(["export", *map(str, arguments)])
 
 
 @pytest.fixture

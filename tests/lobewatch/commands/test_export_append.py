@@ -13,13 +13,12 @@ from typing import Any
 
 import duckdb
 import pytest
-from typer.testing import CliRunner
 
 from acquisition import DataError
-from lobewatch.cli import app
+from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 KILLED = """
 import os, sys, typer.testing
 from lobewatch.cli import app
@@ -34,13 +33,13 @@ def counted(call):
     return run
 for name in ("fsync", "replace", "rename", "mkdir", "unlink"):
     setattr(os, name, counted(getattr(os, name)))
-sys.exit(typer.testing.CliRunner().invoke(app, sys.argv[1:], catch_exceptions=False).exit_code)
+sys.exit(typer.testing.invoke(sys.argv[1:]).exit_code)
 """
 """An export that is ended without warning before it has altered the disk so many times."""
 
 
 def export(*arguments: object) -> dict[str, Any]:
-    result = CliRunner().invoke(app, ["export", *map(str, arguments), "--json"], catch_exceptions=False)
+    result = invoke(["export", *map(str, arguments), "--json"])
     return {"exit_code": result.exit_code, **json.loads(result.stdout)}
 
 
@@ -151,14 +150,14 @@ def test_what_was_excluded_or_analysed_anew_since_is_said_by_its_month(mills: Pa
     fleet = tmp_path / "fleet"
     export(mills, "--append", fleet)
     (tap,) = [line[2] for line in lines(fleet) if line[:2] == ("2026-02", "a")]
-    CliRunner().invoke(app, ["exclude", str(mills / "a"), tap, "--reason", "trial"], catch_exceptions=False)
+    invoke(["exclude", str(mills / "a"), tap, "--reason", "trial"])
     told = export(mills, "--append", fleet)
     assert (told["added"], told["tap_tests"], told["outdated_months"]) == (0, 7, ["2026-02"])
     shutil.rmtree(fleet / "month=2026-02")
     told = export(mills, "--append", fleet)
     assert (told["added"], told["outdated_months"]) == (2, [])
     assert ("a", tap) not in [line[1:3] for line in lines(fleet)]
-    result = CliRunner().invoke(app, ["export", str(mills), "--append", str(fleet)], catch_exceptions=False)
+    result = invoke(["export", str(mills), "--append", str(fleet)])
     assert result.stdout.endswith("in " + str(fleet) + "\n0 of them are new there\n")
 
 

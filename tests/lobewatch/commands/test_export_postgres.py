@@ -1,4 +1,4 @@
-"""lobewatch export --to: a real PostgreSQL, also one that goes away."""
+"""`lobewatch export --to`: a real PostgreSQL server, also when it disconnects."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from typing import Any
 
 import psycopg
 import pytest
-from typer.testing import CliRunner
 
 from acquisition import DataError
-from lobewatch.cli import app
 from lobewatch.show.fleet import export_postgres as table_postgres
+from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Server = Any
 """PostgreSQL of conftest.py."""
 SECRET = "quite-secret"
@@ -50,7 +49,7 @@ def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def export(*arguments: object) -> dict[str, Any]:
-    result = CliRunner().invoke(app, ["export", *map(str, arguments), "--json"], catch_exceptions=False)
+    result = invoke(["export", *map(str, arguments), "--json"])
     return {"exit_code": result.exit_code, **json.loads(result.stdout)}
 
 
@@ -135,11 +134,11 @@ def test_what_counts_no_longer_stays_and_says_so(server: Server, plant: str, mil
     export(mills, "--to", address)
     before = lines(server, plant)
     tap = before[0][2]
-    CliRunner().invoke(app, ["exclude", str(mills / "a"), tap, "--reason", "trial"], catch_exceptions=False)
+    invoke(["exclude", str(mills / "a"), tap, "--reason", "trial"])
     assert export(mills, "--to", address)["set_aside"] == 1
     assert export(mills, "--to", address)["set_aside"] == 0
     assert server.ask("SELECT folder, tap_id FROM lobewatch_taps WHERE NOT counts", plant) == [("a", tap)]
-    CliRunner().invoke(app, ["include", str(mills / "a"), tap], catch_exceptions=False)
+    invoke(["include", str(mills / "a"), tap])
     export(mills, "--to", address)
     assert lines(server, plant) == before
     (mills / "b" / "machine.toml").write_text("x", "utf-8")

@@ -19,14 +19,15 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.verify_files import verify
+from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 RATE, TURN = 25600.0, 12077.0 / 60
 
 
 def recording(path: Path, chatter: float | None = None, seconds: float = 1.2) -> Path:
-    """Of four teeth at 12 077 rpm, as MATLAB text: time and acceleration."""
+    """Write MATLAB text of a cut with four teeth at 12 077 rpm: time and acceleration."""
     random, n = np.random.default_rng(0), round((seconds + 0.8) * RATE)
     time, begin = np.arange(n) / RATE, round(0.5 * RATE)
     signal = random.normal(scale=0.05, size=n)
@@ -42,7 +43,10 @@ def recording(path: Path, chatter: float | None = None, seconds: float = 1.2) ->
 
 
 def run(shop: Shop, *arguments: object) -> Result:
-    return CliRunner().invoke(app, ["listen", str(shop.path), *map(str, arguments)])
+    result = CliRunner().invoke(app, ["listen", str(shop.path), *map(str, arguments)])
+    if isinstance(result.exception, ValueError | OSError):
+        result.exception.args = (with_option_names(str(result.exception)),)
+    return result
 
 
 def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) -> None:

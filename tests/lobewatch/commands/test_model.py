@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from acquisition import Circumstances, Frf, TapDirection, TapTest, new_tap_id
 from dsm import modes_at, natural_frequencies, receptance
 from lobes import lower_envelope, zero_order_lobes
-from lobewatch.cli import app
 from lobewatch.logbook import Logbook, collect_model_figure
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
@@ -27,6 +25,7 @@ from lobewatch.tool import speed_grid
 from lobewatch.tool.prediction import predict_assembly
 from lobewatch.verdicts import Stability
 from modal import Mode
+from tests.lobewatch.commands.invoke import invoke
 
 TOOL = "long end mill"
 EXAMPLE_PROGRAM = """
@@ -78,7 +77,7 @@ def tapped(
 
 
 def said(*arguments: object) -> dict[str, Any]:
-    result = CliRunner().invoke(app, [*map(str, arguments), "--json"], catch_exceptions=False)
+    result = invoke([*map(str, arguments), "--json"])
     assert result.exit_code == 0
     parsed: dict[str, Any] = json.loads(result.stdout)
     return parsed
@@ -184,13 +183,13 @@ def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> 
     assert {"predicted", "one-direction"} <= {remark.code for remark in long.remarks}
     assert long.limit == pytest.approx(0.4e-3, rel=0.5)
     assert long.stability is Stability.DOUBTFUL
-    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
+    shown = invoke(["check", str(folder.path)])
     assert re.search(r"doubtful\s+\(predicted\)", shown.stdout)
     assert shown.exit_code == 1
     folder.commit(tapped(folder, 1.0, direction="y", day=2))
     tame = toml.replace(old, f"{program.replace('depth_mm = 0.3', 'depth_mm = 0.05')}\n\n")
     folder.toml.write_text(tame, "utf-8")
-    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
+    shown = invoke(["check", str(folder.path)])
     assert re.search(r"stable\s+\(predicted\)", shown.stdout)
     assert (shown.exit_code, "1 program: 1 stable" in shown.stdout) == (0, True)
 
@@ -202,7 +201,7 @@ def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
         (("--tool", TOOL, "--waterfall", "w.png"), "--waterfall shows measured lobes"),
     ):
         with pytest.raises(ValueError, match=message):
-            CliRunner().invoke(app, ["lobes", str(folder.path), *arguments], catch_exceptions=False)
+            invoke(["lobes", str(folder.path), *arguments])
 
 
 def test_a_prediction_is_refused_before_the_first_tap(folder: MachineFolder) -> None:

@@ -16,8 +16,10 @@ from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.monitoring import MachineStatus
 from lobewatch.show.report.report import render_report
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.session import build_outcome
 from lobewatch.verdicts.verdict import Stability
+from tests.lobewatch.commands.invoke import invoke
 
 SPINDLE = "# The spindle of the example"
 SAFE = """
@@ -34,7 +36,7 @@ depth_mm = 0.2
 
 """
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture
@@ -45,7 +47,7 @@ def shop(shop: Shop) -> Shop:
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+    return invoke([*map(str, arguments)])
 
 
 def refused(*arguments: object) -> str:
@@ -202,7 +204,7 @@ def test_the_outcome_and_the_report_name_the_command_that_answers(shop: Shop) ->
         ["lobewatch", "replay", str(shop.path), str(tap_file(shop, tap_id)), "--accept", "frequency-jump"]
     )
     outcome = build_outcome(logbook, logbook.measurement(tap_id))
-    assert any(command in text for text in outcome.texts)
+    assert any(command in with_option_names(text) for text in outcome.texts)
     assert "in question" in outcome.texts[0]
     assert command in render_report(logbook, "reference", "x")
     (doubtful,) = logbook.verdicts()
@@ -281,7 +283,8 @@ def test_what_many_tests_ask_is_one_sentence_with_one_answer(shop: Shop) -> None
     shop.edit("band_hz = [1200, 2200]", "band_hz = [2000, 3000]")
     (asked,) = [remark for remark in standing(shop, 600.0).remarks if remark.code == "no-mode-in-band"]
     assert asked.about.startswith("20 tap tests, ")
-    command = shlex.split(asked.text[asked.text.index("lobewatch replay") :])
+    text = with_option_names(asked.text)
+    command = shlex.split(text[text.index("lobewatch replay") :])
     assert command[-2:] == ["--accept", "no-mode-in-band"]
     assert run(*command[1:]).exit_code == 0
     assert not any(remark.code == "no-mode-in-band" for remark in standing(shop, 600.0).remarks)

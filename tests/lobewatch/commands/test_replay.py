@@ -16,9 +16,11 @@ from typer.testing import CliRunner, Result
 from acquisition import DataError, Description, Recording, inspect_file
 from lobewatch.cli import app
 from lobewatch.logbook.recordings.store_recordings import store_recordings
+from lobewatch.show.terminal.option_names import with_option_names
+from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 F = np.arange(4.0, 4000.0, 4.0)
 
 
@@ -30,7 +32,7 @@ def shop(shop: Shop) -> Shop:
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+    return invoke([*map(str, arguments)])
 
 
 def frf(path: Path, frequency: float = 1700.0, heading: str = "Freq (Hz),Real (um/N),Imag (um/N)") -> Path:
@@ -333,7 +335,7 @@ def test_what_is_asked_of_many_tests_is_one_sentence_and_takes_one_answer(shop: 
     first, *_, last = [entry.id for entry in shop.folder.taps()]
     assert remark.about == f"20 tap tests, {first} to {last}"
     answer = f"lobewatch replay {shop.path} {shop.path / 'taps'} --accept other-band"
-    assert remark.cure.endswith(f"if these tests are right, say so: {answer}")
+    assert with_option_names(remark.cure).endswith(f"if these tests are right, say so: {answer}")
     assert answer in said
     run(*answer.split()[1:])
     assert shop.logbook.questions == {}
@@ -346,6 +348,6 @@ def test_one_answer_is_for_those_that_ask_the_same(shop: Shop, narrow: Path) -> 
     one, other = (remark for remark in shop.logbook.status().remarks if remark.code == "other-band")
     assert one.about.startswith("2 tap tests, ")
     assert other.about.startswith("tap test ")
-    run(*one.cure.partition("lobewatch ")[2].split())
+    run(*with_option_names(one.cure).partition("lobewatch ")[2].split())
     (left,) = shop.logbook.questions
     assert left in other.about

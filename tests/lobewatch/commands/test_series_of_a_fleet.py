@@ -1,4 +1,4 @@
-"""What is said with a tap test, and what other machines tell, in the standing of a machine."""
+"""Conditions of tap tests and data of other machines in the status of a machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lobewatch.fleet.summarize import learn_scatter, summarize_machine
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Run = Callable[..., Any]
 FREQUENCY = 1713.0
 
@@ -149,10 +149,10 @@ def test_after_a_repair_the_scatter_of_before_is_known(run: Run, new_shop: type[
             shop.tap(7 * week + 0.1, 0.98 * FREQUENCY * math.exp(percent / 100), "y", tool=tool)
     repaired = shop.start + timedelta(days=110)
     assert run("event", shop.path, "new bearings", "--date", f"{repaired:%Y-%m-%d}", "--new-baseline").code == 0
-    assert shop.logbook.files.known_scatter is None
+    assert shop.logbook.files.fleet_scatter is None
     shop.tap(112, FREQUENCY)
     assert run("event", shop.path, "coolant pump replaced").code == 0  # whatever tells of the machine
-    known = shop.logbook.files.known_scatter
+    known = shop.logbook.files.fleet_scatter
     assert known is not None
     assert known.series == 4
     assert known.alone[0] == pytest.approx(0.2, rel=0.4)

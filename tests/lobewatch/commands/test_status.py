@@ -14,13 +14,14 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lobewatch.cli import app
+from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, ["status", *map(str, arguments)], catch_exceptions=False)
+    return invoke(["status", *map(str, arguments)])
 
 
 @pytest.fixture

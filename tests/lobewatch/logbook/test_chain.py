@@ -178,7 +178,8 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     assert begin_tap(folder, about(folder), resume=False).hits == []
     with TapsEmulator(signal, EMULATED_CHANNELS, 2 * EMULATED_SAMPLE_RATE, realtime=False) as other:
         again = TapSession(folder, lambda: TapsSource(other.port), about(folder, days=0.1))
-        with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with --new"):
+        text = r"another length, sample rate or sensor; begin anew with plan_session\.resume=False"
+        with pytest.raises(ValueError, match=text):
             again.run()
 
 

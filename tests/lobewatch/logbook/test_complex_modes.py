@@ -27,7 +27,7 @@ from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 START = datetime(2026, 1, 15, tzinfo=UTC)
 COVARIANCE = np.array([[0.25, 1e-5, 4e4], [1e-5, 1e-8, 50.0], [4e4, 50.0, 4e11]]) / 25
 SURE = """

@@ -25,7 +25,7 @@ from lobewatch.measurement import Measurement, measure
 from lobewatch.show.report.report import render_report
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SPINDLE = "# The spindle of the example"
 SAFE = """
 [[program]]
@@ -105,7 +105,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     mine, never = shop.logbook, Logbook(other)
     at = day(shop, 61)
     assert mine.status(at) == never.status(at) != before
-    columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "rulings", "remarks")
+    columns = ("tap_id", "frequency", "stiffness", "bearing_stiffness", "verdicts", "remarks")
     for row, same in zip(mine.history.rows, never.history.rows, strict=True):
         assert [getattr(row, name) for name in columns] == [getattr(same, name) for name in columns]
     drawn = r'<div class="pictures">.*?</div>'  # hollow
@@ -141,12 +141,12 @@ def test_a_new_baseline_follows_the_mode_of_a_rebuilt_spindle_and_ends_the_alarm
     logbook = shop.logbook
     series = logbook.status(day(shop, 61)).series_of("reference", "x")
     assert series is not None
-    assert series.is_first
+    assert series.is_baseline
     assert logbook.assembly().directions == ("x",)
     assert logbook.history.rows[-1].frequency.value == pytest.approx(1713.0 * 1.2, abs=0.5)
     shop.tap(90, 1713.0 * 1.2 * 0.97)
     (found,) = shop.logbook.status(day(shop, 91)).series
-    assert found.fall.value == pytest.approx(3.0, abs=0.05)
+    assert found.drop.value == pytest.approx(3.0, abs=0.05)
     withdraw_event(shop.folder, event.id)
     assert "frequency-alarm" in codes(shop, 91)
 
@@ -313,4 +313,4 @@ def test_a_folder_on_a_read_only_disk_is_reported_and_checked(
     assert run("history", shop.path).exit_code == 0
     with pytest.raises(OSError, match="it can be read, not written"):
         run("event", shop.path, "greased")
-    assert not shop.folder.history.exists()
+    assert not shop.folder.history_path.exists()

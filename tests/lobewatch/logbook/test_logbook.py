@@ -1,4 +1,4 @@
-"""The logbook: every tap test analysed once, readers that disturb nobody, one verdict in every place."""
+"""Logbook: every tap test analyzed once, independent readers, one verdict everywhere."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ depth_mm = 4.55
 
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture
@@ -205,7 +205,7 @@ def test_one_program_has_one_word_in_every_place(
     assert (remark.code, remark.about) == (f"program-{word.replace(' ', '-')}", name)
     outcome = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
     assert any(f"{name}: {word}." in text for text in outcome.texts)
-    assert (outcome.status, "lobewatch check" in outcome.next_step) == (light, True)
+    assert (outcome.status, "Logbook.verdicts" in outcome.next_step) == (light, True)
     (row,) = fleet_rows(Fleet({"m": path}).assess_machines())
     assert (f"{name}: {word}" in row["note"], row["light"]) == (True, light)
     (told,) = json.loads(run("check", path, "--json").stdout)["programs"]
@@ -291,7 +291,7 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
     first, last = logbook.taps[1].id, logbook.taps[-1].id
     assert [ruling.stability for ruling in logbook.stored_verdicts(first).values()] == [Stability.STABLE] * 3
     assert [ruling.stability for ruling in logbook.stored_verdicts(last).values()].count(Stability.NOT_STABLE) == 2
-    kept = [row.rulings is not None for row in shop.logbook.history.rows]
+    kept = [row.verdicts is not None for row in shop.logbook.history.rows]
     assert kept == [False, True, False, False, False, True]
 
 

@@ -18,7 +18,7 @@ from lobewatch.measurement.recording_questions import find_clock_questions
 from modal import Mode, synthesize_frf
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 LINES = np.arange(4.0, 4000.0, 4.0)
 
 

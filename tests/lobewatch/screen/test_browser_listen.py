@@ -18,6 +18,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.tap import cut_recording
+from lobewatch.tap.cut_recording import CutStep
 from lobewatch.tap.emulated_cut import emulate_cut
 
 Browser = Any
@@ -34,6 +35,8 @@ pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
 return pen.measureText('H').actualBoundingBoxAscent; })()"""
 LONG = 100.0
 """Time after which the page is not waited for any more (s)."""
+WAITED_FOR = (CutStep.LISTENING, CutStep.CUTTING)
+"""Words that stay until the page has shown them: it leaves out what it is too slow for."""
 TOKEN = "a-token-of-the-test"
 
 
@@ -44,13 +47,13 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def listen() -> None:
-    """As at the terminal."""
+    """Run `lobewatch listen` as in a terminal."""
     with contextlib.suppress(SystemExit):
         main()
 
 
 def collected(told: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """All that has been printed to stderr."""
+    """Return all output to stderr so far."""
     told.append(capsys.readouterr().err)
     return "".join(told)
 
@@ -94,15 +97,23 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
     text: str,
 ) -> None:
     setting = find_cut_setting(folder.machine, PROGRAM, SPEED, depth_mm)
-    emulated = emulate_cut(folder, find_driver("taps"), setting, passage=PASSAGE)
+    emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=PASSAGE)
     told: list[str] = []
-    is_open, hear = threading.Event(), cut_recording.acquire_cut
+    is_open, seen = threading.Event(), {word: threading.Event() for word in WAITED_FOR}
+    acquire: Any = cut_recording.acquire_cut
 
-    def hear_when_open(*given: Any) -> Any:
+    def acquire_at_the_pace_of_the_page(*given: Any) -> Any:
+        *others, picture = given
+
+        def show(**changes: Any) -> None:
+            picture(**changes)
+            if changes.get("word") in seen:
+                seen[changes["word"]].wait(LONG)
+
         is_open.wait(LONG)
-        return hear(*given)
+        return acquire(*others, show)
 
-    monkeypatch.setattr(cut_recording, "acquire_cut", hear_when_open)
+    monkeypatch.setattr(cut_recording, "acquire_cut", acquire_at_the_pace_of_the_page)
     with emulated.device as device:
         said = ["--program", PROGRAM, "--speed", SPEED, "--depth", depth_mm, "--port", device.port, "--screen"]
         command = ["lobewatch", "listen", folder.path, *said, "--token", TOKEN]
@@ -114,15 +125,17 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
             browser.open(address("".join(told)), SIZES[0])
             browser.see("title", PROGRAM)
             is_open.set()
-            browser.saw("text", "LISTENING")
-            browser.saw("unit", "left")
-            browser.saw("reason", "now begin the cut")
+            browser.see("text", "LISTENING")
+            browser.see("reason", "now begin the cut")
+            seen[CutStep.LISTENING].set()
+            browser.see("text", "CUTTING")
+            browser.see("unit", "of cut")
             browser.wait(lambda: browser.part("level-now").text not in ("", "-"))
-            browser.saw("text", "CUTTING")
-            browser.saw("unit", "of cut")
+            seen[CutStep.CUTTING].set()
             browser.see("text", text)
         finally:
-            is_open.set()
+            for event in (is_open, *seen.values()):
+                event.set()
             listening.join()
     (cut,) = Logbook.open(folder.path).cuts
     assert cut.word == kind

@@ -126,7 +126,7 @@ def test_a_journal_from_before_there_was_a_copy_is_read_and_written(folder: Mach
 
 
 def write_without_numbers(path: Path, lines: list[dict[str, object]]) -> None:
-    """As the first version wrote it."""
+    """Write a journal as the first version did."""
     import hashlib
     import zlib
 

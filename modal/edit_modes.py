@@ -78,9 +78,8 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
         for frequency, zeta in edits.fix:
             edited = _fix_mode(edited, frequency, zeta)
         settled = iterate_bands(edited)
-        return replace(
-            settled, bands=tuple(b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
-        )
+        bands = (b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
+        return replace(settled, bands=tuple(bands))
 
 
 @dataclass(frozen=True, eq=False)

@@ -152,9 +152,7 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
         return
     below = orthogonal_basis(np.tile(model.x, p), (model.weight * model.receptance).ravel(), orders)
     above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
-    overlap = [
-        basis.values.conj().T @ part for basis, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)
-    ]
+    overlap = [b.values.conj().T @ part for b, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)]
     for order in range(1, orders + 1):
         left = np.eye(order + 1) - sum(
             part.conj().T @ part for part in (o[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for o in overlap)

@@ -252,8 +252,7 @@ def mobility_noise(frf: Frf) -> Floats:
     """
     factor = measured_over_receptance(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
-    scatter = np.pad(
-        scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2)), (1, 2), mode="edge"
-    )
+    scatter = scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2))
+    scatter = np.pad(scatter, (1, 2), mode="edge")
     noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent_noise(frf), size=NOISE_MEDIAN_LINES))
     return np.asarray(noise * 2 * np.pi * frf.frequency / factor)

@@ -167,10 +167,7 @@ def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list
     >>> [mode.match_count for mode in match_modes([once, twice], others)]
     [(0, 2), (2, 2)]
     """
-    return [
-        replace(mode, match_count=(sum(_has_mode_near(other, mode.frequency) for other in others), len(others)))
-        for mode in modes
-    ]
+    return [replace(m, match_count=(sum(_has_mode_near(o, m.frequency) for o in others), len(others))) for m in modes]
 
 
 def _has_mode_near(modes: Sequence[Mode], frequency: float) -> bool:

@@ -35,31 +35,18 @@ class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "t
         """Id of the alarm for people and other programs, without blanks."""
         return format_alarm_id(self.code, self.about, self.triggered_by)
 
-    def is_about(self, remark: Remark) -> bool:
-        """Return whether it belongs to a remark."""
-        return (self.code, self.about) == (remark.code, remark.about)
-
     def is_acknowledged(self, now: datetime) -> bool:
         """Return whether it is acknowledged at a time."""
         return self.acknowledgement is not None and self.acknowledgement.is_active_at(now)
 
     def to_row(self, now: datetime) -> dict[str, Any]:
         """Return the fields for other programs; times are ISO 8601, `acknowledged` is null if it is not."""
-        word = self.acknowledgement if self.is_acknowledged(now) else None
-        return {
-            "id": self.id,
-            "code": self.code,
-            "about": self.about,
-            "raised_by": self.triggered_by,
-            "raised": self.triggered_at.isoformat(),
-            "acknowledged": word
-            and {
-                "time": word.time.isoformat(),
-                "operator": word.operator,
-                "until": word.until and word.until.isoformat(),
-                "note": word.note,
-            },
-        }
+        word, acknowledged = self.acknowledgement, None
+        if word is not None and word.is_active_at(now):
+            until = word.until and word.until.isoformat()
+            acknowledged = {"time": word.time.isoformat(), "operator": word.operator, "until": until, "note": word.note}
+        row = {"id": self.id, "code": self.code, "about": self.about, "raised_by": self.triggered_by}
+        return row | {"raised": self.triggered_at.isoformat(), "acknowledged": acknowledged}
 
 
 class TriggeredAlarm(NamedTuple):
@@ -75,22 +62,19 @@ class TriggeredAlarm(NamedTuple):
     def build_alarm(self, acknowledgements: Iterable[Acknowledgement], baseline: datetime | None) -> Alarm:
         """Build the alarm, with its newest acknowledgement since it was triggered."""
         code, about = self.remark.code, self.remark.about
-        given = [
-            word
-            for word in acknowledgements
-            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest
-        ]
-        return Alarm(code, about, self.tap_id, self.time, given[-1] if given else None)
+        given = None
+        for word in acknowledgements:
+            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest:
+                given = word
+        return Alarm(code, about, self.tap_id, self.time, given)
 
 
 def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:
     """Add acknowledgements to the text of remarks."""
-    return tuple(_add_acknowledgement(remark, alarms, now) for remark in remarks)
-
-
-def _add_acknowledgement(remark: Remark, alarms: Sequence[Alarm], now: datetime) -> Remark:
-    words = [alarm.acknowledgement for alarm in alarms if alarm.is_about(remark) and alarm.is_acknowledged(now)]
-    return replace(remark, text=f"{remark.text} ({words[0]})") if words else remark
+    active = [alarm for alarm in reversed(alarms) if alarm.is_acknowledged(now)]
+    words = {(alarm.code, alarm.about): alarm.acknowledgement for alarm in active}
+    known = [(remark, words.get((remark.code, remark.about))) for remark in remarks]
+    return tuple(replace(remark, text=f"{remark.text} ({word})") if word else remark for remark, word in known)
 
 
 def select_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -65,11 +65,6 @@ class LikeliestChange(NamedTuple):
     """True for each change that is a step, shape (r,)."""
     point: Indices
     """Index of the point of each change as in `SeriesChange`, shape (r,)."""
-
-    @classmethod
-    def of_none(cls, n: int) -> Self:
-        """Return a result for points that are not evaluated."""
-        return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +126,8 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
 
     What the mean of both directions did is checked beside what the one did alone.
     """
-    base, common, shared = (
-        build_level_model(readings),
-        build_level_model(readings.mean_of_directions),
-        readings.shared_points,
-    )
+    base, shared = build_level_model(readings), readings.shared_points
+    common = build_level_model(readings.mean_of_directions)
     pairs = zip(_score_points(base), _score_points(common), strict=True)
     drops, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
     return ChangeMonitor(base, drops, 1), ChangeMonitor(base, rises, -1)
@@ -144,8 +136,8 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
 def _score_points(base: LevelModel) -> tuple[LikeliestChange, LikeliestChange]:
     """Find the likeliest drop and rise up to each point."""
     first = MIN_POINTS_WITH_PRIOR if base.scatter_prior.freedom else MIN_MONITORED_POINTS
-    last = np.arange(first - 1, base.y.size)
-    drops, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
+    n, last = base.y.size, np.arange(first - 1, base.y.size)
+    drops, rises = (LikeliestChange(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp)) for _ in range(2))
     if last.size:
         for every, judged in zip((drops, rises), _find_likeliest_changes(base, last), strict=True):
             for values, part in zip(every, judged, strict=True):
@@ -163,8 +155,7 @@ def _merge_directions(
     n = np.flatnonzero(np.isfinite(together.score)) + 1
     last, fell, middle = shared[n - 1], together.is_step[n - 1], together.point[n - 1]
     own, mean = base.change_sizes(fell, last + 1, shared[middle]), common.change_sizes(fell, n, middle)
-    shares = own * mean >= MIN_SHARED_CHANGE * mean**2
-    counts = shares & ~(together.score[n - 1] <= alone.score[last])
+    counts = (own * mean >= MIN_SHARED_CHANGE * mean**2) & ~(together.score[n - 1] <= alone.score[last])
     merged = LikeliestChange(alone.score.copy(), alone.is_step.copy(), alone.point.copy())
     for values, part in zip(merged, (together.score[n - 1], fell, shared[middle]), strict=True):
         values[last[counts]] = part[counts]
@@ -174,10 +165,8 @@ def _merge_directions(
 
 def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestChange, LikeliestChange]:
     """Find the likeliest drop and rise up to each of these consecutive points."""
-    blocks = [
-        _find_largest_changes(base, last[begin : begin + SCORE_BLOCK_ROWS] + 1)
-        for begin in range(0, last.size, SCORE_BLOCK_ROWS)
-    ]
+    begins = range(SCORE_BLOCK_ROWS, last.size, SCORE_BLOCK_ROWS)
+    blocks = [_find_largest_changes(base, block + 1) for block in np.split(last, begins)]
     points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
     drop, rise = (_choose_likeliest(base, last + 1, points[i], sign * leans[i]) for i, sign in enumerate((-1, 1)))
     return drop, rise

@@ -18,14 +18,7 @@ from lobewatch.arrays import Floats
 from lobewatch.monitoring.level_model import build_level_model
 from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
 from lobewatch.monitoring.series_points import Readings
-from lobewatch.monitoring.trend_shapes import (
-    SHAPE_KINDS,
-    ShapeFits,
-    TrendShape,
-    fit_pair_shapes,
-    fit_single_shapes,
-    fit_triple_shapes,
-)
+from lobewatch.monitoring.trend_shapes import SHAPE_KINDS, ShapeFits, TrendShape, fit_shapes
 
 MIN_FORECAST_POINTS = 8
 """Smallest number of points for a forecast; chosen."""
@@ -125,10 +118,8 @@ class Forecast:
 
     def quantile_line(self, quantile: float) -> Floats:
         """Return the quantile of the series at the dates, shape (d,)."""
-        low, high = (
-            (self.mean - FAN_STANDARD_ERRORS * self.error).min(axis=0),
-            (self.mean + FAN_STANDARD_ERRORS * self.error).max(axis=0),
-        )
+        reach = FAN_STANDARD_ERRORS * self.error
+        low, high = (self.mean - reach).min(axis=0), (self.mean + reach).max(axis=0)
         for _ in range(QUANTILE_HALVINGS):
             middle = (low + high) / 2
             below = self.probability(middle) < quantile
@@ -167,19 +158,20 @@ class PastFit:
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
         at = np.linspace(span, min(max(horizon - begin, span), 3 * span), N_FORECAST_DATES)
         mean, error = (np.concatenate(blocks) for blocks in zip(*(f.predict(at) for f in self.families), strict=True))
-        shapes = [shape for family in self.families for shape in family.shapes]
-        moved = tuple(shape._replace(start=shape.start + begin) for shape in shapes)
-        freedom = np.concatenate([family.freedom for family in self.families])
-        return Forecast(
-            moved, self.weight, self.spread, self.fitted, begin + at, mean + self.first_value, error, freedom
-        )
+        shapes = tuple(shape._replace(start=shape.start + begin) for family in self.families for shape in family.shapes)
+        dates, mean = begin + at, mean + self.first_value
+        return Forecast(shapes, self.weight, self.spread, self.fitted, dates, mean, error, self.freedom)
+
+    @property
+    def freedom(self) -> Floats:
+        """Degrees of freedom of each shape, shape (j,)."""
+        return np.concatenate([family.freedom for family in self.families])
 
     @property
     def rate(self) -> Rate:
         """Rate of change at its last point."""
         rate, error = (np.concatenate(rates) for rates in zip(*(f.rate() for f in self.families), strict=True))
-        freedom = np.concatenate([family.freedom for family in self.families])
-        low, high = (_mixture_quantile(self.weight, rate, error, freedom, p) for p in RATE_QUANTILES)
+        low, high = (_mixture_quantile(self.weight, rate, error, self.freedom, p) for p in RATE_QUANTILES)
         return Rate(float(self.weight @ rate), low, high)
 
 
@@ -190,19 +182,17 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {MIN_FORECAST_POINTS}")
     places = _average_neighbors(at)
     base = build_level_model(_average_readings(readings))
-    families = [fit(base, places) for fit in (fit_single_shapes, fit_pair_shapes, fit_triple_shapes)]
-    kept, weight = _select_heaviest(
-        [*families, fit_random_walks(base, places, "wander"), fit_random_walks(base, places, "bend")]
-    )
+    families = fit_shapes(base, places)
+    walks = fit_random_walks(base, places, "wander"), fit_random_walks(base, places, "bend")
+    kept, weight = _select_heaviest([*families, *walks])
     first = _average_neighbors(y)[0]
     fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
     return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))
 
 
 def _point_spread(families: Sequence[ShapeFits]) -> float:
-    evidence, variance = (
-        np.concatenate([getattr(family, name) for family in families]) for name in ("evidence", "variance")
-    )
+    evidence = np.concatenate([family.evidence for family in families])
+    variance = np.concatenate([family.variance for family in families])
     weight = np.exp(evidence - evidence.max())
     return float(np.sqrt(weight @ variance / weight.sum()))
 
@@ -235,10 +225,8 @@ def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ..
 def _student_cdf(freedom: Floats, t: Floats) -> Floats:
     """Return the distribution of Student's t (j, d) with degrees of freedom (j,)."""
     freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
-    share, near = (
-        (t > 0).astype(np.float64),
-        ~(np.abs(t) > scipy.special.stdtrit(freedom[:, :1], 1 - NEGLIGIBLE_PROBABILITY)),
-    )
+    near = ~(np.abs(t) > scipy.special.stdtrit(freedom[:, :1], 1 - NEGLIGIBLE_PROBABILITY))
+    share = (t > 0).astype(np.float64)
     share[near] = scipy.special.stdtr(freedom[near], t[near])
     return np.asarray(share)
 

@@ -51,9 +51,8 @@ class LevelModel:
             precision[:, i, i] = OPERATOR_SPREAD**-2
         if self.n_temperature_columns:
             squares = np.concatenate([[0.0, 0.0], np.cumsum(np.diff(self.y) ** 2)])
-            precision[:, 1, 1] = (
-                np.maximum(squares[n] / (2 * (n - 1)), MIN_POINT_VARIANCE) / STEEL_FREQUENCY_PER_KELVIN**2
-            )
+            variance = np.maximum(squares[n] / (2 * (n - 1)), MIN_POINT_VARIANCE)
+            precision[:, 1, 1] = variance / STEEL_FREQUENCY_PER_KELVIN**2
         return precision
 
     def explained_root(self, kind: str, n: Indices, k: Indices) -> Floats:
@@ -66,37 +65,34 @@ class LevelModel:
             product, square = self._change(kind, n, k)
             with np.errstate(invalid="ignore", divide="ignore"):
                 return np.asarray(product / np.sqrt(square))
-        sums, root = _change_without_level(kind, n, k)
+        length = (n - k).astype(np.float64)
+        sums = length if kind == "step" else length * (length - 1) / 2
         product = self._tail(0, kind, n, k)
         product -= sums * self._levels[1][n[:, 0]]
         with np.errstate(invalid="ignore", divide="ignore"):
-            product /= root
+            product /= np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums)
         return product
 
     def t_statistic(self, lean: Floats, n: Indices) -> Floats:
         """Return Student's t of changes that explain this much in the first n, shape (r,) each."""
-        total = self._residual_squares_up_to[n]
-        left = np.maximum(total - lean**2, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
-        return np.asarray(lean / np.sqrt((left + self._prior_squares) / self.freedom(n)))
+        return np.asarray(lean / np.sqrt(self._point_variance(lean**2, n)))
 
     def freedom(self, n: Indices) -> Floats:
         """Return the degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
-    @property
-    def _prior_squares(self) -> float:
-        """Sum of squares of the prior."""
-        return self.scatter_prior.freedom * self.scatter_prior.percent**2
+    def _point_variance(self, explained: Floats, n: Indices) -> Floats:
+        """Return the variance of a point in the first n, where a change explains this sum of squares, shape (r,)."""
+        total, prior = self._residual_squares_up_to[n], self.scatter_prior
+        left = np.maximum(total - explained, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        return np.asarray((left + prior.freedom * prior.percent**2) / self.freedom(n))
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
         """Return size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
         until = np.array([n])
-        product, square = (
-            float(products[0, 0]) for products in self._change(kind, until[:, np.newaxis], np.array([k]))
-        )
-        size, total = product / square, float(self._residual_squares_up_to[n])
-        left = max(total - size * product, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
-        return size, float(np.sqrt((left + self._prior_squares) / float(self.freedom(until)[0]) / square))
+        product, square = (float(part[0, 0]) for part in self._change(kind, until[:, np.newaxis], np.array([k])))
+        size = product / square
+        return size, float(np.sqrt(self._point_variance(np.array([size * product]), until)[0] / square))
 
     def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
         """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
@@ -109,12 +105,9 @@ class LevelModel:
 
     def _change(self, kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
         """Return products of the column of a change with the series and with itself, both orthogonal to the model."""
-        tail, square = (
-            [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])],
-            _change_square(kind, n - k),
-        )
-        inverse, level = (coefficients[n[:, 0]] for coefficients in self._levels)
         p = self.columns.shape[1]
+        tail, square = [self._tail(i, kind, n, k) for i in range(1 + p)], _change_square(kind, n - k)
+        inverse, level = (coefficients[n[:, 0]] for coefficients in self._levels)
         product = tail[0]
         for i in range(p):
             product -= tail[1 + i] * level[:, i, np.newaxis]
@@ -187,9 +180,8 @@ class LevelModel:
 
     def fit_columns(self, columns: Floats) -> ColumnFits:
         """Fit each of some sets of k columns (j, k, n) together with the model."""
-        level = self.inverse_normal_matrix @ self.columns.T @ self.y
-        crossed = columns @ self.columns
-        leaning = crossed @ self.inverse_normal_matrix
+        base, crossed = self.inverse_normal_matrix, columns @ self.columns
+        level, leaning = base @ self.columns.T @ self.y, crossed @ base
         product = columns @ (self.y - self.columns @ level)
         square = columns @ columns.transpose(0, 2, 1) - leaning @ crossed.transpose(0, 2, 1)
         inverse = np.asarray(np.linalg.pinv(square, rcond=MIN_SINGULAR_SHARE, hermitian=True), dtype=np.float64)
@@ -197,9 +189,7 @@ class LevelModel:
         total = self.residual_squares
         rss = np.maximum(total - (size * product).sum(axis=1), MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
         freedom = self.y.size - 1 - columns.shape[1]
-        return ColumnFits(
-            rss, size, inverse, leaning[..., 0], float(level[0]), float(self.inverse_normal_matrix[0, 0]), freedom
-        )
+        return ColumnFits(rss, size, inverse, leaning[..., 0], float(level[0]), float(base[0, 0]), freedom)
 
 
 class ColumnFits(NamedTuple):
@@ -242,14 +232,6 @@ def _change_square(kind: str, length: Indices) -> Floats:
     """Return the squared norm of the column of a change over some points."""
     points = length.astype(np.float64)
     return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
-
-
-def _change_without_level(kind: str, n: Indices, k: Indices) -> tuple[Floats, Floats]:
-    """Return sums and root squares of change columns orthogonal to the level, shape (r, m) each."""
-    length = (n - k).astype(np.float64)
-    sums = length if kind == "step" else length * (length - 1) / 2
-    with np.errstate(invalid="ignore"):
-        return sums, np.asarray(np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums))
 
 
 def _cumulative_sums(values: Floats) -> Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -35,14 +35,10 @@ RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (r
 """Text for a drop as by bearings that run in; it triggers an alarm like any other."""
 
 
-def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
-    """Remark on a newest test that does not show the followed mode."""
+def _newest_remarks(name: str, newest: HistoryRow, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
+    """Remark on a newest test without the followed mode, and a frequency drop that has reached a limit."""
     if not newest.frequency.is_known and newest.direction != CROSS_TAP:
         yield rules.MODE_LOST.remark(name)
-
-
-def _drop_limit_remarks(name: str, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
-    """Remark on a frequency drop that has reached a limit of machine.toml."""
     if drop.value >= limits.frequency_alarm_percent:
         yield rules.FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
     elif drop.value >= limits.frequency_warn_percent:
@@ -54,20 +50,13 @@ def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Ite
     folder = shlex.quote(str(path))
     event = rules.EVENT_CALL.format(folder=folder)
     if trend.open_drop is not None:
-        yield rules.FREQUENCY_DECAY.remark(
-            name,
-            course=_course_text(trend.open_drop.change),
-            since=trend.drop_since,
-            change=_change_text(trend.open_drop.change),
-            run_in=RUN_IN_TEXT if trend.is_run_in else "",
-            event=event,
-            folder=folder,
-        )
+        texts = _describe_change(trend.open_drop.change) | {"run_in": RUN_IN_TEXT if trend.is_run_in else ""}
+        yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, event=event, folder=folder, **texts)
     elif trend.detection.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         rise = trend.detection.rise
-        yield rules.FREQUENCY_ROSE.remark(name, change=_change_text(rise._replace(size=-rise.size)), event=event)
+        yield rules.FREQUENCY_ROSE.remark(name, event=event, **_describe_change(rise._replace(size=-rise.size)))
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -76,20 +65,16 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
         newest = series.values[value].find_newest_change()
         if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
             time, change = newest
-            yield rules.VALUE_CHANGED.remark(
-                name, value=label, course=_course_text(change), since=time, change=_change_text(change)
-            )
+            yield rules.VALUE_CHANGED.remark(name, value=label, since=time, **_describe_change(change))
 
 
-def _course_text(change: SeriesChange) -> str:
+def _describe_change(change: SeriesChange) -> dict[str, str]:
+    """Describe course and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
     past, present = ("fell", "falling") if change.size > 0 else ("rose", "rising")
-    return f"{past} at once before" if change.kind == "step" else f"has been {present} since"
-
-
-def _change_text(change: SeriesChange) -> str:
-    """Format the size of a change (%) with the half-width of its 95 % interval; both are logarithmic in the series."""
     ratio = math.exp(-change.size / 100)
-    return f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} %"
+    size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} %"
+    course = f"{past} at once before" if change.kind == "step" else f"has been {present} since"
+    return {"course": course, "change": size}
 
 
 @dataclass(frozen=True)
@@ -172,8 +157,7 @@ class MachineStatus:
         SeriesStatus or None
             Status of the series; None if it was never tapped.
         """
-        fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
-        return next(fits, None)
+        return next((series for series in self.series if (series.tool, series.direction) == (tool, direction)), None)
 
 
 def assess_status(
@@ -202,56 +186,33 @@ def assess_status(
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
-    asked = {row.tap_id: row.questions for row in history.rows}
-    remarks += question_remarks(asked, path, [row.tap_id for row in rows])
+    remarks += question_remarks({row.tap_id: row.questions for row in history.rows}, path, [row.tap_id for row in rows])
     programs = [*_program_remarks(rows, machine)]
-    raised += [
-        _trigger_program_alarm(remark, rows)
-        for remark in programs
-        if rules.STATUS_BY_CODE[remark.code] is StatusLevel.ALARM
-    ]
-    remarks += [
-        *programs,
-        *rules.date_remarks(newest.tap_id, newest.time, interval, now, path),
-        *_direction_remarks(rows),
-    ]
+    raised += [_trigger_program_alarm(remark, rows) for remark in programs if rules.is_alarm(remark)]
+    remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]
+    remarks += _direction_remarks(rows)
     series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
     left = rules.count_days_left(newest.time, interval, now)
     alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
-    return _build_status(now, remarks, rules.next_tap_step(newest.time, interval), series, newest.time, left, alarms)
+    status = _build_status(now, remarks, rules.next_tap_step(newest.time, interval), alarms)
+    return replace(status, series=tuple(series), last_tap=newest.time, days_left=left)
 
 
 def _build_status(
-    now: datetime,
-    remarks: Sequence[Remark],
-    default_step: str = "",
-    series: Sequence[SeriesStatus] = (),
-    last_tap: datetime | None = None,
-    left: float | None = None,
-    alarms: Sequence[Alarm] = (),
+    now: datetime, remarks: Sequence[Remark], default_step: str = "", alarms: Sequence[Alarm] = ()
 ) -> MachineStatus:
     """Build the status from its remarks; default_step: next step where no remark has one."""
-    ordered = rules.sort_by_severity(remarks)
+    ordered, alarms = rules.sort_by_severity(remarks), rules.sort_by_severity(alarms)
     acknowledged = add_acknowledgements(ordered, alarms, now)
-    return MachineStatus(
-        now,
-        ordered,
-        rules.find_next_step(ordered, default_step),
-        acknowledged,
-        rules.sort_by_severity(alarms),
-        tuple(series),
-        last_tap,
-        left,
-    )
+    return MachineStatus(now, ordered, rules.find_next_step(ordered, default_step), acknowledged, alarms)
 
 
 def _series_history_of(history: History, tool: str, direction: str, scatter: FleetScatter | None) -> SeriesHistory:
     rows, other_rows = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
     if scatter is None or sum(row.time <= scatter.time for row in rows) >= MIN_MONITORED_POINTS:
         return build_series_history(rows, other_rows)
-    return build_series_history(
-        rows, other_rows, SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
-    )
+    prior = SeriesScatterPrior(ScatterPrior(*scatter.alone), ScatterPrior(*scatter.common))
+    return build_series_history(rows, other_rows, prior)
 
 
 def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStatus:
@@ -259,23 +220,14 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
-    of_limits, of_watch = (
-        [*_drop_limit_remarks(name, drop, machine.limits)],
-        [*_trend_remarks(name, trend, path)] if trend else [],
-    )
-    remarks = [*_lost_mode_remarks(name, newest), *of_limits, *of_watch, *_value_change_remarks(name, series)]
-    raised = [
-        TriggeredAlarm(remark, row.tap_id, row.time)
-        for remarks, row in (
-            (of_limits, series.first_below(machine.limits.frequency_alarm_percent)),
-            (of_watch, series.first_falling),
-        )
-        for remark in remarks
-        if rules.STATUS_BY_CODE[remark.code] is StatusLevel.ALARM and row is not None
-    ]
-    return SeriesStatus(
-        newest.tool, newest.direction, newest.time, first.time, drop, trend, tuple(remarks), tuple(raised), series
-    )
+    of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
+    of_watch = [*_trend_remarks(name, trend, path)] if trend else []
+    remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
+    below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
+    pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
+    raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]
+    times = newest.time, first.time
+    return SeriesStatus(newest.tool, newest.direction, *times, drop, trend, tuple(remarks), tuple(raised), series)
 
 
 def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[Remark]:
@@ -284,9 +236,8 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
     for name, ruling in (rows[-1].verdicts or {}).items():
         tap, stability = to_tap.get(tools[name], ""), ruling.stability.value
         if ruling.stability is Stability.NOT_STABLE:
-            yield rules.PROGRAM_NOT_STABLE.remark(
-                name, tap and f"Do not run these programs. {tap}", stability=stability
-            )
+            cure = tap and f"Do not run these programs. {tap}"
+            yield rules.PROGRAM_NOT_STABLE.remark(name, cure, stability=stability)
         elif ruling.stability is Stability.UNKNOWN:
             yield rules.PROGRAM_UNKNOWN.remark(name, stability=stability)
         elif ruling.stability is Stability.DOUBTFUL:
@@ -305,13 +256,9 @@ def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> Trigge
 
 
 def _direction_remarks(rows: Sequence[HistoryRow]) -> Iterator[Remark]:
-    pairs = dict.fromkeys((row.tool, row.direction) for row in rows if row.direction != CROSS_TAP)
-    for tool in dict.fromkeys(tool for tool, _ in pairs):
-        tapped = {direction for name, direction in pairs if name == tool and _is_frequency_known(rows, name, direction)}
+    direct = [row for row in rows if row.direction != CROSS_TAP]
+    for tool in dict.fromkeys(row.tool for row in direct):
+        tapped = {row.direction for row in direct if row.tool == tool and row.frequency.is_known}
         if len(tapped) == 1:
             direction = tapped.pop()
             yield rules.ONE_DIRECTION.remark(tool, direction=direction, missing="y" if direction == "x" else "x")
-
-
-def _is_frequency_known(rows: Sequence[HistoryRow], tool: str, direction: str) -> bool:
-    return any(row.frequency.is_known for row in rows if (row.tool, row.direction) == (tool, direction))

@@ -48,9 +48,8 @@ class RandomWalkFits:
         """Predict mean and standard error of each at dates from the first point on, shape (j, d) each."""
         ahead = at / self.points.span
         is_bend = self.points.kind == "bend"
-        return self._predict(
-            _walk_covariance(is_bend, self.points.share, ahead), _walk_variance(is_bend, ahead), ahead, 1.0
-        )
+        variance = ahead**3 / 3 if is_bend else ahead
+        return self._predict(_walk_covariance(is_bend, self.points.share, ahead), variance, ahead, 1.0)
 
     def rate(self) -> tuple[Floats, Floats]:
         """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
@@ -133,20 +132,14 @@ def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWal
 
 def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoints:
     share, p = at / at[-1], base.columns.shape[1]
-    values, vectors = np.linalg.eigh(_walk_covariance(kind == "bend", share, share))
-    precision = np.zeros((p + 1, p + 1))
-    precision[:p, :p] = base.precision(np.array([at.size]))[0]
-    columns = vectors.T @ np.column_stack([base.columns, share])
-    return _RotatedPoints(
-        kind, share, float(at[-1]), np.maximum(values, 0.0), vectors, columns, vectors.T @ base.y, precision
-    )
+    values, axes = np.linalg.eigh(_walk_covariance(kind == "bend", share, share))
+    prior = np.zeros((p + 1, p + 1))
+    prior[:p, :p] = base.precision(np.array([at.size]))[0]
+    columns = axes.T @ np.column_stack([base.columns, share])
+    return _RotatedPoints(kind, share, float(at[-1]), np.maximum(values, 0.0), axes, columns, axes.T @ base.y, prior)
 
 
 def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:
     """Return the covariance of the random walk, its amount being 1, at two sets of shares of the span, shape (n, d)."""
     first = np.minimum(share[:, np.newaxis], ahead)
     return first**3 / 3 + first**2 * np.abs(share[:, np.newaxis] - ahead) / 2 if is_bend else first
-
-
-def _walk_variance(is_bend: bool, ahead: Floats) -> Floats:
-    return ahead**3 / 3 if is_bend else ahead

@@ -64,7 +64,7 @@ class ValueHistory:
 
         Temperature and operator count for the frequency alone: of the others nothing is known beforehand.
         """
-        rows, numbers = self._positive
+        rows, numbers = self.trend_values
         errors = np.where(np.isfinite(numbers[:, 1]), 100 * numbers[:, 1] / numbers[:, 0], math.nan).tolist()
         under, times = [row.conditions for row in rows], [row.time for row in rows]
         hours = [_or_nan(conditions.hours) for conditions in under]
@@ -104,22 +104,17 @@ class ValueHistory:
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
         """Find the change that the newest points are sure of, and its time, or None."""
-        rows, numbers = self._positive
+        rows, numbers = self.trend_values
         reclamped = [row.conditions.reclamped for row in rows]
         times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
         change = find_newest_change(np.array(percents))
         return None if change is None else (times[change.point], change)
 
     @property
-    def _positive(self) -> tuple[tuple[HistoryRow, ...], Floats]:
+    def trend_values(self) -> tuple[tuple[HistoryRow, ...], Floats]:
         """Reference rows with a positive value, with their numbers, shape (n, 2)."""
         counts = np.isfinite(self.values[:, 0]) & ~self.has_questions & (self.values[:, 0] > 0)
         return self._select(counts), self.values[counts]
-
-    @property
-    def trend_rows(self) -> tuple[HistoryRow, ...]:
-        """Rows of the trend, oldest first."""
-        return self._positive[0]
 
     def _select(self, counts: Flags) -> tuple[HistoryRow, ...]:
         return self.rows if counts.all() else tuple(compress(self.rows, counts.tolist()))
@@ -161,7 +156,8 @@ class SeriesHistory:
         trend = self.frequency.trend
         if trend is None or trend.open_drop is None:
             return None
-        return self.frequency.trend_rows[trend.points[trend.open_drop.triggered_at].taps[0]]
+        rows, _ = self.frequency.trend_values
+        return rows[trend.points[trend.open_drop.triggered_at].taps[0]]
 
 
 def build_series_history(

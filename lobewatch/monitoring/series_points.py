@@ -59,18 +59,15 @@ class Readings:
 
     def since(self, begin: int) -> Self:
         """Return the points from one on."""
-        temperature, other = (
-            None if values is None else values[begin:] for values in (self.temperature, self.other_direction)
-        )
-        operators = self.operators[begin:]
-        return replace(self, y=self.y[begin:], temperature=temperature, operators=operators, other_direction=other)
+        y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
+        temperature, other = (None if values is None else values[begin:] for values in optional)
+        return replace(self, y=y, temperature=temperature, operators=operators, other_direction=other)
 
     @property
     def shared_points(self) -> Indices:
         """Points that both directions have."""
-        return (
-            np.empty(0, np.intp) if self.other_direction is None else np.flatnonzero(np.isfinite(self.other_direction))
-        )
+        other = self.other_direction
+        return np.empty(0, np.intp) if other is None else np.flatnonzero(np.isfinite(other))
 
     @property
     def mean_of_directions(self) -> Readings:

@@ -34,6 +34,9 @@ class StatusLevel(StrEnum):
     """No known problem."""
 
 
+ALARM, UNKNOWN, WARN, GOOD = StatusLevel
+
+
 @dataclass(frozen=True)
 class StatusRule:
     """A rule of the machine status: what a remark code means, with its texts; words in braces are filled in."""
@@ -56,72 +59,65 @@ class StatusRule:
 
 FREQUENCY_ALARM = StatusRule(
     "frequency-alarm",
-    StatusLevel.ALARM,
+    ALARM,
     "frequency fallen by {drop:.1f} % since the first tests (alarm at {limit:g} %)",
     "Before the next part have the bearings, the tool and its clamping looked at, then tap again.",
     is_limit=True,
 )
 FREQUENCY_DECAY = StatusRule(
     "decay",
-    StatusLevel.ALARM,
+    ALARM,
     "frequency {course} {since:%Y-%m-%d}, by {change}{run_in}",
     "Have the bearings, the tool and its clamping looked at; after a repair: {event}. "
     "Known already: operator_entries.acknowledge_alarms {folder}",
 )
 PROGRAM_NOT_STABLE = StatusRule(
     "program-not-stable",
-    StatusLevel.ALARM,
+    ALARM,
     "{stability}",
     "Change these programs before the next part: Logbook.verdicts names a safe speed and depth.",
     is_limit=True,
 )
-UNREADABLE = StatusRule("unreadable", StatusLevel.UNKNOWN, "{reason}")
+UNREADABLE = StatusRule("unreadable", UNKNOWN, "{reason}")
 NEVER_TAPPED = StatusRule(
-    "never-tapped",
-    StatusLevel.UNKNOWN,
-    "no tap test {since}",
-    "Take the first tap test: all others are compared with it.",
+    "never-tapped", UNKNOWN, "no tap test {since}", "Take the first tap test: all others are compared with it."
 )
 FREQUENCY_WARNING = StatusRule(
     "frequency-warn",
-    StatusLevel.WARN,
+    WARN,
     "frequency fallen by {drop:.1f} % since the first tests (warning at {limit:g} %)",
     "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon.",
     is_limit=True,
 )
 DOUBTFUL_DECAY = StatusRule(
     "decay-doubtful",
-    StatusLevel.WARN,
+    WARN,
     "the newest test is lower than those before it",
     "Clamp the tool anew and tap again: TapSession.run {folder} Conditions.reclamped shows whether it fell.",
 )
 MODE_LOST = StatusRule(
     "mode-lost",
-    StatusLevel.WARN,
+    WARN,
     "the newest test does not show the mode followed",
     "Tap again: the mode that is followed was not found in the newest test.",
 )
-OVERDUE = StatusRule(
-    "overdue", StatusLevel.WARN, "the next tap test is overdue by {days}", "Take the tap test that is due."
-)
-PROGRAM_UNKNOWN = StatusRule("program-unknown", StatusLevel.WARN, "{stability}", "See why with Logbook.verdicts.")
+OVERDUE = StatusRule("overdue", WARN, "the next tap test is overdue by {days}", "Take the tap test that is due.")
+PROGRAM_UNKNOWN = StatusRule("program-unknown", WARN, "{stability}", "See why with Logbook.verdicts.")
 PROGRAM_DOUBTFUL = StatusRule(
     "program-doubtful",
-    StatusLevel.WARN,
+    WARN,
     "{stability}",
     "See with Logbook.verdicts what would settle it, and where to go until then.",
 )
-FREQUENCY_ROSE = StatusRule(
-    "frequency-rose", StatusLevel.GOOD, "frequency rose by {change}: assembly changed?", "If so: {event}"
-)
+FREQUENCY_ROSE = StatusRule("frequency-rose", GOOD, "frequency rose by {change}: assembly changed?", "If so: {event}")
 VALUE_CHANGED = StatusRule(
     "value-changed",
-    StatusLevel.GOOD,
+    GOOD,
     "{value} {course} {since:%Y-%m-%d}, by {change}; programs are judged with it, the light does not watch it",
 )
 ONE_DIRECTION = StatusRule(
     "one-direction",
-    StatusLevel.GOOD,
+    GOOD,
     "tapped in direction {direction} alone",
     "Tap direction {missing} of the same tool too: no program is sure with one direction alone.",
 )
@@ -131,29 +127,19 @@ EVENT_CALL = 'folder_updates.add_event {folder} "what was done" add_event.new_ba
 
 def _rules_of(*codes: str) -> list[StatusRule]:
     """Rules of warnings that other packages write."""
-    return [StatusRule(code, StatusLevel.WARN) for code in codes]
+    return [StatusRule(code, WARN) for code in codes]
 
 
 STATUS_RULES = (
-    FREQUENCY_ALARM,
-    FREQUENCY_DECAY,
-    PROGRAM_NOT_STABLE,
-    UNREADABLE,
-    NEVER_TAPPED,
+    *(FREQUENCY_ALARM, FREQUENCY_DECAY, PROGRAM_NOT_STABLE, UNREADABLE, NEVER_TAPPED),
     *_rules_of("journal-damaged", "tap-damaged", "tap-unreadable", "tap-unlisted"),
     *_rules_of("file-damaged", "cut-damaged", "cut-unlisted"),
-    FREQUENCY_WARNING,
-    DOUBTFUL_DECAY,
+    *(FREQUENCY_WARNING, DOUBTFUL_DECAY),
     *_rules_of("frequency-jump"),
     MODE_LOST,
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of(*CLOCK_QUESTIONS, "tap-in-future"),
-    OVERDUE,
-    PROGRAM_UNKNOWN,
-    PROGRAM_DOUBTFUL,
-    FREQUENCY_ROSE,
-    VALUE_CHANGED,
-    ONE_DIRECTION,
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
@@ -162,6 +148,11 @@ LIMIT_CODES = {rule.code for rule in STATUS_RULES if rule.is_limit}
 """Codes with which an alarm is not early."""
 UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
 """Next step for a machine that cannot be read."""
+
+
+def is_alarm(remark: Remark) -> bool:
+    """Return whether a remark is an alarm."""
+    return STATUS_BY_CODE[remark.code] is ALARM
 
 
 def unreadable_remark(reason: str) -> Remark:
@@ -177,13 +168,12 @@ def sort_by_severity(remarks: Iterable[CodedT]) -> tuple[CodedT, ...]:
 
 def worst_status(ordered: Sequence[Remark]) -> StatusLevel:
     """Return the status of the most severe remark."""
-    return STATUS_BY_CODE[ordered[0].code] if ordered else StatusLevel.GOOD
+    return STATUS_BY_CODE[ordered[0].code] if ordered else GOOD
 
 
 def is_early_alarm(ordered: Sequence[Remark]) -> bool:
     """Return whether the only alarm is a detected drop short of every limit and program."""
-    codes = {remark.code for remark in ordered}
-    return worst_status(ordered) is StatusLevel.ALARM and codes.isdisjoint(LIMIT_CODES)
+    return worst_status(ordered) is ALARM and {remark.code for remark in ordered}.isdisjoint(LIMIT_CODES)
 
 
 def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:
@@ -201,14 +191,12 @@ def count_days_left(newest: datetime, interval_days: float, now: datetime) -> fl
     return interval_days - (now - newest) / timedelta(days=1)
 
 
-def date_remarks(
-    tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
-) -> Iterator[Remark]:
-    """Yield remarks by date: a test is overdue, or in the future; path: of the folder."""
-    left = count_days_left(newest, interval_days, now)
+def date_remarks(tap_id: str, newest: datetime, days: float, now: datetime, path: Path | str) -> Iterator[Remark]:
+    """Yield remarks by date: a test is overdue, or in the future; days: tap interval; path: of the folder."""
+    left = count_days_left(newest, days, now)
     if left < 0:
-        days = math.ceil(-left)
-        yield OVERDUE.remark("", days=f"{days} day{'s' if days > 1 else ''}")
+        late = math.ceil(-left)
+        yield OVERDUE.remark("", days=f"{late} day{'s' if late > 1 else ''}")
     yield from future_tap_remarks(tap_id, newest, now, path)
 
 

@@ -63,9 +63,8 @@ def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:
     if not known:
         return NO_FORECAST
     rows = ((reach.earliest, reach.probable, reach.latest, reach.forecast_end) for reach in known)
-    first = ThresholdDates(
-        False, *(min((day for day in days if day is not None), default=None) for days in zip(*rows, strict=True))
-    )
+    columns = ([day for day in days if day is not None] for days in zip(*rows, strict=True))
+    first = ThresholdDates(False, *(min(days, default=None) for days in columns))
     return first if len(known) == len(reaches) or first.earliest is not None else NO_FORECAST
 
 

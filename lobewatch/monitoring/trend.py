@@ -105,11 +105,8 @@ class Trend:
     @cached_property
     def forecast(self) -> Forecast | None:
         """Forecast over days since 1970; None below 8 points."""
-        return (
-            None
-            if self.past_fit is None
-            else self.past_fit.forecast(float(self.past_fit.dates[-1]) + FORECAST_HORIZON_DAYS)
-        )
+        past = self.past_fit
+        return None if past is None else past.forecast(float(past.dates[-1]) + FORECAST_HORIZON_DAYS)
 
     @cached_property
     def likeliest_shape(self) -> TrendShape | None:
@@ -169,8 +166,7 @@ class Trend:
         """True if the open drop began among the first points and has slowed down, as of bearings that run in."""
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
-        fallen = self.start - float(self.past_fit.fitted[-1])
-        mean = fallen / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
+        mean = (self.start - float(self.past_fit.fitted[-1])) / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
         return -self.past_fit.rate.value < MAX_RUN_IN_RATE * mean
 
     @property
@@ -180,19 +176,18 @@ class Trend:
 
 
 def fit_trend(
-    series: Sequence[TapValue],
-    now: datetime,
-    other: Sequence[TapValue] = (),
-    known: SeriesScatterPrior = NO_SERIES_PRIOR,
+    taps: Sequence[TapValue], now: datetime, other: Sequence[TapValue] = (), known: SeriesScatterPrior = NO_SERIES_PRIOR
 ) -> Trend:
-    """Fit the trend of a series, oldest first, with at least one value.
+    """Fit the trend of a series of taps, oldest first, with at least one value.
 
     now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
-    points = _newest_points(series)
+    points, past = _newest_points(taps), None
     readings = _build_readings(points, _newest_points(other) if other else (), known)
-    return Trend(points, series[0].value, readings, _fit_points(points, readings), int(days_since_epoch(now)))
+    if len(points) >= MIN_FORECAST_POINTS:
+        past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
+    return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
@@ -223,12 +218,6 @@ def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
     """Return 100 ln of each value over the first."""
     log, first = math.log, values[0] if values else 1.0
     return tuple([100 * log(value / first) for value in values])
-
-
-def _fit_points(points: Sequence[TrendPoint], readings: Readings) -> PastFit | None:
-    if len(points) < MIN_FORECAST_POINTS:
-        return None
-    return fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
 
 
 def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], known: SeriesScatterPrior) -> Readings:

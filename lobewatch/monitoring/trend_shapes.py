@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self, get_args
 
 import numpy as np
 
@@ -23,30 +24,10 @@ MIN_RUNAWAY_DISTANCE = 1e-6
 """Smallest remaining share of the time to that end at which such a curve is evaluated."""
 
 ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
-SHAPE_KINDS: tuple[ShapeKind, ...] = (
-    "none",
-    "line",
-    "slope",
-    "step",
-    "curve",
-    "runaway",
-    "slopes",
-    "breaks",
-    "crash",
-    "wander",
-    "bend",
-)
+SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
 
 
-PRIOR_ODDS: dict[ShapeKind, float] = {
-    "none": 0.3,
-    "step": 0.3,
-    "slopes": 5.0,
-    "breaks": 5.0,
-    "crash": 4.0,
-    "wander": 0.5,
-    "bend": 0.5,
-}
+PRIOR_ODDS = {"none": 0.3, "step": 0.3, "slopes": 5.0, "breaks": 5.0, "crash": 4.0, "wander": 0.5, "bend": 0.5}
 """Prior odds of the kinds, all others 1, chosen so that forecast ranges of many trends hold their dates."""
 
 
@@ -86,8 +67,7 @@ def list_pair_shapes(at: Floats) -> list[TrendShape]:
     """List all shapes of two columns."""
     ramps, steps = [0.0, *at[1:-3].tolist()], at[2:-1].tolist()
     slopes = [TrendShape("slopes", later, end=ramp) for i, ramp in enumerate(ramps) for later in ramps[i + 1 :]]
-    crashes = [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
-    return slopes + crashes
+    return slopes + [TrendShape("crash", step, end=ramp) for step in steps for ramp in {0.0, step}.intersection(ramps)]
 
 
 def list_triple_shapes(at: Floats) -> list[TrendShape]:
@@ -102,20 +82,17 @@ def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floa
     columns, end = np.empty((len(shapes), at.size)), 0
     for kind, alike in groupby(shape.kind for shape in shapes):
         begin, end = end, end + len([*alike])
-        block, block_starts = columns[begin:end], starts[begin:end]
+        block, part = columns[begin:end], shapes[begin:end]
         if kind == "step":
-            block[:] = at >= block_starts
+            block[:] = at >= starts[begin:end]
         elif kind == "curve":
-            curves = [(shape.rate, shape.power) for shape in shapes[begin:end]]
-            block[:] = [np.expm1(rate * at / span) if rate else (at / span) ** power for rate, power in curves]
+            share = at / span
+            block[:] = [np.expm1(shape.rate * at / span) if shape.rate else share**shape.power for shape in part]
         elif kind == "runaway":
-            ways = [
-                (shape.power, np.maximum(1 - at / (shape.end * span), MIN_RUNAWAY_DISTANCE))
-                for shape in shapes[begin:end]
-            ]
-            block[:] = [way**-power - 1 for power, way in ways]
+            ways = [np.maximum(1 - at / (shape.end * span), MIN_RUNAWAY_DISTANCE) for shape in part]
+            block[:] = [way**-shape.power - 1 for way, shape in zip(ways, part, strict=True)]
         else:
-            np.maximum(np.subtract(at, block_starts, out=block), 0.0, out=block)
+            np.maximum(np.subtract(at, starts[begin:end], out=block), 0.0, out=block)
     return np.asarray(columns[:, np.newaxis])
 
 
@@ -130,8 +107,7 @@ def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
 
 def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
     """Build the columns of three-column shapes, shape (j, 3, d): the line, and both dates."""
-    line = np.broadcast_to(at, (len(shapes), 1, at.size))
-    return np.concatenate([line, build_pair_columns(shapes, at)], axis=1)
+    return np.concatenate([np.broadcast_to(at, (len(shapes), 1, at.size)), build_pair_columns(shapes, at)], axis=1)
 
 
 RATE_STEP = 1e-6
@@ -181,20 +157,11 @@ class ShapeFits:
         return self.fits.rate(np.diff(near)[..., 0] / (RATE_STEP * self.span))
 
 
-def fit_single_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Fit the shapes of one column."""
-    span = float(at[-1])
-    return _fit_shapes(base, at, list_single_shapes(at), lambda shapes, dates: build_columns(shapes, dates, span))
-
-
-def fit_pair_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Fit the shapes of two columns."""
-    return _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
-
-
-def fit_triple_shapes(base: LevelModel, at: Floats) -> ShapeFits:
-    """Fit the shapes of three columns."""
-    return _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)
+def fit_shapes(base: LevelModel, at: Floats) -> list[ShapeFits]:
+    """Fit the shapes of one, two and three columns."""
+    single = _fit_shapes(base, at, list_single_shapes(at), partial(build_columns, span=float(at[-1])))
+    pairs = _fit_shapes(base, at, list_pair_shapes(at), build_pair_columns)
+    return [single, pairs, _fit_shapes(base, at, list_triple_shapes(at), build_triple_columns)]
 
 
 def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], drawn: ColumnBuilder) -> ShapeFits:

@@ -107,9 +107,8 @@ def find_critical_drop(verdict: Verdict) -> CriticalDrop:
     depth = verdict.program.depth_mm / 1e3
     last = find_tolerable_drop(samples, depth, stiffness_at)
     first = _first_doubtful_drop(samples, depth, last, stiffness_at) if verdict.stability is Stability.STABLE else 0.0
-    return CriticalDrop(
-        min(first, last), last, _drop_error(samples, depth, last, stiffness_at) if last < math.inf else 0.0
-    )
+    error = _drop_error(samples, depth, last, stiffness_at) if last < math.inf else 0.0
+    return CriticalDrop(min(first, last), last, error)
 
 
 def build_stored_verdict(verdict: Verdict, drops: bool) -> StoredVerdict:
@@ -148,7 +147,6 @@ def _drop_error(samples: ProgramSamples, depth: float, last: float, stiffness_at
     alike = samples.rows[np.zeros(N_DROP_ERROR_SAMPLES, dtype=np.intp)]
     scattered = replace(samples, rows=replace(alike, damping_ratio=rows.damping_ratio, stiffness=rows.stiffness))
     spread = np.std(apply_drops(scattered, np.array([last]), stiffness_at).growth(depth))
-    before, after = apply_drops(median, last + np.array([-DROP_SLOPE_STEP, DROP_SLOPE_STEP]), stiffness_at).growth(
-        depth
-    )[:, 0]
+    drops = last + np.array([-DROP_SLOPE_STEP, DROP_SLOPE_STEP])
+    before, after = apply_drops(median, drops, stiffness_at).growth(depth)[:, 0]
     return float(spread * 2 * DROP_SLOPE_STEP / abs(after - before)) if after != before else 0.0

@@ -13,8 +13,9 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts import program_samples
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_samples, find_worst_limit
+from lobewatch.verdicts.program_samples import ProgramSamples, WorstLimit, build_median_row
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
@@ -49,11 +50,9 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
     limit, worst = float(samples.limits[0]), samples.with_lowest_cuts(0.0)
     near = samples.with_lowest_cuts(SIMILAR_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS)
     softness = (samples.rows.tangential[0] / samples.rows.tangential)[:, np.newaxis]
-    tried = (
-        softness * limit * TRIED_LIMIT_SHARES
-        if np.isfinite(limit)
-        else np.tile(MAX_PROGRAM_DEPTH_RATIO * depth * UNLIMITED_DEPTH_SHARES, (len(softness), 1))
-    )
+    tried = np.tile(MAX_PROGRAM_DEPTH_RATIO * depth * UNLIMITED_DEPTH_SHARES, (len(softness), 1))
+    if np.isfinite(limit):
+        tried = softness * limit * TRIED_LIMIT_SHARES
     low, high, at_low, at_high = _bracket_limits(tried, worst.growth(tried))
     open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
     if open_ones.size:
@@ -147,12 +146,10 @@ class SampledProgram(NamedTuple):
 
     depth: float
     """Axial depth of cut (m)."""
-    median: ProgramLimit
-    """Limit of the median estimate."""
+    worst: WorstLimit
+    """Limit of the median estimate, with its worst principal directions."""
     samples: ProgramSamples
     """Samples of the whole uncertainty."""
-    axes_ratio: float
-    """Highest over lowest median limit for all open principal directions; 1 if none are open."""
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
@@ -162,20 +159,19 @@ def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
 
 def sample_program(case: ProgramCase) -> SampledProgram:
     """Find the median limit of a program and sample its samples."""
-    median, axes, axes_ratio = find_worst_limit(case)
-    return SampledProgram(case.depth, median, draw_samples(case, median, axes), axes_ratio)
+    worst = program_samples.find_worst_limit(case)
+    return SampledProgram(case.depth, worst, program_samples.draw_samples(case, worst))
 
 
 def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
     """Evaluate all samples of a program: limits, quantiles, samples that chatter."""
-    depth, median, samples, across = program
+    depth, (median, _, axes_ratio), samples = program
     limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
     below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
     around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
-    near = (samples.limits <= below) | around
-    chatters = _find_chattering(samples, near, around, limits, depth)
-    return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, across)
+    chatters = _find_chattering(samples, (samples.limits <= below) | around, around, limits, depth)
+    return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, axes_ratio)
 
 
 def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:
@@ -244,11 +240,8 @@ def compute_limit_band(
     limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *rising)
     limits *= [np.interp(line.speed_rpm, speeds, ratio) for ratio in ratios]
     lowest, highest = np.quantile(limits, LIMIT_QUANTILES, axis=0)
-    return LimitBand(
-        line.speed_rpm,
-        np.minimum(lowest, line.depth),
-        np.maximum(np.where(highest < UNLIMITED_DEPTH / 2, highest, np.inf), line.depth),
-    )
+    highest = np.where(highest < UNLIMITED_DEPTH / 2, highest, np.inf)
+    return LimitBand(line.speed_rpm, np.minimum(lowest, line.depth), np.maximum(highest, line.depth))
 
 
 def _band_depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:

@@ -99,22 +99,15 @@ def propose_pitch(
     if verdict.stability is Stability.UNKNOWN or verdict.samples is None:
         raise DataError("; ".join(str(remark) for remark in verdict.remarks))
     case = ProgramCase(at_speed.apply_coefficients(table), assembly, machine, at_speed)
-    limits, half_wave = (
-        _pitch_limits(verdict.samples, case.depth),
-        half_wave_deg(table.speed_rpm, verdict.chatter_frequency),
-    )
+    limits = _pitch_limits(verdict.samples, case.depth)
+    half_wave = half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
     search = PitchSearch(case, verdict.samples, limits)
     unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
     if present := machine.build_cut(table).pitch:
-        pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
-        unequal.append(search.evaluate(pattern)[0])
+        unequal.append(search.evaluate(PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is"))[0])
     band = verdict.limit, verdict.limit_low, verdict.limit_high
-    return PitchProposal(
-        verdict,
-        _build_evaluation(equal, verdict.stability, band, limits, limits),
-        tuple(sorted(unequal, key=lambda judged: -judged.low)),
-        half_wave,
-    )
+    evaluation = _build_evaluation(equal, verdict.stability, band, limits, limits)
+    return PitchProposal(verdict, evaluation, tuple(sorted(unequal, key=lambda judged: -judged.low)), half_wave)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +128,8 @@ class PitchSearch:
 
     def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
         """Find the best pattern of one kind."""
-        places = [
-            *np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist(),
-            *range(0, self.equal_limits.size, PITCH_SAMPLE_STEP),
-        ]
+        places = np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist()
+        places += range(0, self.equal_limits.size, PITCH_SAMPLE_STEP)
         judged = dict[PitchPattern, PitchEvaluation]()
         for _ in range(MAX_PITCH_TRIES):
             calm = {pattern: self._stable_depth(pattern, np.unique(places)) for pattern in patterns}
@@ -158,9 +149,8 @@ class PitchSearch:
         few = replace(self.samples[places], cuts=tuple(with_pitch_pattern(cut, pattern) for cut in cuts), limits=limits)
         speeds = few.rows.speed_rpm[:, np.newaxis]
         mean = min(float(np.min(ZeroOrderBatch.of(few.rows.with_cut(cut)).limits(speeds)[0])) for cut in few.cuts)
-        return find_deepest_stable(
-            few, min(PITCH_DEPTH_FACTOR * mean, MAX_PROGRAM_DEPTH_RATIO * self.case.table.depth_mm / 1e3)
-        )
+        most = MAX_PROGRAM_DEPTH_RATIO * self.case.table.depth_mm / 1e3
+        return find_deepest_stable(few, min(PITCH_DEPTH_FACTOR * mean, most))
 
     def evaluate(self, pattern: PitchPattern) -> tuple[PitchEvaluation, Floats]:
         """Evaluate a pattern; return its evaluation and the limit of each sample (m), the median first."""
@@ -183,7 +173,5 @@ def _build_evaluation(
 ) -> PitchEvaluation:
     """Build an evaluation from sample limits and those of equal pitch (m), the median first."""
     gains = limits / equal - 1
-    low, high = np.quantile(gains[1:], LIMIT_QUANTILES)
-    return PitchEvaluation(
-        pattern, word, *band, float(gains[0]), float(low), float(high), float(np.mean(gains[1:] < 0))
-    )
+    low, high = np.quantile(gains[1:], LIMIT_QUANTILES).tolist()
+    return PitchEvaluation(pattern, word, *band, float(gains[0]), low, high, float(np.mean(gains[1:] < 0)))

@@ -72,9 +72,8 @@ def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
     """Return the source of the tool limits for a remark."""
     tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
     where = "in a slot" if limits.cut == "slot" else "at the side"
-    return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
-        f" of {table.material}" if table.material else ""
-    )
+    material = f" of {table.material}" if table.material else ""
+    return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}{material}"
 
 
 def _range_text(low: float, high: float) -> str:
@@ -100,11 +99,8 @@ MIN_CROSS_LIMIT_RATIO = 1.04
 def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[Remark]:
     """Warn about defaults assumed for missing program settings."""
     table = case.table
-    if (
-        table.immersion < NARROW_CUT_IMMERSION
-        and table.corner_radius_mm is None
-        and not isinstance(table.radial_depth_mm, tuple)
-    ):
+    is_plain = table.corner_radius_mm is None and not isinstance(table.radial_depth_mm, tuple)
+    if table.immersion < NARROW_CUT_IMMERSION and is_plain:
         yield _corner_remark(case, result)
     if case.machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
         yield Remark(

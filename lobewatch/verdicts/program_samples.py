@@ -8,18 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lobes import (
-    Cut,
-    MillingRows,
-    Program,
-    ProgramLimit,
-    build_milling_system,
-    count_pieces,
-    growth_rate,
-    join_rows,
-    program_limit,
-    rows_at_speeds,
-)
+import lobes
+from lobes import Cut, MillingRows, Program, ProgramLimit
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engagement
 from lobewatch.arrays import Flags, Floats, Indices
@@ -69,9 +59,8 @@ class ProgramSamples:
         wanted = np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
         cut, row = np.divmod(np.arange(len(self.cuts) * len(self.rows)), len(self.rows))
-        return np.asarray(
-            np.max(self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape), axis=0)
-        )
+        grown = self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape)
+        return np.asarray(np.max(grown, axis=0))
 
     def critical_growth(self, depth: float) -> Floats:
         """Return the growth rate at a depth (m) in the worst cut; clearly stable samples in the first cut only.
@@ -103,8 +92,8 @@ class ProgramSamples:
             here = np.flatnonzero(np.isin(cut, alike))
             if here.size:
                 rows = replace(self.rows[row[here]], cut=self.cuts[alike[0]], feed_angle=angles[cut[here]])
-                number = self.piece_factor * count_pieces(rows, float(np.max(depths)), COARSE_CYCLES_PER_PIECE)
-                grown[here] = growth_rate(rows, depths[here], number)
+                number = self.piece_factor * lobes.count_pieces(rows, float(np.max(depths)), COARSE_CYCLES_PER_PIECE)
+                grown[here] = lobes.growth_rate(rows, depths[here], number)
         return grown
 
     def __getitem__(self, places: Indices) -> ProgramSamples:
@@ -142,22 +131,17 @@ class ProgramSamples:
         """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
-        speeds, frequencies, stiffnesses = (np.repeat(factor, len(self.rows)) for factor in factors)
-        changed = replace(
-            rows,
-            speed_rpm=rows.speed_rpm * speeds,
-            frequency=rows.frequency * frequencies[:, np.newaxis],
-            stiffness=rows.stiffness * stiffnesses[:, np.newaxis],
-        )
-        return replace(self, rows=changed)
+        n, f, k = (np.repeat(factor, len(self.rows))[:, np.newaxis] for factor in factors)
+        speed_rpm = rows.speed_rpm * n[:, 0]
+        rows = replace(rows, speed_rpm=speed_rpm, frequency=rows.frequency * f, stiffness=rows.stiffness * k)
+        return replace(self, rows=rows)
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
     """Build the median system, the feed along x; axes: of its modes (n, 2), None: the first sign pattern."""
     vectors = assembly.principal_directions.sign_patterns[0] if axes is None else axes
-    return rows_at_speeds(
-        build_milling_system(assembly.x, assembly.y, vectors), program.cut, np.array([program.speed_rpm])
-    )
+    system = lobes.build_milling_system(assembly.x, assembly.y, vectors)
+    return lobes.rows_at_speeds(system, program.cut, np.array([program.speed_rpm]))
 
 
 class WorstLimit(NamedTuple):
@@ -175,10 +159,9 @@ def find_worst_limit(case: ProgramCase) -> WorstLimit:
     """Find the lowest limit over all cuts of a program and all open signs of the principal directions."""
     spindle, axes = case.spindle, case.spindle.principal_directions
     patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
-    limits = [program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
+    limits = [lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
     worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    deepest = MAX_PROGRAM_DEPTH_RATIO * case.depth
-    depths = [min(limit.limit, deepest) for limit in limits]
+    depths = [min(limit.limit, MAX_PROGRAM_DEPTH_RATIO * case.depth) for limit in limits]
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
 
 
@@ -187,7 +170,7 @@ def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:
     patterns = case.spindle.principal_directions.sign_patterns
     if len(patterns) == 1:
         return patterns[0]
-    rows = reduce(join_rows, (build_median_row(program, case.spindle, axes) for axes in patterns))
+    rows = reduce(lobes.join_rows, (build_median_row(program, case.spindle, axes) for axes in patterns))
     return patterns[int(np.argmax(_unlimited_samples(case, rows).growth(program.depth)))]
 
 
@@ -202,15 +185,15 @@ def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
     program: the case at another speed and depth, in SI units.
     """
     median = build_median_row(program, case.spindle, _find_likely_axes(case, program))
-    return _unlimited_samples(case, join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
+    return _unlimited_samples(case, lobes.join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
 
 
-def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = None) -> ProgramSamples:
-    """Sample the samples of a program from its median limit, with modes along axes (n, 2)."""
-    median, limits = build_median_row(case.program, case.spindle, axes), np.array(limit.limits)
+def draw_samples(case: ProgramCase, worst: WorstLimit) -> ProgramSamples:
+    """Sample the samples of a program from its median limit, with modes along the worst axes."""
+    median, limits = build_median_row(case.program, case.spindle, worst.axes), np.array(worst.limit.limits)
     order = np.argsort(limits)
-    finer = max(limit.pieces // int(count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)
-    rows = join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES))
+    finer = max(worst.limit.pieces // int(lobes.count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)
+    rows = lobes.join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES))
     return ProgramSamples(rows, tuple(case.cuts[place] for place in order), limits[order], finer, case.uncertainty)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
@@ -111,20 +111,15 @@ def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTa
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
 """Labels of alternative settings by their advantage."""
-CUT_REMEDIES = (
-    "a shorter stick-out: tap it again with it",
-    "another tool: a thicker one, or with fewer teeth",
-    "a smaller radial depth",
-)
+NEW_TOOL_REMEDIES = "a shorter stick-out: tap it again with it", "another tool: a thicker one, or with fewer teeth"
+CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "a smaller radial depth")
 """Measures that make an unsafe cut safe, for verdicts."""
-TOOL_SPEED_REMEDIES = (
-    "a smaller diameter",
-    "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
-)
+TOOL_DATA_REMEDY = "tool_material and cutting_speed_m_min in its [[tool]], where it bears more"
+TOOL_SPEED_REMEDIES = ("a smaller diameter", TOOL_DATA_REMEDY)
 """Measures if the spindle is too fast for the tool."""
 MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
 """Measures if max_speed_rpm limits the speed."""
-FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
+FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_DATA_REMEDY)
 """Measures if a program runs at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Immersion up to which a smaller radial depth is not recommended (-)."""
@@ -195,10 +190,10 @@ def recommend(
         setting = search.best if depth_mm is None else search.fastest_window(depth_mm)
     others = tuple(_list_alternatives(search, setting, present_rpm))
     if setting is None:
-        reason, cures = _explain_no_setting(search, depth_mm, present_rpm if is_set else None)
+        reason, cures = _explain_gap(search, depth_mm, present_rpm if is_set else None)
         feed = _feed_range(search, table)
         return Recommendation(table, either, reason=reason, remedies=cures, alternatives=others, feed_mm=feed)
-    return _recommend_setting(search, table, setting, others)
+    return replace(_recommend_setting(search, table, setting), alternatives=others)
 
 
 def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
@@ -222,21 +217,19 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
 
 
-def _recommend_setting(
-    search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
-) -> Recommendation:
+def _recommend_setting(search: SettingSearch, table: ProgramTable, setting: Setting) -> Recommendation:
     """Build the recommendation of a setting, evaluated as a program."""
-    case, result = search.case, search.results[setting.speed_rpm, setting.depth_mm]
-    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": result.samples.cuts[0].direction}
-    program = msgspec.structs.replace(table, **at)
+    case, (speed, depth) = search.case, (setting.speed_rpm, setting.depth_mm)
+    result = search.results[speed, depth]
+    milled = result.samples.cuts[0].direction
+    program = msgspec.structs.replace(table, speed_rpm=speed, depth_mm=depth, direction=milled)
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
         reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
-        return Recommendation(table, search.case.any_direction, reason=reason, alternatives=others)
+        return Recommendation(table, case.any_direction, reason=reason)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
-    return Recommendation(
-        program, search.case.any_direction, setting, verdict, "", (), others, _feed_range(search, table), remarks
-    )
+    feed = _feed_range(search, table)
+    return Recommendation(program, case.any_direction, setting, verdict, feed_mm=feed, remarks=remarks)
 
 
 def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, float] | None:
@@ -245,36 +238,31 @@ def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, floa
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
-def _list_alternatives(
-    search: SettingSearch, setting: Setting | None, present_rpm: float | None
-) -> Iterator[Alternative]:
+def _list_alternatives(search: SettingSearch, setting: Setting | None, own_rpm: float | None) -> Iterator[Alternative]:
     places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
     wanted = {MAX_REMOVAL_LABEL: search.best}
-    if present_rpm is not None:
-        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
+    if own_rpm is not None:
+        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(own_rpm, search.cut_range.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
             yield Alternative(what, other)
 
 
-def _explain_no_setting(
-    search: SettingSearch, depth_mm: float | None, set_rpm: float | None
-) -> tuple[str, tuple[str, ...]]:
+def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
     """Explain why there is no setting, with remedies."""
-    if set_rpm is not None and not search.cut_range.low_rpm <= set_rpm <= search.cut_range.high_rpm:
-        return f"{set_rpm:g} rpm is outside {search.cut_range.text}", FIXED_SPEED_REMEDIES
-    if set_rpm is not None:
-        return f"no safe depth at {set_rpm:g} rpm", _list_remedies(search, depth_mm)
+    reach = search.cut_range
+    if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
+        return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    return f"no safe {named} in {search.cut_range.text}", _list_remedies(search, depth_mm)
+    reason = f"no safe {named} in {reach.text}" if set_rpm is None else f"no safe depth at {set_rpm:g} rpm"
+    return reason, _list_remedies(search, depth_mm)
 
 
 def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
     """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
-    speed = float(likely.speeds[int(np.argmax(likely.depths))])
-    probe = search.case.at(speed, depth_mm or DEPTH_STEP_MM)
+    probe = search.case.at(float(likely.speeds[int(np.argmax(likely.depths))]), depth_mm or DEPTH_STEP_MM)
     verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else CUT_REMEDIES[:2]))
+    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES))

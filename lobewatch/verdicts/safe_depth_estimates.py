@@ -14,21 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from lobes import Cut, MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
+from lobes import MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
+from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import (
-    MIN_DEPTH_MARGIN,
-    ROBUST_DEPTH_FACTOR,
-    ROBUST_SPEED_FACTOR,
-    sweep_extremes,
-)
+from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
@@ -98,16 +93,15 @@ def select_critical_samples(
     likely = draw_likely_samples(case, program)
     order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
     likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
-    aged = sweep_extremes(likely, drop, stiffness_at)
+    aged = robustness.sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
     median = likely.rows[np.zeros(1, dtype=np.intp)]
     push = (1 + MIN_DEPTH_MARGIN) / ROBUST_DEPTH_FACTOR
     median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
-    first = np.concatenate(
-        (np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES], [grown.size])
-    )
-    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, median)), np.unique(first))
+    growing, flexible = np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES]
+    first = np.unique(np.concatenate((growing, flexible, [grown.size])))
+    return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, median)), first)
 
 
 def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
@@ -169,10 +163,8 @@ class LikelyDepths:
         tops = np.flatnonzero((removal_rates[1:-1] >= removal_rates[:-2]) & (removal_rates[1:-1] >= removal_rates[2:]))
         order = np.argsort(-removal_rates[1:-1], kind="stable")
         taken: list[int] = []
-        for places, apart in (
-            (order[np.isin(order, tops)], MIN_PEAK_SPEED_DISTANCE),
-            (order, MIN_OTHER_SPEED_DISTANCE),
-        ):
+        looks = (order[np.isin(order, tops)], MIN_PEAK_SPEED_DISTANCE), (order, MIN_OTHER_SPEED_DISTANCE)
+        for places, apart in looks:
             for place in places.tolist():
                 if all(abs(place - top) * LIKELY_SPEED_STEP > apart for top in taken):
                     taken.append(place)
@@ -193,10 +185,8 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     cuts, spindle, uncertainty = case.cuts, case.spindle, case.uncertainty
     number = max(int(math.log(reach.high_rpm / reach.low_rpm) / LIKELY_SPEED_STEP), 1)
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
-    by_cut = (
-        np.array([lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts])
-        * 1e3
-    )
+    lobes = [lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross) for cut in cuts]
+    by_cut = np.array([each.depth for each in lobes]) * 1e3
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
     margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
@@ -208,35 +198,29 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
 
     limit = np.min(by_cut, axis=0)
     if not all(map(is_force_constant, cuts)):
-        removal_rates = speeds * around(limit)
-        thinkable = speeds * np.minimum(
-            deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe
-        ) >= MIN_REMOVAL_SHARE * np.max(removal_rates)
-        wanted = scipy.ndimage.maximum_filter1d(thinkable, 4 * steps + 1)
-        limit = _limits_by_multipliers(spindle, cuts, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
+        best = np.max(speeds * around(limit))
+        rates = speeds * np.minimum(deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe)
+        wanted = scipy.ndimage.maximum_filter1d(rates >= MIN_REMOVAL_SHARE * best, 4 * steps + 1)
+        limit = _limits_by_multipliers(case, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
     return LikelyDepths(speeds, around(limit))
 
 
-def _limits_by_multipliers(
-    spindle: Assembly, cuts: Sequence[Cut], speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags
-) -> Floats:
+def _limits_by_multipliers(case: ProgramCase, speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags) -> Floats:
     """Return limits (mm) by multipliers where wanted (n,), interpolated; else by the zero-order approximation.
 
     by_cut: limits by the zero-order approximation (cuts, n).
     """
     places = np.unique(np.append(np.arange(0, speeds.size, COARSE_SPEED_STEPS), speeds.size - 1))
     places = places[wanted[places]]
-    systems = [
-        build_milling_system(spindle.x, spindle.y, vectors) for vectors in spindle.principal_directions.sign_patterns
-    ]
+    x, y, patterns = case.spindle.x, case.spindle.y, case.spindle.principal_directions.sign_patterns
+    systems = [build_milling_system(x, y, vectors) for vectors in patterns]
     worst, true = np.argsort(by_cut[:, places], axis=0)[:N_LIKELY_FEEDS], deepest[places].copy()
-    for (i, cut), system in itertools.product(enumerate(cuts), systems):
+    for (i, cut), system in itertools.product(enumerate(case.cuts), systems):
         here = np.flatnonzero(np.any(worst == i, axis=0))
         rows = rows_at_speeds(system, cut, speeds[places[here]])
         limit = _first_crossing(rows, np.min(by_cut[:, places[here]], axis=0), deepest[places[here]])
         true[here] = np.minimum(true[here], limit)
-    between = np.interp(np.log(speeds), np.log(speeds[places]), true)
-    return np.asarray(np.where(wanted, between, np.min(by_cut, axis=0)))
+    return np.asarray(np.where(wanted, np.interp(np.log(speeds), np.log(speeds[places]), true), np.min(by_cut, axis=0)))
 
 
 def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
@@ -245,8 +229,7 @@ def _first_crossing(rows: MillingRows, mean: Floats, most: Floats) -> Floats:
     mean: limit by the zero-order approximation (mm) (r,); most: depth up to which it matters.
     """
     ends = np.minimum(mean * TRIED_ZERO_ORDER_SHARES[-1], most)[:, np.newaxis]
-    tried = np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis])
-    limit = _interpolate_crossing(rows, tried)
+    limit = _interpolate_crossing(rows, np.minimum(mean[:, np.newaxis] * TRIED_ZERO_ORDER_SHARES, most[:, np.newaxis]))
     beyond = np.flatnonzero(np.isinf(limit) & (ends[:, 0] < most))
     further = ends[beyond] * (1 - FURTHER_DEPTH_SHARES) + most[beyond, np.newaxis] * FURTHER_DEPTH_SHARES
     limit[beyond] = _interpolate_crossing(rows[beyond], further)

@@ -52,42 +52,32 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
-    return _sweep_speeds_and_drops(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
+    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over both speeds, the frequency drop and half of it."""
-    return _sweep_speeds_and_drops(
-        samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at
-    )
+    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at)
 
 
-def _sweep_speeds_and_drops(
-    samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness_at: StiffnessAt
-) -> ProgramSamples:
-    stiffness = np.array([stiffness_at(drop) for drop in drops])
-    return samples.sweep(np.array(speeds), 1 - np.array(drops), stiffness)
+def _sweep(samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness: StiffnessAt) -> ProgramSamples:
+    return samples.sweep(np.array(speeds), 1 - np.array(drops), np.array([stiffness(drop) for drop in drops]))
 
 
 def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
     """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
-    steps = np.arange(MAX_WINDOW_STEPS + 1.0)
-    slow, fast = (
-        _last_stable_ratio(near, hardest, np.power(1 + WINDOW_SPEED_STEP, sign * steps), depth) for sign in (-1, 1)
-    )
-    slowest, fastest = max(speed * slow, reach.low_rpm), min(speed * fast, reach.high_rpm)
-    return min(math.ceil(slowest / SPEED_STEP_RPM) * SPEED_STEP_RPM, speed), max(
-        math.floor(fastest / SPEED_STEP_RPM) * SPEED_STEP_RPM, speed
-    )
+    ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * np.arange(MAX_WINDOW_STEPS + 1.0)) for sign in (-1, 1))
+    slow, fast = (_last_stable_ratio(near, hardest, ratio, depth) for ratio in ratios)
+    slowest = math.ceil(max(speed * slow, reach.low_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
+    fastest = math.floor(min(speed * fast, reach.high_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
+    return min(slowest, speed), max(fastest, speed)
 
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
     """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
-    grown = _sweep_speeds_and_drops(
-        hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at
-    ).critical_growth(depth)
+    grown = _sweep(hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at).critical_growth(depth)
     return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
 
 
@@ -120,7 +110,5 @@ def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
     """Return the frequency drop that a recommended setting must tolerate: two tap intervals at the rate so far."""
     days = N_TAP_INTERVALS * machine.machine.tap_interval_days
     drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
-    return max(
-        (DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops),
-        default=DEFAULT_NEEDED_DROP,
-    )
+    needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops]
+    return max(needed, default=DEFAULT_NEEDED_DROP)

@@ -18,27 +18,14 @@ import numpy as np
 from lobes import Program
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
+from lobewatch.verdicts import safe_depth_estimates as estimates
+from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
 from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
-from lobewatch.verdicts.safe_depth_estimates import (
-    CriticalSamples,
-    LikelyDepths,
-    estimate_likely_depths,
-    find_deepest_stable,
-    select_critical_samples,
-)
-from lobewatch.verdicts.setting_robustness import (
-    MIN_DEPTH_MARGIN,
-    ROBUST_DEPTH_FACTOR,
-    ROBUST_SPEED_FACTOR,
-    Setting,
-    find_drop_margin,
-    find_needed_drop,
-    find_speed_window,
-    sweep_neighborhood,
-)
+from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths, find_deepest_stable
+from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, Setting
 
 MAX_DEPTH_MARGIN = 20.0
 """Largest searched depth margin, which also represents no limit."""
@@ -48,9 +35,7 @@ PROMISING_FACTOR = 1.1
 """Factor on the likely removal rate of a speed, above which it is checked against the best rate so far.
 
 The likely rate includes the largest share of such a depth that few samples have left elsewhere."""
-NEIGHBOR_SPEED_STEPS = np.concatenate(
-    [sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)]
-)
+NEIGHBOR_SPEED_STEPS = np.outer([-1, 1], [0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]).ravel()
 """Relative distances of neighbors checked around the speed of the largest removal rate."""
 N_CLIMBS = 2
 """Number of times that neighbors are checked."""
@@ -94,7 +79,7 @@ class SettingSearch:
     @cached_property
     def needed_drop(self) -> float:
         """Relative frequency drop at which a setting must stay stable."""
-        return find_needed_drop(self.case.assembly, self.case.machine)
+        return robustness.find_needed_drop(self.case.assembly, self.case.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
@@ -104,7 +89,7 @@ class SettingSearch:
     @cached_property
     def likely_depths(self) -> LikelyDepths:
         """Likely safe depths over speed."""
-        return estimate_likely_depths(self.case, self.cut_range, self.needed_drop)
+        return estimates.estimate_likely_depths(self.case, self.cut_range, self.needed_drop)
 
     @cached_property
     def best(self) -> Setting | None:
@@ -147,10 +132,8 @@ class SettingSearch:
         """Yield speeds (rpm) at which a depth (mm) is likely safe; the speed of the best setting last."""
         if self.cut_range.is_empty:
             return
-        middles = {
-            *self.likely_depths.window_centers(depth_mm),
-            *self.likely_depths.window_centers(NEARLY_SAFE_SHARE * depth_mm),
-        }
+        depths = depth_mm, NEARLY_SAFE_SHARE * depth_mm
+        middles = {center for depth in depths for center in self.likely_depths.window_centers(depth)}
         yield from map(_round_speed, sorted(middles, key=rank)[:MAX_SEARCHED_SPEEDS])
         if self.best is not None:
             yield self.best.speed_rpm
@@ -163,9 +146,8 @@ class SettingSearch:
         """
         if self.cut_range.is_empty:
             return
-        tops = [(_round_speed(speed), depth) for speed, depth in self.likely_depths.removal_peaks(MAX_SEARCHED_SPEEDS)][
-            ::-1
-        ]
+        peaks = self.likely_depths.removal_peaks(MAX_SEARCHED_SPEEDS)
+        tops = [(_round_speed(speed), depth) for speed, depth in reversed(peaks)]
         depths, confirmed = DepthsBySpeed(), SharesBySpeed()
         visited, left = set[float](), 0.0
         for _ in range(MAX_SETTING_TRIES):
@@ -206,10 +188,12 @@ class SettingSearch:
 
     def _best_speed(self, depths: DepthsBySpeed, confirmed: SharesBySpeed) -> float:
         """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
+
+        def rate(speed: float) -> float:
+            return speed * depths[speed] * self._expected_share(speed, confirmed)
+
         while True:
-            speed = max(
-                depths, key=lambda speed: speed * depths[speed] * self._expected_share(speed, confirmed), default=0.0
-            )
+            speed = max(depths, key=rate, default=0.0)
             if not speed or self.critical[speed].chattered == self.chattered:
                 return speed
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
@@ -241,7 +225,7 @@ class SettingSearch:
             return self.critical[speed]
         likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
         program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
-        return select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
+        return estimates.select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
         """Find the deepest setting up to a depth (mm)."""
@@ -259,13 +243,12 @@ class SettingSearch:
         depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
         program = sample_program(self.case.at(speed, depth_mm))
-        limit = program.median.limit
+        limit = program.worst.limit.limit
         if limit < depth * (1 + MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
-        near = program.samples.with_cuts(
-            program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR) >= 0
-        )
-        around = sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
+        grown = program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)
+        near = program.samples.with_cuts(grown >= 0)
+        around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(deep)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
@@ -276,8 +259,8 @@ class SettingSearch:
             calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
             return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
-        window = find_speed_window(near, hardest, speed, depth, self.cut_range)
-        left = find_drop_margin(hardest, depth, self.stiffness_at)
+        window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
+        left = robustness.find_drop_margin(hardest, depth, self.stiffness_at)
         self.results[speed, depth_mm] = result
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
 
@@ -285,10 +268,8 @@ class SettingSearch:
         """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
-        return min(
-            1e3 * find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3) / ROBUST_DEPTH_FACTOR,
-            depth_mm - DEPTH_STEP_MM,
-        )
+        calm = find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
+        return min(1e3 * calm / ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
 
 
 def _round_speed(speed: float) -> float:

@@ -59,7 +59,8 @@ def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) ->
     modes, reach = assembly.without_stiffness, CutRange.of(machine, table)
     if not modes or reach.is_empty:
         return []
-    x, y = (_with_arbitrary_stiffness(modes.get(name) or next(iter(modes.values()))) for name in ("x", "y"))
+    sides = [modes.get(name) or next(iter(modes.values())) for name in ("x", "y")]
+    x, y = (Mode(mode.frequency, mode.damping_ratio, ARBITRARY_STIFFNESS) for mode in sides)
     width = max(_frequency_uncertainty(assembly, name, machine) for name in modes)
     low, high, beyond = reach.low_rpm, reach.high_rpm, 1 + 2 * width
     speeds = np.geomspace(low / beyond, high * beyond, int(math.log(high / low * beyond**2) / POCKET_SPEED_STEP) + 2)
@@ -67,19 +68,11 @@ def find_speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) ->
     lowest = lobes.minimum.depth
     if not math.isfinite(lowest):
         return []
-    candidates = [
-        SpeedPocket(
-            min(max(pocket.speed_rpm, low), high),
-            (max(pocket.from_rpm * (1 + width), low), min(pocket.to_rpm * (1 - width), high)),
-            pocket.depth / lowest,
-        )
-        for pocket in rank_pockets(find_pockets(lobes, MAX_POCKET_GAIN * lowest), speeds.size, "removal")
-    ]
+    candidates = []
+    for pocket in rank_pockets(find_pockets(lobes, MAX_POCKET_GAIN * lowest), speeds.size, "removal"):
+        window = max(pocket.from_rpm * (1 + width), low), min(pocket.to_rpm * (1 - width), high)
+        candidates.append(SpeedPocket(min(max(pocket.speed_rpm, low), high), window, pocket.depth / lowest))
     return [pocket for pocket in candidates if pocket.contains(pocket.speed_rpm)][:N_SPEED_POCKETS]
-
-
-def _with_arbitrary_stiffness(mode: Mode) -> Mode:
-    return Mode(mode.frequency, mode.damping_ratio, ARBITRARY_STIFFNESS)
 
 
 def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine) -> float:

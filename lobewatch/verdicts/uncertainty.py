@@ -60,9 +60,8 @@ class LearnedSamples:
         """Build samples around a median (a row), at its speed; without: a cause that is left out."""
         take = np.arange(count) % len(self.tangential)
         rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != causes.TEST_CUTS.name)
-        force, direction = (
-            1 + (factor[take] - 1) * (without != causes.COEFFICIENTS.name) for factor in (self.tangential, self.ratio)
-        )
+        is_counted = without != causes.COEFFICIENTS.name
+        force, direction = (1 + (factor[take] - 1) * is_counted for factor in (self.tangential, self.ratio))
         return replace(
             rows,
             frequency=rows.frequency * (1 + (self.frequency[take] - 1) * spindle),
@@ -107,13 +106,8 @@ class Uncertainty:
     def causes(self) -> tuple[str, ...]:
         """Names of all causes."""
         across = [causes.CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
-        return (
-            *self.modes,
-            *across,
-            causes.SPEED.name,
-            causes.COEFFICIENTS.name,
-            *([causes.WEAR.name] if self.wear > 1 else []),
-        )
+        worn = [causes.WEAR.name] if self.wear > 1 else []
+        return (*self.modes, *across, causes.SPEED.name, causes.COEFFICIENTS.name, *worn)
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Sample systems within the uncertainty, reproducible by seed.
@@ -145,22 +139,23 @@ class Uncertainty:
         if self.learned is not None:
             rows = self.learned.build_rows(median, count, without)
             speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != causes.SPEED.name)
-            return self._with_sampled_axes(
-                replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR)), seed, without
-            )
+            rows = replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR))
+            return self._with_sampled_axes(rows, seed, without)
         random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
         factor = np.ones((count, median.frequency.shape[1], 3))
         turned = np.zeros(factor.shape[:2])
         for cause, widths in self.modes.items():
             uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
-            moved = widths * self._correlated(cause, np.concatenate(uniform, axis=-1))
+            numbers = np.concatenate(uniform, axis=-1)
+            if cause == causes.TAP_TEST.name:
+                numbers = np.einsum("nij,cnj->cni", self.tap_correlation, numbers)
+            moved = widths * numbers
             if cause != without:
                 factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
                 turned += moved[..., 3]
         speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != causes.SPEED.name)
-        tangential, ratio = (
-            span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._coefficient_ranges
-        )
+        spans = self.tangential, self.ratio
+        tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in spans)
         if without == causes.COEFFICIENTS.name:
             tangential, ratio = np.ones((2, count))
         rows = median[np.zeros(count, dtype=np.intp)]
@@ -182,14 +177,6 @@ class Uncertainty:
             return rows
         return replace(rows, vector=self.axes.sample(len(rows), seed))
 
-    def _correlated(self, cause: str, uniform: Floats) -> Floats:
-        """Correlate the uniform numbers of the tap error, shape (count, n, 4)."""
-        return np.einsum("nij,cnj->cni", self.tap_correlation, uniform) if cause == causes.TAP_TEST.name else uniform
-
-    @property
-    def _coefficient_ranges(self) -> tuple[FactorRange, FactorRange]:
-        return self.tangential, self.ratio
-
 
 def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
     """Determine the uncertainty of a cut with a tool that does not rotate.
@@ -208,25 +195,15 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
     Uncertainty
         Half-widths by cause, and ranges of the cutting coefficients.
     """
-    tangential, ratio = _coefficient_ranges(table, machine)
-    modes = [*(assembly.x or ()), *(assembly.y or ())]
-    mixing = np.array([_tap_correlation(mode) for mode in modes])
-    speed, wear = machine.doubt.speed_percent / 100, wear_factor_of(table, machine)
-    return Uncertainty(
-        _mode_uncertainty(assembly, machine.doubt),
-        mixing,
-        speed,
-        tangential,
-        ratio,
-        wear,
-        assembly.principal_directions,
-    )
+    mixing = np.array([_tap_correlation(mode) for mode in (*(assembly.x or ()), *(assembly.y or ()))])
+    speed, ranges = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
+    axes, wear = assembly.principal_directions, wear_factor_of(table, machine)
+    return Uncertainty(_mode_uncertainty(assembly, machine.doubt), mixing, speed, *ranges, wear, axes)
 
 
 def wear_factor_of(table: CutTable, machine: Machine) -> float:
     """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
-    said = table.wear if isinstance(table, ProgramTable) else None
-    return WEAR_FACTORS[said or machine.doubt.wear]
+    return WEAR_FACTORS[(table.wear if isinstance(table, ProgramTable) else None) or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:
@@ -234,15 +211,15 @@ def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, 
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        widths = {causes.PREDICTION.name: np.array([_prediction_uncertainty(mode, given) for mode in (*x, *y)])}
+        percents = given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent
+        sizes = [percent / 100 for percent in percents]
+        widths = {causes.PREDICTION.name: np.array([(*sizes, abs(np.radians(mode.phase_deg))) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
-        clamping = [np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides]
-        clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
-        widths = {
-            causes.TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)]),
-            causes.CLAMPING.name: np.vstack(clamping),
-        }
+        clamping = np.vstack([np.tile(tap_scatter_of(assembly, side, given), (count, 1)) for side, count in sides])
+        clamping = clamping * [1, 1, 1, np.pi / 180]
+        widths = {causes.TAP_TEST.name: np.array([_tap_error(mode) for mode in (*x, *y)])}
+        widths[causes.CLAMPING.name] = clamping
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
         widths[causes.UNTAPPED.name] = absent
@@ -258,17 +235,10 @@ def tap_scatter_of(assembly: Assembly, side: str, given: UncertaintyTable) -> Sc
     return Scatter(sizes[0], sizes[1], sizes[2], scatter.phase_deg)
 
 
-def _prediction_uncertainty(mode: Mode, given: UncertaintyTable) -> tuple[float, float, float, float]:
-    """Return the half-widths of a predicted mode."""
-    frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
-    return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
-
-
 def _tap_error(mode: Mode) -> Floats:
     """Return the 95 % error of the tap test, relative, of the phase in rad; 0 where it is unknown."""
     values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
-    error = np.append(mode.standard_error, mode.phase_deg_std)
-    return np.asarray(np.nan_to_num(mode.quantile() * error / values))
+    return np.asarray(np.nan_to_num(mode.quantile() * np.append(mode.standard_error, mode.phase_deg_std) / values))
 
 
 def _tap_correlation(mode: Mode) -> Floats:
@@ -288,7 +258,5 @@ def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange,
         share = machine.doubt.coefficients_percent / 100
         return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
     ratio = median.radial / median.tangential
-    return (
-        FactorRange(*(limit / median.tangential for limit in median.tangential_range)),
-        FactorRange(*(limit / ratio for limit in median.ratio_range)),
-    )
+    tangential = FactorRange(*(limit / median.tangential for limit in median.tangential_range))
+    return tangential, FactorRange(*(limit / ratio for limit in median.ratio_range))

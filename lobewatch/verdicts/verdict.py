@@ -15,14 +15,9 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
+from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_remarks import (
-    assumption_remarks,
-    find_decisive_cause,
-    tool_limit_remarks,
-    uncertainty_advice,
-)
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
@@ -176,11 +171,10 @@ def evaluate_program(
     """
     if isinstance(tool, DataError):
         unknown = _unknown_verdict(table, (Remark("no-tap", "", str(tool)),))
-        return replace(unknown, remarks=(*unknown.remarks, *tool_limit_remarks(table, machine)))
+        return replace(unknown, remarks=(*unknown.remarks, *program_remarks.tool_limit_remarks(table, machine)))
     if not tool.directions:
         return _unknown_verdict(table, tool.remarks, tool, speed_pocket_remarks(table, table.name, tool, machine))
-    on_model = tool.predicted or machine.tap.position_mm > 0
-    if asked := find_program_questions(machine, table, on_model):
+    if asked := find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0):
         return _unknown_verdict(table, tuple(doubted.remark for doubted in asked), tool)
     case = ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed)
     return _build_verdict(case, result or run_monte_carlo(case))
@@ -189,10 +183,10 @@ def evaluate_program(
 def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     """Build the verdict on a program from its Monte Carlo result."""
     median, stability, cause = result.median, classify_stability(case, result), ""
-    remarks = [*_verdict_remarks(case), *assumption_remarks(case, result)]
+    remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
     if stability is Stability.DOUBTFUL:
         cause = _find_decisive_cause(case, result)
-        remarks.append(uncertainty_advice(cause, case, result))
+        remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
     return Verdict(
         program=case.table,
@@ -256,7 +250,7 @@ def _find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
         return QUESTION.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
-    return find_decisive_cause(result, case.depth)
+    return program_remarks.find_decisive_cause(result, case.depth)
 
 
 def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:
@@ -271,6 +265,6 @@ def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
     yield from case.assembly.questions
-    yield from tool_limit_remarks(table, machine)
+    yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

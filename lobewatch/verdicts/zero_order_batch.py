@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -66,23 +65,6 @@ CONSTANT_FORCE_TOLERANCE = 1e-6
 """Change of the force over a turn, relative to its mean, below which it is constant."""
 
 
-class ModeColumns(NamedTuple):
-    """Columns of one mode of each spindle, shape (r, 1) each."""
-
-    frequency: Floats
-    """Natural frequency (rad/s)."""
-    damping_ratio: Floats
-    """Damping ratio (-)."""
-    stiffness: Floats
-    """Modal stiffness (N/m)."""
-    displacement: Floats
-    """Displacement of the tip per modal coordinate (-)."""
-    velocity: Floats
-    """Displacement of the tip per modal velocity over the natural frequency (-)."""
-    coupling: Floats
-    """Product of the mode shape in the direction of the force and of the displacement (-)."""
-
-
 @dataclass(frozen=True, eq=False)
 class ZeroOrderBatch:
     """Many spindles with a cut, represented by its mean force."""
@@ -95,7 +77,9 @@ class ZeroOrderBatch:
     @classmethod
     def of(cls, rows: MillingRows) -> ZeroOrderBatch:
         """Build the batch from rows, each fed in its own direction."""
-        tangential, radial = _unit_mean_forces(rows.cut)
+        unit = replace(rows.cut, tangential=1.0, radial=0.0, feed_angle=0.0)
+        tangential = mean_force(unit)
+        radial = mean_force(replace(unit, radial=1.0)) - tangential
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, rotate_to_machine(force, rows.feed_angle))
 
@@ -120,11 +104,8 @@ class ZeroOrderBatch:
             grid = refine_frequency_grid(grid, cut, teeth)
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            limit, frequency = (
-                find_uneven_limits(grid, loop, cut, teeth)
-                if cut.pitch
-                else _find_even_limits(grid, loop, teeth, deepest)
-            )
+            uneven = find_uneven_limits(grid, loop, cut, teeth) if cut.pitch else None
+            limit, frequency = uneven or _find_even_limits(grid, loop, teeth, deepest)
             chatter = np.where(limit < depth, frequency, chatter)
             depth = np.minimum(limit, depth)
         return depth, chatter
@@ -162,10 +143,8 @@ class ZeroOrderBatch:
             both = h[:, 0, 1] + h[:, 1, 0]
             trace, dtrace = trace + both * gxy, dtrace + both * dxy
             minor, dminor = minor - product * gxy**2, dminor - 2 * product * gxy * dxy
-        return (
-            1 + gain * trace + gain**2 * minor,
-            dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor,
-        )
+        slope = dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor
+        return 1 + gain * trace + gain**2 * minor, slope
 
     @property
     def _is_rotated(self) -> bool:
@@ -175,28 +154,31 @@ class ZeroOrderBatch:
     def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:
         """Return the receptance from one direction to another at frequencies (rad/s) (r, k)."""
         total = np.zeros(frequency.shape, np.complex128)
-        for mode in self._modes(force, shown):
-            r = frequency / mode.frequency
-            elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
-            share = mode.coupling / (mode.stiffness * (elastic * elastic + damped * damped))
-            total.real += (mode.displacement * elastic + moving * damped) * share
-            total.imag += (moving * elastic - mode.displacement * damped) * share
+        for natural, zeta, stiffness, place, velocity, coupling in self._modes(force, shown):
+            r = frequency / natural
+            elastic, damped, moving = 1 - r * r, 2 * zeta * r, velocity * r
+            share = coupling / (stiffness * (elastic * elastic + damped * damped))
+            total.real += (place * elastic + moving * damped) * share
+            total.imag += (moving * elastic - place * damped) * share
         return total
 
     def _receptance_with_derivative(self, s: Complexes, force: int, shown: int) -> tuple[Complexes, Complexes]:
         """Return the receptance from one direction to another at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
-        for mode in self._modes(force, shown):
-            r = s / mode.frequency
-            flexible = 1 / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
-            part = (mode.displacement + mode.velocity * r) * flexible
-            total += mode.coupling * part
-            bend = part * (2 * mode.stiffness * (mode.damping_ratio + r))
-            slope += mode.coupling * (mode.velocity - bend) * flexible / mode.frequency
+        for natural, zeta, stiffness, place, velocity, coupling in self._modes(force, shown):
+            r = s / natural
+            flexible = 1 / (stiffness * (1 + (2 * zeta + r) * r))
+            part = (place + velocity * r) * flexible
+            total += coupling * part
+            slope += coupling * (velocity - part * (2 * stiffness * (zeta + r))) * flexible / natural
         return total, slope
 
-    def _modes(self, force: int, shown: int) -> Iterator[ModeColumns]:
-        """Yield the modes that a force in one direction moves in another."""
+    def _modes(self, force: int, shown: int) -> Iterator[list[Floats]]:
+        """Yield the modes that a force in one direction moves in another, shape (r, 1) each.
+
+        Natural frequency (rad/s), damping ratio, stiffness (N/m), the shares of its coordinate and of its velocity over
+        the natural frequency that the tip shows, and the product of its parts in both directions.
+        """
         place, velocity = self.rows.tip_participation
         axes, vector = self.rows.axes.tolist(), self.rows.vector
         if force not in axes or shown not in axes:
@@ -204,7 +186,7 @@ class ZeroOrderBatch:
         share = vector[..., axes.index(force)] * vector[..., axes.index(shown)]
         parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity, share
         for k in np.flatnonzero(np.any(share, axis=0)):
-            yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
+            yield [part[:, k, np.newaxis] for part in parts]
 
     def _frequency_grid(self) -> Floats:
         """Return rising frequencies (Hz), dense near the natural ones, shape (r, k)."""
@@ -222,8 +204,7 @@ class ZeroOrderBatch:
             gxy = self._receptance(2 * np.pi * grid, 0, 1)
             half, product = half + (h[:, 0, 1] + h[:, 1, 0]) * gxy / 2, product - gxy**2
         root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * product)
-        jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
-        root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
+        root[:, 1:] *= np.cumprod(np.where(np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0, -1.0, 1.0), axis=1)
         return [half + root, half - root]
 
 
@@ -232,7 +213,9 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
 
     A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
-    turn = 0.5 - _unwrap(np.angle(loop)) / np.pi
+    angle = np.angle(loop)
+    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(np.diff(angle, axis=1) / (2 * np.pi)), axis=1)
+    turn = 0.5 - angle / np.pi
     low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)
     depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     steps = np.flatnonzero(np.any(low, axis=0))
@@ -258,24 +241,8 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
     return depth, frequency
 
 
-def _unwrap(angle: Floats) -> Floats:
-    """Unwrap angles (r, k)."""
-    step = np.diff(angle, axis=1)
-    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(step / (2 * np.pi)), axis=1)
-    return angle
-
-
 def is_force_constant(cut: Cut) -> bool:
     """Return whether the force is constant over the turn, so that the mean force is exact."""
     force = interval_forces(cut, 64)[0]
-    return (
-        not cut.pitch
-        and cut.helix_lag == 0
-        and bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
-    )
-
-
-def _unit_mean_forces(cut: Cut) -> tuple[Floats, Floats]:
-    """Return the mean force matrices for Kt = 1 and for Kr = 1, in the frame of the feed."""
-    first = mean_force(replace(cut, tangential=1.0, radial=0.0, feed_angle=0.0))
-    return first, mean_force(replace(cut, tangential=1.0, radial=1.0, feed_angle=0.0)) - first
+    is_even = bool(np.max(np.ptp(force, axis=0)) < CONSTANT_FORCE_TOLERANCE * np.max(np.abs(force)))
+    return is_even and not cut.pitch and cut.helix_lag == 0

@@ -140,10 +140,10 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
     """Return whether the median and the critical samples allow a setting."""
     at = search.case.at(speed, depth_mm)
-    limit, axes, _ = find_worst_limit(at)
-    if limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
+    worst = find_worst_limit(at)
+    if worst.limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
         return False
-    drawn = draw_samples(at, limit, axes).with_lowest_cuts(np.inf, 2)
+    drawn = draw_samples(at, worst).with_lowest_cuts(np.inf, 2)
     force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
     hardest = drawn[np.argsort(-np.max(force, axis=1))[:HARDEST]]
     return not np.any(

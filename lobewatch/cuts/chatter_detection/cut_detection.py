@@ -106,8 +106,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
         return [CutParts("no-cut")]
     is_loud = np.zeros(sounds.size, dtype=np.bool_)
     is_loud[sounds] = _find_loud_pieces([_piece_power(axis[sounds], sample_rate) for axis in pieces])
-    loud = _find_stretches(is_loud)
-    joined = _join_stretches(loud, MAX_PAUSE_TIME * sample_rate / step)
+    joined = _join_stretches(_find_stretches(is_loud), MAX_PAUSE_TIME * sample_rate / step)
     stretches = [(first, last) for first, last in joined if (last - first) * step > MAX_KNOCK_TIME * sample_rate]
     if not stretches:
         return [CutParts("no-cut")]
@@ -116,8 +115,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     cuts = [_build_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
     least = MIN_CUT_LENGTH_SHARE * (longest.end - longest.begin)
-    kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
-    return kept or [longest]
+    return [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least] or [longest]
 
 
 def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
@@ -134,8 +132,7 @@ def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
 
 def _loudness_step(level: Floats, is_loud: Flags) -> float:
     """By how much what is loud is louder than what is not, in the mean."""
-    is_split = np.any(is_loud) and not np.all(is_loud)
-    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
+    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if np.any(is_loud) and not np.all(is_loud) else 0.0
 
 
 def _loudness_threshold(level: Floats) -> float:
@@ -151,23 +148,19 @@ def _loudness_threshold(level: Floats) -> float:
     return threshold
 
 
-def _build_parts(
-    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
-) -> CutParts:
+def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, rate: float, size: int) -> CutParts:
     """Build entry, steady part and exit of a stretch of pieces, with its fault; size: of a piece (samples)."""
-    step, longest = size // 2, round(MAX_CUT_TIME * sample_rate)
+    step, longest = size // 2, round(MAX_CUT_TIME * rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
-    first, last = begin + step + round(CUT_SETTLING_TIME * sample_rate), end - size
-    entry, leaving = _find_entry_and_exit(
-        power[slice(*stretch)], MAX_PAUSE_TIME * sample_rate / step, MAX_ENTRY_TIME * sample_rate / step
-    )
+    first, last = begin + step + round(CUT_SETTLING_TIME * rate), end - size
+    pause, most = MAX_PAUSE_TIME * rate / step, MAX_ENTRY_TIME * rate / step
+    entry, leaving = _find_entry_and_exit(power[slice(*stretch)], pause, most)
     steady = max(first, begin + step + entry * step), last - leaving * step
     if steady[1] - steady[0] >= longest:
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
-    times = (place / sample_rate for place in (begin, end, first, last))
-    parts = CutParts("", air, settled, *times)
-    return parts._replace(reason=_find_cut_fault(axes, parts, sample_rate, step))
+    parts = CutParts("", air, settled, *(place / rate for place in (begin, end, first, last)))
+    return parts._replace(reason=_find_cut_fault(axes, parts, rate, step))
 
 
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
@@ -207,14 +200,10 @@ def _loudness(power: Floats) -> Floats:
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_SMOOTHED_PIECES, axis=0)
     half_window = N_QUIET_PIECES // 2
-    quiet = int(
-        np.argmin(
-            scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)[half_window:-half_window]
-        )
-    )
-    least = np.minimum(
-        np.quantile(smooth, MIN_AIR_SHARE, axis=0), np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)
-    )
+    level = scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), N_QUIET_PIECES)
+    quiet = int(np.argmin(level[half_window:-half_window]))
+    quietest = np.mean(power[quiet : quiet + N_QUIET_PIECES], axis=0)
+    least = np.minimum(np.quantile(smooth, MIN_AIR_SHARE, axis=0), quietest)
     return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
 
 
@@ -246,7 +235,6 @@ def _has_knock(signal: Floats, step: int) -> bool:
     """Return whether single pieces exceed those around them, as by a hammer or a dropped part."""
     count = signal.size // step
     peak = np.max(np.abs(signal[: count * step].reshape(count, step)), axis=1)
-    wide = np.lib.stride_tricks.sliding_window_view(
-        np.pad(peak, N_KNOCK_NEIGHBORS, mode="reflect"), 2 * N_KNOCK_NEIGHBORS + 1
-    )
+    padded = np.pad(peak, N_KNOCK_NEIGHBORS, mode="reflect")
+    wide = np.lib.stride_tricks.sliding_window_view(padded, 2 * N_KNOCK_NEIGHBORS + 1)
     return bool(np.any(peak > KNOCK_PEAK_RATIO * np.quantile(wide, KNOCK_PEAK_QUANTILE, axis=1)))

@@ -6,42 +6,19 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
+from lobewatch.cuts.chatter_detection import peak_classification as classification
+from lobewatch.cuts.chatter_detection import spectrum as spectral
+from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
-from lobewatch.cuts.chatter_detection.peak_classification import (
-    MIN_TOOTH_HARMONICS,
-    PEAK_TOLERANCE,
-    ChatterPeaks,
-    PeaksByOrigin,
-    add_air_tones,
-    classify_peaks,
-    estimate_unsteadiness,
-    find_chatter_peaks,
-    find_cut_peaks,
-    has_sidebands,
-    is_undersampled,
-)
-from lobewatch.cuts.chatter_detection.spectrum import (
-    SpectralPeaks,
-    Spectrum,
-    compute_spectra,
-    compute_spectrum,
-    find_peaks,
-    fold_frequency,
-    remove_skirts,
-)
-from lobewatch.cuts.chatter_detection.spindle_speed import (
-    check_tachometer_speed,
-    find_distant_speed,
-    find_speed_of_spectra,
-)
+from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -130,77 +107,72 @@ def evaluate_cut(
     >>> heard.verdict, round(heard.speed_rpm)
     ('stable', 6000)
     """
-    spectra = compute_spectra(cut, sample_rate)
+    spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
         return replace(_evaluate_without_air(spectra, teeth, commanded_rpm / 60), reason="no-air")
-    quiet = compute_spectra(air, sample_rate)
+    quiet = spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    turning = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
-    if isinstance(turning, CutEvaluation):
-        return turning
+    speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    if isinstance(speed, CutEvaluation):
+        return speed
     axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
-    sounds = [
-        replace(_evaluate_axis(*axis, turning, teeth, immersion), axis=number) for number, axis in enumerate(axes)
-    ]
+    sounds = [replace(_evaluate_axis(*axis, speed, teeth, immersion), axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
-    if is_measured or sound.verdict == "stable" or sound.peaks is None or not len(sound.peaks.unexplained):
+    others = None if sound.peaks is None else sound.peaks.unexplained
+    if is_measured or sound.verdict == "stable" or not others:
         return sound
-    distant = 60 * find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.peaks.unexplained)
+    distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, speed, others)
     return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
 
 
 def _evaluate_axis(
-    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, turning: SpindleSpeed, teeth: int, immersion: float
+    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    peaks = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
-    unsteady = estimate_unsteadiness(cut, spectrum.sample_rate, peaks, turning, spectrum.bin_width)
-    by_origin = classify_peaks(peaks, spectrum, quiet, turning, teeth, unsteady)
-    sound = CutEvaluation("stable", "", spindle_speed=turning, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
+    peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
+    unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
+    by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
+    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
     judged = _evaluate_peaks(sound, cut, teeth, immersion)
     if judged.reason != "unexplained-tone":
         return judged
-    tones = add_air_tones(quiet, air, by_origin.unexplained.frequency)
-    by_origin = classify_peaks(peaks, spectrum, tones, turning, teeth, unsteady)
+    tones = classification.add_air_tones(quiet, air, by_origin.unexplained.frequency)
+    by_origin = classification.classify_peaks(peaks, spectrum, tones, speed, teeth, unsteady)
     return _evaluate_peaks(replace(sound, peaks=by_origin), cut, teeth, immersion)
 
 
 def _find_speed(
-    spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
+    spectra: Spectra, quiet: Spectra, teeth: int, commanded: float, measured_rpm: float | None
 ) -> SpindleSpeed | CutEvaluation:
     """Find the spindle speed, or return the evaluation of a cut without one; commanded in Hz."""
     if measured_rpm is None:
-        turning = find_speed_of_spectra(spectra, quiet, teeth, commanded)
-        if turning is not None:
-            return turning
-        distant = 60 * find_distant_speed(spectra, quiet, teeth, commanded, None)
-        return (
-            _speed_not_found(spectra[0], distant)
-            if np.isfinite(distant)
-            else _evaluate_without_air(spectra, teeth, commanded)
-        )
-    turning, other = check_tachometer_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
+        speed = spindle_speed.find_speed_of_spectra(spectra, quiet, teeth, commanded)
+        if speed is not None:
+            return speed
+        distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded, None, None)
+        if np.isfinite(distant):
+            return _speed_not_found(spectra[0], distant)
+        return _evaluate_without_air(spectra, teeth, commanded)
+    speed, other = spindle_speed.check_tachometer_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
     if np.isfinite(other):
         return CutEvaluation("cannot tell", "tacho-contradicts", spectrum=spectra[0], distant_rpm=60 * other)
-    return turning or _speed_not_found(spectra[0], np.nan)
+    return speed or _speed_not_found(spectra[0], np.nan)
 
 
-def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
+def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> CutEvaluation:
     """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
-    turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
-    if turning is None:
+    speed = spindle_speed.find_speed_of_spectra(spectra, silence, teeth, commanded)
+    if speed is None:
         return _speed_not_found(spectra[0], np.nan)
-    peaks = find_cut_peaks(spectra, silence)
-    other_peaks = peaks[fold_frequency(peaks.frequency, turning.frequency) > PEAK_TOLERANCE * spectra[0].bin_width]
-    distant = (
-        60 * find_distant_speed(spectra, silence, teeth, commanded, turning, other_peaks)
-        if len(other_peaks)
-        else np.nan
-    )
-    if np.isfinite(distant):
-        return _speed_not_found(spectra[0], distant)
-    return CutEvaluation("cannot tell", "no-air", spindle_speed=turning, spectrum=spectra[0])
+    peaks = classification.find_cut_peaks(spectra, silence)
+    reach = classification.PEAK_TOLERANCE * spectra[0].bin_width
+    others = peaks[spectral.fold_frequency(peaks.frequency, speed.frequency) > reach]
+    if len(others):
+        distant = 60 * spindle_speed.find_distant_speed(spectra, silence, teeth, commanded, speed, others)
+        if np.isfinite(distant):
+            return _speed_not_found(spectra[0], distant)
+    return CutEvaluation("cannot tell", "no-air", spindle_speed=speed, spectrum=spectra[0])
 
 
 def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
@@ -219,38 +191,30 @@ def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
 
 def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
-    peaks, turning, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
-    if peaks is None or turning is None or spectrum is None:
+    peaks, speed, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
+    if peaks is None or speed is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
-    if (
-        is_undersampled(spectrum, turning, teeth)
-        and np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded) < MIN_TOOTH_HARMONICS
-    ):
+    n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
+    if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return replace(sound, verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
         return _evaluate_without_chatter(sound, teeth, immersion)
-    tooth = turning.frequency * teeth
-    chatter = find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
-    end = compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
-    still = min(
-        float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0]) / _chatter_power(chatter), 1.0
-    )
+    tooth = speed.frequency * teeth
+    chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
+    end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
+    end_power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
+    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
+    still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = replace(sound, energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_without_chatter(sound, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
         return replace(sound, verdict="cannot tell", reason="faint")
-    if not has_sidebands(peaks.unexplained, chatter, turning.frequency, spectrum.bin_width):
+    if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
-
-
-def _chatter_power(chatter: ChatterPeaks) -> float:
-    """Return the power of the peak that names the chatter."""
-    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
-    return float(chatter.peaks.amplitude[at] ** 2)
 
 
 def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
@@ -260,12 +224,8 @@ def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float
     power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))
-    is_odd = uneven > MAX_UNEVEN_ENERGY * float(np.sum(power[run_out & ~tooth])) and uneven > MAX_STABLE_ENERGY * float(
-        np.sum(power)
-    )
-    is_loud = immersion < SLOT_IMMERSION and float(np.sum(power[~tooth])) > MAX_RUNOUT_ENERGY * float(
-        np.sum(power[tooth])
-    )
+    is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))
+    is_loud = immersion < SLOT_IMMERSION and np.sum(power[~tooth]) > MAX_RUNOUT_ENERGY * np.sum(power[tooth])
     return replace(sound, verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
@@ -307,10 +267,8 @@ def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
 
     Reasons why one cannot be told are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
-    return [
-        _evaluate_parts(recording, parts)
-        for parts in find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
-    ]
+    cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
+    return [_evaluate_parts(recording, parts) for parts in cuts]
 
 
 def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
@@ -319,15 +277,9 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
         return CutEvaluation("cannot tell", reason, parts)
     measured = None if recording.measured_rpm is None else _mean_speed(recording.measured_rpm[parts.cut])
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
-    sound = evaluate_cut(
-        axes[:, parts.cut],
-        axes[:, parts.air if not reason else slice(0, 0)],
-        recording.sample_rate,
-        recording.teeth,
-        recording.immersion,
-        recording.commanded_rpm,
-        measured,
-    )
+    air = axes[:, slice(0, 0) if reason else parts.air]
+    _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
+    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
     return replace(sound, parts=parts, measured_rpm=measured)
 
 

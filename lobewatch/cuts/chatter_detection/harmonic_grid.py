@@ -87,9 +87,8 @@ def find_sideband_families(frequency: float, peaks: SpectralPeaks, tolerance: fl
         members = left & (np.minimum(off, off_mirrored) < tolerance)
         sign = np.where(off <= off_mirrored, 1.0, -1.0)
         if np.count_nonzero(members) > 1:
-            families.append(
-                SidebandFamily(np.flatnonzero(members), sign[members], np.where(sign > 0, up, down)[members])
-            )
+            order = np.where(sign > 0, up, down)
+            families.append(SidebandFamily(np.flatnonzero(members), sign[members], order[members]))
         left &= ~members
     return families
 

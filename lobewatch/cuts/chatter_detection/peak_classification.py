@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats, Indices, Integers
+from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
-from lobewatch.cuts.chatter_detection.spectrum import (
-    SpectralPeaks,
-    Spectrum,
-    compute_power,
-    compute_spectrum,
-    find_peaks,
-    fold_frequency,
-    join_peaks,
-    remove_skirts,
-    sideband_distance,
-)
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, find_peaks, fold_frequency
 
 N_STEADINESS_PARTS = 4
 """Number of parts into which a cut is divided."""
@@ -40,17 +30,15 @@ def estimate_unsteadiness(
 ) -> float:
     """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
     order = np.round(peaks.frequency / turning.frequency)
-    comb = (
-        np.abs(peaks.frequency - order * turning.frequency)
-        < bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
-    ) & (order > 1)
+    reach = bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
+    comb = (np.abs(peaks.frequency - order * turning.frequency) < reach) & (order > 1)
     loudest = peaks[comb].loudest(N_STEADINESS_PEAKS)
     if not len(loudest):
         return MIN_UNSTEADINESS
     orders = np.round(loudest.frequency / turning.frequency)
     changes = []
     for part in np.array_split(signal, N_STEADINESS_PARTS):
-        heard = find_peaks(compute_spectrum(part, sample_rate)).frequency
+        heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
         if heard.size:
             nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
             changes.append(_speed_change(nearest / (orders * turning.frequency) - 1))
@@ -116,9 +104,8 @@ class PeaksByOrigin:
 
 def is_in_air(peaks: SpectralPeaks, air: Spectrum) -> Flags:
     """Return whether each peak is in air, too."""
-    return np.asarray(
-        peaks.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(peaks.frequency, AIR_PEAK_TOLERANCE)
-    )
+    power = air.max_power_near(peaks.frequency, AIR_PEAK_TOLERANCE)
+    return np.asarray(peaks.amplitude**2 <= MAX_AIR_POWER_RATIO * power)
 
 
 def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
@@ -129,11 +116,10 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
-    near, tolerance = (
-        _bins_around(frequency / step, bins, size // 2) for bins in (round(AIR_PEAK_TOLERANCE), TONE_NOISE_BINS)
-    )
+    reaches = round(AIR_PEAK_TOLERANCE), TONE_NOISE_BINS
+    near, tolerance = (_bins_around(frequency / step, bins, size // 2) for bins in reaches)
     for begin in range(0, signal.size - size + 1, size // 2):
-        power = compute_power(signal[begin : begin + size], size)
+        power = spectral.compute_power(signal[begin : begin + size], size)
         tone, noise = np.max(power[near], axis=1), np.median(power[tolerance], axis=1) / np.log(2)
         level = np.maximum(level, np.where(tone > MIN_TONE_POWER_RATIO * noise, tone, 0.0))
     power = air.power.copy()
@@ -143,14 +129,13 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
 
 def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
     """Return the bins within a reach of some, none beyond the last; shape (n, 2 reach + 1)."""
-    places = np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1)
-    return np.asarray(np.clip(places, 0, last))
+    return np.asarray(np.clip(np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1), 0, last))
 
 
-def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralPeaks:
+def find_cut_peaks(spectra: Spectra, air: Spectra) -> SpectralPeaks:
     """Find the peaks of all axes that are not in air, without skirts."""
-    peaks = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
-    return join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(peaks, air, strict=True)])
+    peaks = [spectral.remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    return spectral.join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(peaks, air, strict=True)])
 
 
 def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
@@ -173,30 +158,22 @@ def classify_peaks(
     half = spectrum.sample_rate / 2
     upper = comb & (peaks.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
     loudest = float(np.max(peaks.amplitude[upper], initial=0.0))
-    is_bounded = peaks.amplitude <= MAX_FOLDED_AMPLITUDE * loudest
-    back = _is_near_folded(peaks, spectrum, turning, teeth, unsteady) & (
-        is_bounded | is_undersampled(spectrum, turning, teeth)
-    )
-    back &= ~(comb | foreign)
+    is_bounded = (peaks.amplitude <= MAX_FOLDED_AMPLITUDE * loudest) | is_undersampled(spectrum, turning, teeth)
+    back = _is_folded(peaks, spectrum, turning, teeth, unsteady) & is_bounded & ~(comb | foreign)
     kept = comb & (order > 1)
     tooth = (order[kept] % teeth).astype(np.int64)
-    left = _remove_wavering(peaks[~(comb | foreign | back)], peaks[kept], spectrum, turning)
+    left = _remove_wavering(peaks[~(comb | foreign | back)], peaks[kept], spectrum.bin_width, turning.frequency)
     return PeaksByOrigin(peaks[kept], tooth, peaks[foreign], peaks[back], left)
 
 
-def _remove_wavering(
-    left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed
-) -> SpectralPeaks:
+def _remove_wavering(left: SpectralPeaks, comb: SpectralPeaks, bin_width: float, turn: float) -> SpectralPeaks:
     """Remove faint peaks next to spindle harmonics, caused by a speed that wavers quickly."""
     if left.energy > MAX_WAVERING_ENERGY * comb.energy:
         return left
-    away = fold_frequency(left.frequency, turning.frequency)
-    return left[away > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * spectrum.bin_width]
+    return left[fold_frequency(left.frequency, turn) > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * bin_width]
 
 
-def _is_near_folded(
-    peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
-) -> Flags:
+def _is_folded(peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float) -> Flags:
     """Return whether each peak is at a folded spindle harmonic from above half the sample rate."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
@@ -246,20 +223,15 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
     named = np.where(left.amplitude >= MIN_CHATTER_AMPLITUDE * np.max(left.amplitude), weight, 0.0)
     anchors = [i for i in np.argsort(-named)[:MAX_CHATTER_ANCHORS] if named[i] > 0]
     clear = np.where(part, np.log10(left.clearness), 0.0)
-    families = [
-        sideband_distance(left.frequency, left.frequency[i], tooth_frequency) < PEAK_TOLERANCE * bin_width
-        for i in anchors
-    ]
+    tops, reach = left.frequency[anchors], PEAK_TOLERANCE * bin_width
+    families = [spectral.sideband_distance(left.frequency, top, tooth_frequency) < reach for top in tops]
     energy = np.array([np.sum(weight[family]) for family in families])
-    explained = np.array(
-        [_find_explained(left, left.frequency[i], tooth_frequency, bin_width) @ clear for i in anchors]
-    )
+    explained = np.array([_find_explained(left, top, tooth_frequency, bin_width) @ clear for top in tops])
     large = energy / np.max(energy)
     score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
     best = families[int(np.argmax(score))]
     top = int(np.argmax(np.where(best, named, 0.0)))
-    error = float(left.frequency_error(bin_width)[top])
-    return ChatterPeaks(float(left.frequency[top]), error, left[best & part])
+    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[best & part])
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:
@@ -272,6 +244,6 @@ def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: floa
     """Return 1 for peaks that are harmonics of a frequency or their sidebands, else 0, shape (n,)."""
     explained = np.zeros(len(left))
     for order in range(1, CHATTER_HARMONICS + 1):
-        apart = sideband_distance(left.frequency, order * frequency, tooth_frequency)
+        apart = spectral.sideband_distance(left.frequency, order * frequency, tooth_frequency)
         explained[apart < PEAK_TOLERANCE * bin_width * max(1.0, order / 2)] = 1.0
     return explained

@@ -65,6 +65,10 @@ class Spectrum:
         return np.asarray(np.interp(frequency, self.frequency, scipy.ndimage.maximum_filter1d(self.power, wide)))
 
 
+Spectra = Sequence[Spectrum]
+"""Spectra of all axes."""
+
+
 @dataclass(frozen=True, eq=False)
 class SpectralPeaks:
     """Peaks of a spectrum."""
@@ -93,9 +97,8 @@ class SpectralPeaks:
 
     def frequency_error(self, bin_width: float) -> Floats:
         """Return the standard error of each frequency (Hz), shape (n,); bin_width: of the spectrum (Hz)."""
-        return np.asarray(
-            bin_width * np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR)
-        )
+        error = np.hypot(PEAK_FREQUENCY_ERROR / np.sqrt(self.clearness), MIN_PEAK_FREQUENCY_ERROR)
+        return np.asarray(bin_width * error)
 
 
 def compute_spectrum(signal: Floats, sample_rate: float) -> Spectrum:
@@ -119,12 +122,10 @@ def compute_spectra(signal: Floats, sample_rate: float) -> list[Spectrum]:
 
 def _noise_level(power: Floats) -> Floats:
     """Return the mean noise power, from the quiet bins of each neighborhood (power of noise is exponential)."""
-    count = max(power.size // (PADDING_FACTOR * NOISE_BINS), 2)
-    blocks = np.array_split(power, count)
+    blocks = np.array_split(power, max(power.size // (PADDING_FACTOR * NOISE_BINS), 2))
     level = np.array([np.quantile(block, NOISE_QUANTILE) for block in blocks]) / -np.log(1 - NOISE_QUANTILE)
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
-    least = np.finfo(np.float64).tiny
-    return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
+    return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), np.finfo(np.float64).tiny))
 
 
 def remove_skirts(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:
@@ -138,9 +139,8 @@ def remove_skirts(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:
 
 def join_peaks(axes: Sequence[SpectralPeaks]) -> SpectralPeaks:
     """Join the peaks of several axes."""
-    return SpectralPeaks(
-        *(np.concatenate([getattr(peaks, name) for peaks in axes]) for name in ("frequency", "amplitude", "clearness"))
-    )
+    parts = zip(*((peaks.frequency, peaks.amplitude, peaks.clearness) for peaks in axes), strict=True)
+    return SpectralPeaks(*map(np.concatenate, parts))
 
 
 def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPeaks:

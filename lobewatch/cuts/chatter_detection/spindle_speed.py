@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.chatter_detection import spectrum as spectral
+from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
 from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
-from lobewatch.cuts.chatter_detection.spectrum import (
-    SpectralPeaks,
-    Spectrum,
-    compute_spectra,
-    find_peaks,
-    fold_frequency,
-    join_peaks,
-    remove_skirts,
-)
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
-    MAX_COMB_PEAKS,
-    find_comb,
-    find_comb_by_sum,
-    find_distant_comb,
-    list_distant_centers,
-    refine_comb,
-)
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, fold_frequency
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, find_comb, find_comb_by_sum
 
 COMB_SPEED_TOLERANCE = 0.05
 """Relative distance from the commanded speed within which a plain comb is searched."""
@@ -81,37 +66,28 @@ def find_spindle_speed(
     >>> round(60 * speed.frequency)
     6000
     """
-    return find_speed_of_spectra(
-        compute_spectra(cut, sample_rate), compute_spectra(air, sample_rate), teeth, commanded_rpm / 60
-    )
+    spectra, quiet = (spectral.compute_spectra(part, sample_rate) for part in (cut, air))
+    return find_speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
 
 
-def find_speed_of_spectra(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
-) -> SpindleSpeed | None:
+def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
     """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
     peaks, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         return voted or summed
-    rival = refine_speed(summed.frequency, peaks, spectra[0].bin_width)
-    return summed if rival.agreeing >= voted.agreeing else voted
+    return summed if refine_speed(summed.frequency, peaks, spectra[0].bin_width).agreeing >= voted.agreeing else voted
 
 
-def _find_speed_by_peaks(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
-) -> SpindleSpeed | None:
+def _find_speed_by_peaks(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
     """Find the speed by peaks clear of the noise."""
-    peaks = [remove_skirts(find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
+    peaks = [spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
     of_cut, first = find_cut_peaks(spectra, air), spectra[0]
-    voted = find_speed_by_votes(of_cut, join_peaks(peaks), first, teeth, commanded)
+    voted = find_speed_by_votes(of_cut, spectral.join_peaks(peaks), first, teeth, commanded)
     comb = find_comb(of_cut, first.bin_width, first.sample_rate, teeth, commanded, COMB_SPEED_TOLERANCE)
     if comb is None:
-        return (
-            voted
-            if voted is not None and (voted.misfit < MAX_SPEED_MISFIT or voted.agreeing >= MIN_SURE_VOTES)
-            else None
-        )
+        is_sure = voted is not None and (voted.misfit < MAX_SPEED_MISFIT or voted.agreeing >= MIN_SURE_VOTES)
+        return voted if is_sure else None
     if voted is None or comb.agreeing >= voted.agreeing:
         is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE
         return voted if is_same else comb if comb.share >= MIN_GRID_SHARE else None
@@ -130,27 +106,20 @@ def find_speed_by_votes(
     loudest = cut_lines.loudest(MAX_COMB_PEAKS)
     if len(loudest) < 2:
         return None
-    grid = commanded * (
-        1
-        + np.arange(
-            -VOTE_SPEED_TOLERANCE,
-            VOTE_SPEED_TOLERANCE,
-            VOTE_GRID_STEP * VOTE_WIDTH * spectrum.bin_width / (FINEST_VOTE_HARMONIC * commanded),
-        )
-    )
-    votes = _count_votes(loudest, grid, teeth, VOTE_WIDTH * spectrum.bin_width)
+    bin_width = spectrum.bin_width
+    step = VOTE_GRID_STEP * VOTE_WIDTH * bin_width / (FINEST_VOTE_HARMONIC * commanded)
+    grid = commanded * (1 + np.arange(-VOTE_SPEED_TOLERANCE, VOTE_SPEED_TOLERANCE, step))
+    votes = _count_votes(loudest, grid, teeth, VOTE_WIDTH * bin_width)
     if not np.any(votes):
         return None
     turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < VOTE_SPEED_TOLERANCE]
     near = np.any(np.abs(grid[:, np.newaxis] - turning) < OWN_PEAK_TOLERANCE * spectrum.bin_width, axis=1)
     best = int(np.argmax(votes))
-    known_speed = int(np.argmax(np.where(near, votes, 0.0)))
-    best = known_speed if near[known_speed] and votes[known_speed] > MIN_OWN_PEAK_VOTES * votes[best] else best
+    known = int(np.argmax(np.where(near, votes, 0.0)))
+    best = known if near[known] and votes[known] > MIN_OWN_PEAK_VOTES * votes[best] else best
     speed = refine_speed(float(grid[best]), loudest, spectrum.bin_width)
     if speed.misfit > MAX_SPEED_MISFIT:
-        rivals = [
-            refine_speed(frequency, loudest, spectrum.bin_width) for frequency in grid[_vote_peaks(votes)].tolist()
-        ]
+        rivals = [refine_speed(frequency, loudest, bin_width) for frequency in grid[_vote_peaks(votes)].tolist()]
         speed = min((speed, *rivals), key=lambda rival: rival.misfit)
     is_sure = min(speed.share, _spaced_share(loudest, speed.frequency, teeth, spectrum.bin_width)) >= MIN_GRID_SHARE
     is_sure &= speed.agreeing >= MIN_AGREEING_PEAKS
@@ -175,10 +144,8 @@ def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
     weight, step = np.log10(peaks.clearness), grid[1] - grid[0]
     i, j = np.triu_indices(len(peaks), 1)
     spaced = np.concatenate([np.abs(peaks.frequency[i] - peaks.frequency[j]), peaks.frequency[i] + peaks.frequency[j]])
-    spaced, weight = (
-        np.concatenate([spaced, peaks.frequency]),
-        np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight]),
-    )
+    spaced = np.concatenate([spaced, peaks.frequency])
+    weight = np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight])
     votes = np.zeros(grid.size)
     for order in range(1, MAX_VOTE_HARMONIC + 1):
         place = np.round((spaced / order - grid[0]) / step).astype(int)
@@ -192,8 +159,7 @@ def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
 def _smooth_votes(votes: Floats, width: float) -> Floats:
     """Spread each vote over its neighbors; width: standard deviation in grid steps."""
     reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
-    spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    return np.convolve(votes, spread, "same")
+    return np.convolve(votes, np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2), "same")
 
 
 TACHOMETER_TOLERANCE = 2e-3
@@ -207,7 +173,7 @@ The ratio is tachometer speed over commanded speed, or its inverse."""
 
 
 def check_tachometer_speed(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, measured: float
+    spectra: Spectra, air: Spectra, teeth: int, commanded: float, measured: float
 ) -> tuple[SpindleSpeed | None, float]:
     """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
@@ -219,12 +185,12 @@ def check_tachometer_speed(
     at_set = None if is_near else find_speed_of_spectra(spectra, air, teeth, commanded)
     if at_set is not None:
         return None, at_set.frequency
-    known_speed = find_speed_of_spectra(spectra, air, teeth, measured)
-    if known_speed is not None and abs(known_speed.frequency / measured - 1) > TACHOMETER_TOLERANCE:
-        return None, known_speed.frequency
-    if not is_near and (known_speed is None or is_pulse_multiple(measured / commanded)):
+    known = find_speed_of_spectra(spectra, air, teeth, measured)
+    if known is not None and abs(known.frequency / measured - 1) > TACHOMETER_TOLERANCE:
+        return None, known.frequency
+    if not is_near and (known is None or is_pulse_multiple(measured / commanded)):
         return None, commanded
-    return known_speed or _use_tachometer_speed(spectra, air, measured), np.nan
+    return known or _use_tachometer_speed(spectra, air, measured), np.nan
 
 
 def is_pulse_multiple(ratio: float) -> bool:
@@ -233,16 +199,14 @@ def is_pulse_multiple(ratio: float) -> bool:
     return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
 
 
-def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], measured: float) -> SpindleSpeed | None:
+def _use_tachometer_speed(spectra: Spectra, air: Spectra, measured: float) -> SpindleSpeed | None:
     """Return the speed of the tachometer if some peaks are its harmonics, else None."""
     peaks, bin_width = find_cut_peaks(spectra, air), spectra[0].bin_width
-    own = fold_frequency(peaks.frequency, measured) < PEAK_TOLERANCE * bin_width
-    if np.count_nonzero(own) < MIN_AGREEING_PEAKS:
+    n_own = int(np.count_nonzero(fold_frequency(peaks.frequency, measured) < PEAK_TOLERANCE * bin_width))
+    if n_own < MIN_AGREEING_PEAKS:
         return None
-    other_peaks = refine_speed(measured, peaks.loudest(MAX_COMB_PEAKS), bin_width)
-    return SpindleSpeed(
-        measured, TACHOMETER_ERROR * measured, other_peaks.share, int(np.count_nonzero(own)), other_peaks.misfit
-    )
+    refined = refine_speed(measured, peaks.loudest(MAX_COMB_PEAKS), bin_width)
+    return SpindleSpeed(measured, TACHOMETER_ERROR * measured, refined.share, n_own, refined.misfit)
 
 
 HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
@@ -252,54 +216,43 @@ MIN_DISTANT_SHARE = 0.5
 
 
 def find_distant_speed(
-    spectra: Sequence[Spectrum],
-    air: Sequence[Spectrum],
-    teeth: int,
-    commanded: float,
-    known_speed: SpindleSpeed | None,
-    other_peaks: SpectralPeaks | None = None,
+    spectra: Spectra, air: Spectra, teeth: int, commanded: float, known: SpindleSpeed | None, left: SpectralPeaks | None
 ) -> float:
     """Find a clear comb (Hz) far from the commanded speed, else NaN.
 
-    known_speed: the speed that was found; other_peaks: peaks that are no harmonics of it. Only a comb whose
+    known: the speed that was found; left: peaks that are no harmonics of it. Only a comb whose
     harmonics they are, and on which more peaks agree, is one then. That of half of it is none, which chatter of
     period two makes; the mains hum at harmonics of theirs.
     """
     peaks, first = find_cut_peaks(spectra, air), spectra[0]
     about = first.bin_width, first.sample_rate, teeth
-    clearest = find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
-    if known_speed is None or other_peaks is None:
+    clearest = combs.find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
+    if known is None or left is None:
         return np.nan if clearest is None else clearest.frequency
-    mains = [
-        find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in HUM_FREQUENCIES if not _is_mains_speed(known_speed, hum)
-    ]
-    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known_speed.agreeing]
-    centres = list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
+    hums = [hum for hum in HUM_FREQUENCIES if not _is_mains_speed(known, hum)]
+    mains = [find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in hums]
+    plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known.agreeing]
+    centres = combs.list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
     sums = (find_comb_by_sum(spectra, air, peaks, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
     loudest = peaks.loudest(MAX_COMB_PEAKS)
-    agreeing = refine_speed(known_speed.frequency, loudest, first.bin_width).agreeing
-    summed = [
-        comb for comb in sums if comb and refine_speed(comb.frequency, loudest, first.bin_width).agreeing > agreeing
-    ]
-    better = [
-        comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, known_speed, other_peaks, first.bin_width)
-    ]
-    return max(better, key=lambda frequency: _rank_comb(frequency, loudest, first.bin_width)) if better else np.nan
+    width = first.bin_width
+    agreeing = refine_speed(known.frequency, loudest, width).agreeing
+    summed = [comb for comb in sums if comb and refine_speed(comb.frequency, loudest, width).agreeing > agreeing]
+    better = [comb.frequency for comb in (*plain, *summed) if _is_better_comb(comb, known, left, width)]
+    return max(better, key=lambda frequency: _rank_comb(frequency, loudest, width)) if better else np.nan
 
 
-def _is_better_comb(
-    comb: SpindleSpeed, known_speed: SpindleSpeed, other_peaks: SpectralPeaks, bin_width: float
-) -> bool:
+def _is_better_comb(comb: SpindleSpeed, known: SpindleSpeed, others: SpectralPeaks, bin_width: float) -> bool:
     """Return whether most peaks that are no harmonics of a speed fit another comb, not that of half of it."""
-    belongs = fold_frequency(other_peaks.frequency, comb.frequency) < PEAK_TOLERANCE * bin_width
-    is_half = abs(2 * comb.frequency / known_speed.frequency - 1) < SAME_SPEED_TOLERANCE
-    share = np.count_nonzero(belongs) / len(other_peaks), other_peaks[belongs].energy / other_peaks.energy
+    belongs = fold_frequency(others.frequency, comb.frequency) < PEAK_TOLERANCE * bin_width
+    is_half = abs(2 * comb.frequency / known.frequency - 1) < SAME_SPEED_TOLERANCE
+    share = np.count_nonzero(belongs) / len(others), others[belongs].energy / others.energy
     return not is_half and max(share) > MIN_DISTANT_SHARE
 
 
 def _rank_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> tuple[float, float]:
     """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
-    comb = refine_comb(frequency, peaks, bin_width)
+    comb = combs.refine_comb(frequency, peaks, bin_width)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import scipy
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency, join_peaks
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, find_peaks, fold_frequency, join_peaks
 
 COMB_TOLERANCE = 1.2
 """Distance from a harmonic within which a peak belongs to it (bins), the width of a peak (`PEAK_TOLERANCE`)."""
@@ -56,8 +55,9 @@ def find_comb(
     """
     peaks = peaks.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
-    for images in (_folded_images(peaks, sample_rate)[:1], *([_folded_images(peaks, sample_rate)] if few else [])):
-        best = _find_best_comb(peaks, images, bin_width, frequency, tolerance)
+    folded = _folded_images(peaks, sample_rate)
+    for images in (folded[:1], folded) if few else (folded[:1],):
+        best = _pick_comb(peaks, images, bin_width, frequency, tolerance)
         if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
             return _comb_speed(best, peaks, bin_width)
     return None
@@ -77,9 +77,8 @@ def find_distant_comb(
         if comb is None or comb.share < MIN_COMB_SHARE:
             continue
         order = np.round(peaks.frequency / comb.frequency).astype(int)
-        common = int(
-            np.gcd.reduce(order[np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width])
-        )
+        is_near = np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width
+        common = int(np.gcd.reduce(order[is_near]))
         ranked = round(comb.share, 1), common == teeth, comb.frequency
         if common and teeth % common == 0 and ranked > rank:
             best, rank = comb, ranked
@@ -104,12 +103,10 @@ def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
     return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
-def _find_best_comb(
-    peaks: SpectralPeaks, images: Floats, bin_width: float, frequency: float, tolerance: float
-) -> Comb | None:
+def _pick_comb(peaks: SpectralPeaks, images: Floats, width: float, frequency: float, tolerance: float) -> Comb | None:
     weight, best, most = np.minimum(np.log10(peaks.clearness), MAX_PEAK_WEIGHT), None, 0.0
     for candidate in _candidate_frequencies(peaks, frequency, tolerance):
-        comb = _fit_comb(float(candidate), peaks, images, bin_width)
+        comb = _fit_comb(float(candidate), peaks, images, width)
         score = float(np.sum(weight[comb.is_member]))
         if score > most and abs(comb.frequency / frequency - 1) <= tolerance:
             best, most = comb, score
@@ -149,9 +146,7 @@ def _peak_error(peaks: SpectralPeaks, bin_width: float) -> Floats:
     return np.hypot(peaks.frequency_error(bin_width), COMB_SPEED_WAVER * peaks.frequency)
 
 
-def _comb_chance(
-    comb: Comb, peaks: SpectralPeaks, images: Floats, bin_width: float, teeth: int, tolerance: float
-) -> float:
+def _comb_chance(comb: Comb, peaks: SpectralPeaks, images: Floats, width: float, teeth: int, tolerance: float) -> float:
     """Return how many of all combs tried would have as many harmonics among random peaks.
 
     Harmonics of tooth passing alone are this much rarer.
@@ -160,9 +155,9 @@ def _comb_chance(
     if orders.size < MIN_COMB_HARMONICS:
         return np.inf
     spacing = comb.frequency * (1 if np.any(orders % teeth) else teeth)
-    near = min(2 * COMB_TOLERANCE * bin_width / spacing * len(images), 1.0)
-    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * bin_width), 1.0)
-    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * bin_width))).size
+    near = min(2 * COMB_TOLERANCE * width / spacing * len(images), 1.0)
+    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * width), 1.0)
+    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * width))).size
     return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
 
 
@@ -198,27 +193,21 @@ WEAK_PEAK_POWER = 4.0
 
 
 def find_comb_by_sum(
-    spectra: Sequence[Spectrum],
-    air: Sequence[Spectrum],
-    peaks: SpectralPeaks,
-    teeth: int,
-    frequency: float,
-    tolerance: float,
-    usual: float = 1.0,
+    spectra: Spectra, air: Spectra, peaks: SpectralPeaks, teeth: int, center: float, tolerance: float, usual: float = 1
 ) -> SpindleSpeed | None:
-    """Find the comb within `tolerance` (relative) of a frequency (Hz) that is loudest over the noise, or None.
+    """Find the comb within `tolerance` (relative) of a center frequency (Hz) that is loudest over the noise, or None.
 
     spectra and air: of each axis; what is no louder than in air does not count. peaks: those that stand clear, of
     all axes; where they are many, they settle it, and there is one on a harmonic of anything. The mean over all axes
     of log10 of power over noise is summed over the harmonics (Schroeder 1968, J. Acoust. Soc. Am. 43, 829-834). It
     is a comb where as many frequencies that are no harmonics would have that sum less often than once in ten
-    thousand, over all that are tried as near to the frequency as it is, or up to `usual` from it, relative.
+    thousand, over all that are tried as near to the center as it is, or up to `usual` from it, relative.
     """
     if len(peaks) >= MAX_COMB_PEAKS * len(spectra):
         return None
     first, above = spectra[0], _mean_level(spectra, air)
-    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (frequency * (1 + tolerance))))
-    lowest, most = (1 - tolerance) * frequency, (1 + tolerance) * frequency
+    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (center * (1 + tolerance))))
+    lowest, most = (1 - tolerance) * center, (1 + tolerance) * center
     tried = np.arange(lowest, most, SUM_FREQUENCY_STEP * first.bin_width / max(highest, 1))
     parts = np.array([np.interp(k * tried, first.frequency, above) for k in range(1, highest + 1)])
     best = int(np.argmax(np.sum(parts, axis=0)))
@@ -228,23 +217,22 @@ def find_comb_by_sum(
     inside = (first.frequency > lowest) & (first.frequency < highest * most)
     between = inside & (fold_frequency(first.frequency, float(tried[best])) > HARMONIC_BINS * first.bin_width)
     rarest = MAX_COMB_CHANCE if np.mean(levels) >= CLEAR_SUM_MEAN else FAINT_SUM_CHANCE
-    likely = min(max(abs(float(tried[best]) / frequency - 1), usual) / tolerance, 1.0)
-    if SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, above[between]) > rarest or _is_partial_comb(
-        levels, above[between], teeth
-    ):
+    likely = min(max(abs(float(tried[best]) / center - 1), usual) / tolerance, 1.0)
+    noise = above[between]
+    chance = SUM_FREQUENCY_STEP * tried.size * likely * _sum_chance(levels, noise)
+    if chance > rarest or _is_partial_comb(levels, noise, teeth):
         return None
     weak = join_peaks([find_peaks(spectrum, WEAK_PEAK_POWER) for spectrum in spectra])
     return refine_comb(float(tried[best]), weak[weak.frequency < (highest + 0.5) * tried[best]], first.bin_width)
 
 
-def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
+def _mean_level(spectra: Spectra, air: Spectra) -> Floats:
     """Return log10 of power over noise beyond `MIN_HARMONIC_LEVEL`, the mean of all axes; 0 where it is air."""
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):
         above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
-        above[spectrum.power <= MAX_AIR_POWER_RATIO * quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)] = (
-            0.0
-        )
+        power = quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)
+        above[spectrum.power <= MAX_AIR_POWER_RATIO * power] = 0.0
         total += np.clip(above, 0.0, MAX_HARMONIC_LEVEL)
     return total / len(spectra)
 
@@ -252,18 +240,15 @@ def _mean_level(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Floats:
 def _is_partial_comb(levels: Floats, values: Floats, teeth: int) -> bool:
     """Return whether the harmonics share an order that the teeth do not: the comb belongs to another frequency."""
     orders = np.arange(1, levels.size + 1)
-    return any(
-        _sum_chance(levels[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in orders[1:] if teeth % part
-    )
+    parts = [part for part in orders[1:] if teeth % part]
+    return any(_sum_chance(levels[orders % part != 0], values) > MAX_REMAINING_CHANCE for part in parts)
 
 
 def _sum_chance(levels: Floats, values: Floats) -> float:
     """Return how often random values have a sum as large."""
     count, level = levels.size, np.arange(N_SUM_LEVELS + 1) * (MAX_HARMONIC_LEVEL / N_SUM_LEVELS)
-    share = (
-        np.bincount(np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int), minlength=level.size)
-        / values.size
-    )
+    places = np.round(values * (N_SUM_LEVELS / MAX_HARMONIC_LEVEL)).astype(int)
+    share = np.bincount(places, minlength=level.size) / values.size
     louder = np.maximum(np.cumsum(share[::-1])[::-1], np.exp(-(10 ** (MIN_HARMONIC_LEVEL + level))))
     share = np.append(1.0, louder[1:]) - np.append(louder[1:], 0.0)
     size = N_SUM_LEVELS * count + 1

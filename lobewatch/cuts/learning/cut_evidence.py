@@ -10,8 +10,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lobes import Cut
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.cut_entry import CutEntry, CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
+
+CutEntries = Sequence[CutEntry]
+"""Test cuts of a machine as in its journal, oldest first."""
 
 DRIVE_POWER_SPREAD = 0.15
 """Relative standard deviation of displayed drive power over that of the cuts, common to all cuts.
@@ -45,9 +48,8 @@ class PowerEvidence:
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
     """Estimate Kt from the drive power of a cut in a material."""
     of_edges = power.edge_share / (1 + power.edge_share)
-    common = math.hypot(
-        DRIVE_POWER_SPREAD, (EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD) * of_edges
-    )
+    edge_spread = EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD
+    common = math.hypot(DRIVE_POWER_SPREAD, edge_spread * of_edges)
     median, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
     return PowerEvidence(power.tangential / cut.tangential / median, common, math.hypot(POWER_READING_SPREAD, scatter))
 

@@ -159,8 +159,7 @@ def max_log_likelihood(cut: CutEvidence) -> float:
 
 def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
     """Return the likelihood of recorded kind and frequency if the cut chatters."""
-    alike = prediction.is_flip == (cut.verdict == "flip")
-    kind = np.where(alike, 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
+    kind = np.where(prediction.is_flip == (cut.verdict == "flip"), 1 - WRONG_KIND_SHARE, WRONG_KIND_SHARE)
     wide = CHATTER_FREQUENCY_SPREAD * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
     distances = prediction.frequency_distances(cut)
     near = np.exp(-((distances / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
@@ -171,8 +170,7 @@ def _frequency_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats
 
 def _folded_chatter(cut: CutEvidence) -> Floats:
     """Return the chatter frequency, or that of period two, folded by the teeth (Hz)."""
-    chatter = cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2
-    return fold_frequency(chatter, cut.tooth_frequency)
+    return fold_frequency(cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2, cut.tooth_frequency)
 
 
 def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
@@ -183,12 +181,10 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
-        _, loudest = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond]).fastest_growth(
-            rows.speed_rpm[beyond], cut.depth
-        )
+        unstable = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond])
+        _, loudest = unstable.fastest_growth(rows.speed_rpm[beyond], cut.depth)
         frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
-    teeth = 1 / rows.tooth_period
-    base, at_limit = (fold_frequency(part, teeth) for part in (frequency, at_limit))
+    base, at_limit = (fold_frequency(part, 1 / rows.tooth_period) for part in (frequency, at_limit))
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
 
 
@@ -205,9 +201,8 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
     if cut.has_frequency:
         at_limit = ZeroOrderBatch.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
-    return CutPrediction(
-        excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), np.pi - angle < FLIP_ANGLE_TOLERANCE
-    )
+    is_flip = np.pi - angle < FLIP_ANGLE_TOLERANCE
+    return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), is_flip)
 
 
 class ExpectedChatter(NamedTuple):
@@ -228,10 +223,8 @@ def predict_chatter(setting: CutSetting, assembly: Assembly, speed_rpm: float) -
     axes = FEED_ANGLES.values() if setting.feed == "both" else (FEED_ANGLES[setting.feed],)
     cuts = [replace(setting.cut, feed_angle=angle) for angle in axes]
     depth, speed = np.array([[setting.depth]]), np.array([speed_rpm])
-    multipliers = []
-    for cut in cuts:
-        rows = rows_at_speeds(system, cut, speed)
-        multipliers.append(largest_multipliers(rows, depth, count_pieces(rows, setting.depth))[0])
+    fed = [rows_at_speeds(system, cut, speed) for cut in cuts]
+    multipliers = [largest_multipliers(rows, depth, count_pieces(rows, setting.depth))[0] for rows in fed]
     worst = int(np.argmax([abs(multiplier[0]) for multiplier in multipliers]))
     repeats = np.array([setting.cut.repeats_per_turn * speed_rpm / 60])
     frequency = loudest_chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], repeats)

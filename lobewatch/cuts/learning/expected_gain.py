@@ -15,8 +15,8 @@ from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
-from modal import Mode
 
 SPEED_GRID_STEP = 0.008
 """Relative step of the checked speeds."""
@@ -28,8 +28,6 @@ N_COMPARED_SPEEDS = 80
 """Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
 """Smallest and largest credible ratio of true limit to zero-order limit; chosen."""
-
-TipModes = Sequence[Mode] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +57,8 @@ class CutGrid:
 def list_speeds(low: float, high: float) -> Floats:
     """List the speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
     number = max(int(np.log(high / low) / SPEED_GRID_STEP) + 1, 2)
-    return np.unique(
-        np.clip(np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM, low, high)
-    )
+    speeds = np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM
+    return np.unique(np.clip(speeds, low, high))
 
 
 def floor_depth(depth: float) -> float:
@@ -128,39 +125,29 @@ class LimitCharts:
         """Compute the limits of samples at speed."""
         rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
-        fed = [
-            ZeroOrderBatch.of(rows.with_feed_angle(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles
-        ]
+        batches = (ZeroOrderBatch.of(rows.with_feed_angle(angle)) for angle in grid.feed_angles)
+        fed = [batch.limits(grid.speeds, deepest) for batch in batches]
         worst = np.argmin([limit for limit, _ in fed], axis=0)[np.newaxis]
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True))
         limit = np.minimum(limit * grid.zero_order_trust, grid.max_depths)
         order = np.argsort(-limit, axis=0, kind="stable")
-        depth = (
-            np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING)
-            * TRIED_DEPTH_STEP_MM
-            / 1e3
-        )
+        steps = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING)
+        depth = steps * TRIED_DEPTH_STEP_MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
         teeth = grid.cut.repeats_per_turn * grid.speeds / 60
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def true_best_rates(self, cuts: Sequence[CutEvidence]) -> Floats:
         """Return the largest removal rate (rpm m) of cuts that are truly stable in each sample, shape (r,)."""
-        best = np.zeros(len(self.limits))
-        for cut in cuts:
-            if not cut.has_chatter:
-                best = np.maximum(best, np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth))
-        return best
+        stable = [cut for cut in cuts if not cut.has_chatter]
+        rates = [np.where(self.is_label_wrong(cut), 0.0, cut.speed_rpm * cut.depth) for cut in stable]
+        return np.asarray(np.max([np.zeros(len(self.limits)), *rates], axis=0))
 
     def is_label_wrong(self, cut: CutEvidence) -> Flags:
         """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
-        excess = np.log(cut.depth / self.limits[:, row])
-        return np.asarray(
-            excess < -MAX_LABEL_DEVIATION * LIMIT_SPREAD
-            if cut.has_chatter
-            else excess > MAX_LABEL_DEVIATION * LIMIT_SPREAD
-        )
+        excess = np.log(cut.depth / self.limits[:, row]) * (-1 if cut.has_chatter else 1)
+        return np.asarray(excess > MAX_LABEL_DEVIATION * LIMIT_SPREAD)
 
     def expected_gains(self, weights: Floats, best: float | Floats) -> Floats:
         """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
@@ -169,8 +156,7 @@ class LimitCharts:
         order, rates = self.depth_order[deep][:, speeds], self.removal_rates[deep][:, speeds]
         gain = np.zeros(rates.shape)
         for value in np.unique(best):
-            stable = np.cumsum((weights * (best == value))[order], axis=0)
-            gain += stable * np.maximum(rates - value, 0.0)
+            gain += np.cumsum((weights * (best == value))[order], axis=0) * np.maximum(rates - value, 0.0)
         likely = np.cumsum(weights[order], axis=0) > MIN_STABLE_PROBABILITY
         best_gains = np.zeros(speeds.shape)
         best_gains[speeds] = np.max(likely * gain, axis=0, initial=0.0)
@@ -179,21 +165,15 @@ class LimitCharts:
     def candidates(self, best: float | Floats) -> Iterator[tuple[int, float]]:
         """Yield candidate speeds, by their place, and depths (m)."""
         gains = self.expected_gains(np.full(len(self.limits), 1 / len(self.limits)), best)
-        places = list[int]()
+        places, speeds = list[int](), self.grid.speeds
         for row in np.argsort(-gains).tolist():
-            if all(
-                abs(np.log(self.grid.speeds[row] / self.grid.speeds[place])) > MIN_CANDIDATE_DISTANCE
-                for place in places
-            ):
+            if all(abs(np.log(speeds[row] / speeds[place])) > MIN_CANDIDATE_DISTANCE for place in places):
                 places.append(row)
             if len(places) == MAX_CANDIDATE_SPEEDS:
                 break
         for row in places:
-            depths = {
-                floor_depth(float(np.quantile(self.limits[:, row], 1 - chance)))
-                for chance in TRIED_STABLE_PROBABILITIES
-            }
-            yield from ((row, depth) for depth in sorted(depths) if depth > 0)
+            limits = [float(np.quantile(self.limits[:, row], 1 - chance)) for chance in TRIED_STABLE_PROBABILITIES]
+            yield from ((row, depth) for depth in sorted(set(map(floor_depth, limits))) if depth > 0)
 
     def expected_worth(self, row: int, depth: float, best: float | Floats, left: int) -> float:
         """Return the worth of a cut (rpm m): its own gain, and that of the best next cut."""
@@ -215,10 +195,8 @@ class LimitCharts:
         expected = self.frequencies[places, row]
         wide = FREQUENCY_ERROR_FACTOR * CHATTER_FREQUENCY_SPREAD * self.typical_frequency
         gains = []
-        for frequency in (
-            expected[int(share * places.size)]
-            for share in (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
-        ):
+        shares = (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
+        for frequency in (expected[int(share * places.size)] for share in shares):
             near = np.exp(-(((expected - frequency) / wide) ** 2) / 2)
             weights = np.zeros(len(self.limits))
             weights[places] = near / np.sum(near) if np.sum(near) > 0 else 1 / places.size

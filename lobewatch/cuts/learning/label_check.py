@@ -10,13 +10,8 @@ from enum import StrEnum
 import numpy as np
 
 from acquisition import Remark
+from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import (
-    CHATTER_FREQUENCY_SPREAD,
-    log_likelihood,
-    mislabel_probability,
-    power_distance,
-)
 from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
 
 MAX_WRONG_PROBABILITY = 0.5
@@ -57,7 +52,8 @@ class InconsistentCut:
 def wrong_label_probability(evidence: NewEvidence) -> float:
     """Return the probability that the verdict of a cut is wrong on spindles that explain all cuts."""
     cut, before = evidence.cut, evidence.prior
-    return float(np.sum(before.weights * mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))))
+    wrong = cut_likelihood.mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))
+    return float(np.sum(before.weights * wrong))
 
 
 def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
@@ -65,11 +61,10 @@ def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
     wrong = wrong_label_probability(evidence)
     if np.isfinite(cut.frequency) and cut.has_chatter:
-        near = np.any(
-            prediction.frequency_distances(cut) < MAX_FREQUENCY_DEVIATION * CHATTER_FREQUENCY_SPREAD * cut.frequency,
-            axis=0,
-        )
-        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction, _repeats_of(cut, evidence.prior)))
+        reach = MAX_FREQUENCY_DEVIATION * cut_likelihood.CHATTER_FREQUENCY_SPREAD * cut.frequency
+        near = np.any(prediction.frequency_distances(cut) < reach, axis=0)
+        likelihood = cut_likelihood.log_likelihood(cut, prediction, _repeats_of(cut, evidence.prior))
+        others = weights * np.exp(-cut.weight * likelihood)
         if np.sum(others * near) < MIN_EXPLAINED_WEIGHT * np.sum(others):
             return InconsistentCut(cut, Contradiction.FREQUENCY, wrong)
     if wrong <= MAX_WRONG_PROBABILITY:
@@ -82,11 +77,10 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
     cut, before = evidence.cut, evidence.prior
     if cut.power is None:
         return False
-    distance, variance = power_distance(cut, before.samples.force_factors(cut.material), before.cuts)
+    distance, variance = cut_likelihood.power_distance(cut, before.samples.force_factors(cut.material), before.cuts)
     mean = np.sum(before.weights * distance)
-    return bool(
-        abs(mean) > MAX_FREQUENCY_DEVIATION * np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance)
-    )
+    spread = np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance)
+    return bool(abs(mean) > MAX_FREQUENCY_DEVIATION * spread)
 
 
 def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
@@ -96,11 +90,9 @@ def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
     return tuple(uncertainty for uncertainty in rejected if uncertainty is not None)
 
 
-def inconsistent_cut_remarks(
-    posterior: Posterior, contradicting: Sequence[InconsistentCut], about: str
-) -> Iterator[Remark]:
+def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[InconsistentCut], about: str) -> Iterator[Remark]:
     """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
-    yield from map(_inconsistent_cut_remark, contradicting)
+    yield from map(_inconsistent_cut_remark, rejected)
     if posterior.is_frequency_unusual:
         between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
         text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"

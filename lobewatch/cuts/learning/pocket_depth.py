@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition import Remark
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.program_learning import collect_tool_evidence
+from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence
+from lobewatch.cuts.learning.program_learning import collect_evidence
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
+from lobewatch.machine.journal.cut_entry import geometry_key
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
@@ -63,23 +62,19 @@ class PocketDepth:
             wanted = first if math.isinf(self.chatter_depth) else self.chatter_depth / 2
         elif math.isinf(self.chatter_depth):
             wanted = 2 * self.stable_depth
+        elif self.chatter_depth > MIN_DEPTH_RATIO * self.stable_depth:
+            wanted = math.sqrt(self.stable_depth * self.chatter_depth)
         else:
-            wanted = (
-                math.sqrt(self.stable_depth * self.chatter_depth)
-                if self.chatter_depth > MIN_DEPTH_RATIO * self.stable_depth
-                else self.stable_depth
-            )
+            wanted = self.stable_depth
         wanted = round_down_depth_mm(1e3 * min(wanted, self.max_depth)) / 1e3
         return wanted if wanted > self.stable_depth else None
 
 
-def find_pocket_depths(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
-) -> list[PocketDepth]:
+def find_pocket_depths(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> list[PocketDepth]:
     """Find the best pockets of a program with their test cuts, the nearest to its own speed first."""
-    own, reach = _find_own_cuts(table, assembly, machine, cuts), CutRange.of(machine, table)
+    own, reach = _find_own_cuts(table, tool, machine, cuts), CutRange.of(machine, table)
     depths = []
-    for pocket in find_speed_pockets(table, assembly, machine):
+    for pocket in find_speed_pockets(table, tool, machine):
         speed = round(sum(pocket.window_rpm) / 2 / SPEED_STEP_RPM) * SPEED_STEP_RPM
         inside = tuple(cut for cut in own if pocket.contains(cut.speed_rpm))
         depths.append(PocketDepth(pocket, speed, inside, float(reach.depth_limits(np.array([speed]))[0]) / 1e3))
@@ -91,15 +86,11 @@ def choose_first_depth(table: ProgramTable) -> float:
     return max(round_down_depth_mm(FIRST_DEPTH_SHARE * table.depth_mm), DEPTH_STEP_MM) / 1e3
 
 
-def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> Verdict:
+def apply_test_cuts(verdict: Verdict, tool: Assembly, machine: Machine, cuts: CutEntries) -> Verdict:
     """Set the stability of a program without a limit from test cuts at its speed; doubtful at best."""
-    program = verdict.program
-    at_speed = [
-        cut
-        for cut in _find_own_cuts(program, assembly, machine, cuts)
-        if abs(cut.speed_rpm / program.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE
-    ]
-    depth = program.depth_mm / 1e3
+    program, depth = verdict.program, verdict.program.depth_mm / 1e3
+    own = _find_own_cuts(program, tool, machine, cuts)
+    at_speed = [cut for cut in own if abs(cut.speed_rpm / program.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE]
     chattering = [cut for cut in at_speed if cut.has_chatter and cut.depth <= depth]
     stable = [cut for cut in at_speed if not cut.has_chatter and cut.depth >= depth]
     if not chattering and not stable:
@@ -112,11 +103,9 @@ def apply_test_cuts(verdict: Verdict, assembly: Assembly, machine: Machine, cuts
     return replace(verdict, stability=word, remarks=(remark, *others))
 
 
-def _find_own_cuts(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
-) -> list[CutEvidence]:
+def _find_own_cuts(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> list[CutEvidence]:
     """Find the cuts of this program, at speeds corrected for the change of the natural frequency."""
     shape = geometry_key(machine.build_cut(table))
-    evidence = collect_tool_evidence(cuts, table, assembly, machine)
+    evidence = collect_evidence(cuts, table, tool, machine)
     own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]
     return [replace(cut, speed_rpm=cut.speed_rpm / cut.frequency_ratio) for cut in own]

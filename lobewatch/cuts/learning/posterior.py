@@ -10,14 +10,9 @@ import numpy as np
 
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import (
-    CutPrediction,
-    log_likelihood,
-    max_log_likelihood,
-    power_log_likelihood,
-    predict_cut,
-)
+from lobewatch.cuts.learning.cut_likelihood import CutPrediction, predict_cut
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.uncertainty import Uncertainty
 
@@ -76,7 +71,8 @@ class Posterior:
     @property
     def weights(self) -> Floats:
         """Weight of each sample, sum 1, shape (r,)."""
-        return _normalize_weights(self.log_weight)
+        weights = np.exp(self.log_weight - np.max(self.log_weight))
+        return np.asarray(weights / np.sum(weights))
 
     @property
     def effective_size(self) -> float:
@@ -88,11 +84,8 @@ class Posterior:
         """Intervals by name; those of natural frequencies stay open until chatter was recorded twice."""
         intervals = {name: _weighted_interval(values, self.weights) for name, values in self.samples.ratios().items()}
         if self.n_frequencies < MIN_CHATTER_FREQUENCIES:
-            intervals |= {
-                name: intervals[name].no_narrower(*OPEN_FREQUENCY_INTERVAL)
-                for name in intervals
-                if name.startswith("frequency")
-            }
+            names = [name for name in intervals if name.startswith("frequency")]
+            intervals |= {name: intervals[name].no_narrower(*OPEN_FREQUENCY_INTERVAL) for name in names}
         return intervals
 
     @property
@@ -105,10 +98,8 @@ class Posterior:
         """True if a natural frequency is probably further from that not rotating than in 95 % of spindles."""
         leading = [values for name, values in self.samples.ratios().items() if name in ("frequency_x", "frequency_y")]
         beside = [(USUAL_FREQUENCY_INTERVAL[0] < values) & (values < USUAL_FREQUENCY_INTERVAL[1]) for values in leading]
-        return (
-            self.n_frequencies >= MIN_CHATTER_FREQUENCIES
-            and float(np.sum(self.weights * np.all(beside, axis=0))) < 1 / 2
-        )
+        usual = float(np.sum(self.weights * np.all(beside, axis=0)))
+        return self.n_frequencies >= MIN_CHATTER_FREQUENCIES and usual < 1 / 2
 
     def learn_from(self, cut: CutEvidence) -> Posterior:
         """Update with one more cut."""
@@ -123,9 +114,8 @@ class Posterior:
 
     def draw(self, count: int) -> SpindleSamples:
         """Draw samples of equal weight."""
-        return self.samples[
-            _resample_indices(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))
-        ]
+        random = np.random.default_rng((self.seed, 4, len(self.cuts)))
+        return self.samples[_resample_indices(self.weights, count, random)]
 
     def resample(self, count: int) -> Posterior:
         """Resample to a number of samples of equal weight."""
@@ -145,10 +135,9 @@ class NewEvidence:
 
     def update(self) -> Posterior:
         """Update the posterior with the cut."""
-        log_weight = self.prior.log_weight + _cut_log_likelihood(
-            self.cut, self.prior.samples, self.prediction, self.prior.cuts
-        )
-        posterior = replace(self.prior, log_weight=log_weight, cuts=(*self.prior.cuts, self.cut))
+        prior = self.prior
+        likelihood = _cut_log_likelihood(self.cut, prior.samples, self.prediction, prior.cuts)
+        posterior = replace(prior, log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
@@ -166,13 +155,8 @@ def _cut_log_likelihood(
     cut: CutEvidence, samples: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
 ) -> Floats:
     """Return the log likelihood of one cut after those before it; an old cut counts less."""
-    word = log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    return cut.weight * word + power_log_likelihood(cut, samples.force_factors(cut.material), before)
-
-
-def _normalize_weights(log_weight: Floats) -> Floats:
-    weights = np.exp(log_weight - np.max(log_weight))
-    return np.asarray(weights / np.sum(weights))
+    word = cut_likelihood.log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
+    return cut.weight * word + cut_likelihood.power_log_likelihood(cut, samples.force_factors(cut.material), before)
 
 
 def _refresh(posterior: Posterior) -> Posterior:
@@ -185,8 +169,7 @@ def _refresh(posterior: Posterior) -> Posterior:
     value = _joint_log_density(samples[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
     samples = samples[chosen[copies]]
     for _ in range(N_MARKOV_MOVES):
-        step = random.standard_normal(samples.normal.shape) @ root.T
-        moved = replace(samples, normal=samples.normal + step)
+        moved = replace(samples, normal=samples.normal + random.standard_normal(samples.normal.shape) @ root.T)
         least = value + np.log(random.uniform(size=len(samples)))
         moved_value = _joint_log_density(moved, cuts, least)
         taken = moved_value > least
@@ -201,7 +184,7 @@ def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], lea
     A sample that cannot come to more any more is not asked about further cuts.
     """
     value: Floats = -np.sum(samples.normal**2, axis=1) / 2
-    hope = [cut.weight * max_log_likelihood(cut) for cut in cuts]
+    hope = [cut.weight * cut_likelihood.max_log_likelihood(cut) for cut in cuts]
     for k, cut in enumerate(cuts):
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))

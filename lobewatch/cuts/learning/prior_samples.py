@@ -16,15 +16,10 @@ import scipy
 
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
-from lobewatch.verdicts.program_samples import (
-    ROTATING_DAMPING_FACTOR,
-    ROTATING_FORCE_SPREAD,
-    ROTATING_FREQUENCY_FACTOR,
-    ROTATING_STIFFNESS_FACTOR,
-)
+from lobewatch.verdicts import program_samples
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
-ROTATING_FORCE_PRIOR = (1.1, ROTATING_FORCE_SPREAD)
+ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 """Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
 
 Frequency, damping and stiffness are those of the chatter risk of a verdict (the deviation of f_n absolute)."""
@@ -76,7 +71,8 @@ class SpindleSamples:
         """
         at_rest = self.at_rest
         tangential, ratio = self._coefficient_factors(0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
-        frequency, sides, soft = self._frequency_factors(), self._side_factors(), np.mean(self._flexibility(), axis=0)
+        frequency, sides = self._frequency_factors(), self._side_factors()
+        soft = np.mean(1 / (2 * at_rest.damping_ratio * at_rest.stiffness), axis=0)
         values = {"tangential": tangential, "ratio": ratio}
         for axis, side in enumerate("xy"):
             modes = np.flatnonzero(at_rest.axes[at_rest.direction] == axis)
@@ -91,9 +87,8 @@ class SpindleSamples:
         first, rejected = self._material_index(material), self.uncertainty.tangential
         at_speed, normal = self.normal[:, first : first + 2].T
         force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
-        return np.asarray(
-            ROTATING_FORCE_PRIOR[0] * np.maximum(1 + ROTATING_FORCE_PRIOR[1] * at_speed, MIN_PRIOR_FACTOR) * force
-        )
+        mean, spread = ROTATING_FORCE_PRIOR
+        return np.asarray(mean * np.maximum(1 + spread * at_speed, MIN_PRIOR_FACTOR) * force)
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
@@ -113,26 +108,19 @@ class SpindleSamples:
         """Place of the first number of a material."""
         return _count_spindle_numbers(self.at_rest) + NUMBERS_PER_MATERIAL * material
 
-    def _flexibility(self) -> Floats:
-        """Return the flexibility of each mode at its natural frequency, not rotating (m/N), shape (r, n)."""
-        return np.asarray(1 / (2 * self.at_rest.damping_ratio * self.at_rest.stiffness))
-
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""
-        return np.asarray(
-            ROTATING_FREQUENCY_FACTOR[0]
-            + ROTATING_FREQUENCY_FACTOR[1] * _to_heavy_tailed(self.normal[:, : self.at_rest.direction.size])
-        )
+        mean, spread = program_samples.ROTATING_FREQUENCY_FACTOR
+        normal = self.normal[:, : self.at_rest.direction.size]
+        return np.asarray(mean + spread * np.interp(normal, *_mixture_quantiles()))
 
     def _side_factors(self) -> Floats:
         """Factors of zeta and K in x and y, shape (r, 2, 2)."""
         first = self.at_rest.direction.size
         normal = self.normal[:, first : first + NUMBERS_PER_SPINDLE].reshape(-1, 2, 2)
-        parts = (
-            median * np.maximum(1 + spread * normal[..., place], MIN_PRIOR_FACTOR)
-            for place, (median, spread) in enumerate((ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR))
-        )
-        return np.stack(tuple(parts), axis=-1)
+        priors = program_samples.ROTATING_DAMPING_FACTOR, program_samples.ROTATING_STIFFNESS_FACTOR
+        median, spread = np.array(priors).T
+        return np.asarray(median * np.maximum(1 + spread * normal, MIN_PRIOR_FACTOR))
 
     def _coefficient_factors(self, material: int, tangential: float, radial: float) -> tuple[Floats, Floats]:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""
@@ -144,10 +132,8 @@ class SpindleSamples:
 def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
-    normal = np.random.default_rng((seed, 2)).standard_normal(
-        (count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL)
-    )
-    return SpindleSamples(normal, at_rest, uncertainty)
+    size = count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL
+    return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty)
 
 
 def _count_spindle_numbers(rows: MillingRows) -> int:
@@ -164,22 +150,14 @@ def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) ->
         return np.asarray(rejected.low + (rejected.high - rejected.low) * share)
     ends = np.sort([rejected.low, rejected.high, 0.0, 1 / median])
     width = max(rejected.high - rejected.low, 1e-9)
-    below = (1 - OPEN_FORCE_RATIO_SHARE) * np.clip(
-        (ends - rejected.low) / width, 0, 1
-    ) + OPEN_FORCE_RATIO_SHARE * np.clip(ends * median, 0, 1)
-    return np.asarray(np.interp(share, below, ends))
-
-
-def _to_heavy_tailed(normal: Floats) -> Floats:
-    """Map standard normal numbers to a mixture with heavy tails, in the same order."""
-    return np.asarray(np.interp(normal, *_mixture_quantiles()))
+    near, anywhere = np.clip((ends - rejected.low) / width, 0, 1), np.clip(ends * median, 0, 1)
+    return np.asarray(np.interp(share, (1 - OPEN_FORCE_RATIO_SHARE) * near + OPEN_FORCE_RATIO_SHARE * anywhere, ends))
 
 
 @cache
 def _mixture_quantiles() -> tuple[Floats, Floats]:
     """Return standard normal numbers and the mixture quantiles of the same probabilities."""
     value = np.linspace(-MIXTURE_TABLE_END, MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS)
-    beyond = (1 - WIDE_FREQUENCY_SHARE) * scipy.special.ndtr(
-        -np.abs(value)
-    ) + WIDE_FREQUENCY_SHARE * scipy.special.ndtr(-np.abs(value) / WIDE_FREQUENCY_FACTOR)
+    usual, wide = scipy.special.ndtr(-np.abs(value)), scipy.special.ndtr(-np.abs(value) / WIDE_FREQUENCY_FACTOR)
+    beyond = (1 - WIDE_FREQUENCY_SHARE) * usual + WIDE_FREQUENCY_SHARE * wide
     return np.asarray(-np.sign(value) * scipy.special.ndtri(beyond)), value

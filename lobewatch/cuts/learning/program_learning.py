@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lobewatch.cuts.learning.cut_evidence import CutEvidence, estimate_force_by_power
+from lobewatch.cuts.learning import label_check
+from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
-from lobewatch.cuts.learning.label_check import (
-    Contradiction,
-    InconsistentCut,
-    find_inconsistent_cuts,
-    is_power_inconsistent,
-)
+from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
-from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import find_by_name
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency
@@ -74,87 +69,77 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
     return find_by_name({table.name: table for table in machine.program}, name)
 
 
-def learn_program(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry]
-) -> LearningResult:
+def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    start = build_prior(
-        build_median_row(build_program(table, machine), assembly), uncertainty_of(assembly, table, machine)
-    )
+    start = build_prior(build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine))
     posterior, odd_powers = start, []
-    for cut in collect_tool_evidence(cuts, table, assembly, machine):
+    for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
-        if is_power_inconsistent(evidence):
+        if label_check.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
             evidence = replace(evidence, cut=replace(cut, power=None))
         posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
     own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    return LearningResult(table, start, posterior, (*find_inconsistent_cuts(posterior), *odd_powers), own_cuts)
+    inconsistent = (*label_check.find_inconsistent_cuts(posterior), *odd_powers)
+    return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 
-def find_next_cut(
-    table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[CutEntry], most: int
-) -> NextCut:
+def find_next_cut(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries, most: int) -> NextCut:
     """Find the next test cut of a program, of `most` cuts."""
-    learning = learn_program(table, assembly, machine, cuts)
+    learning = learn_program(table, tool, machine, cuts)
     left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
     if not left or reach.is_empty:
         return NextCut(learning, None, left, reach)
-    grid = build_cut_grid(table, assembly, machine)
+    grid = build_cut_grid(table, tool, machine)
     cut = suggest_cut(learning.posterior, grid, learning.own_cuts, left, learning.rejected_cuts, table.depth_mm / 1e3)
     return NextCut(learning, cut, left, reach)
 
 
-def build_cut_grid(table: ProgramTable, assembly: Assembly, machine: Machine) -> CutGrid:
+def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> CutGrid:
     """Build the grid of speeds and the depths that tool and drive allow."""
     reach = CutRange.of(machine, table)
     speeds = reach.speeds(SPEED_GRID_STEP)
     deepest = reach.depth_limits(speeds) / 1e3
     cut, angles = machine.build_cut(table), tuple(FEED_ANGLES[feed] for feed in table.feed_axes)
-    trust = compare_zero_order(assembly.x, assembly.y, cut, angles, speeds, reach.deepest_mm / 1e3)
+    trust = compare_zero_order(tool.x, tool.y, cut, angles, speeds, reach.deepest_mm / 1e3)
     return CutGrid(cut, angles, speeds, deepest, trust)
 
 
-def collect_tool_evidence(
-    cuts: Sequence[CutEntry], table: ProgramTable, assembly: Assembly, machine: Machine
-) -> tuple[CutEvidence, ...]:
-    """Collect the usable cuts of the same tool, oldest first."""
+def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine) -> Iterator[CutEvidence]:
+    """Yield the usable cuts of the same tool, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
-    evidence = []
     for entry in cuts:
         if entry.tool != table.tool or not entry.is_usable:
             continue
         material = entry.coefficients, entry.cut.tangential, entry.cut.radial
         if material not in materials:
             materials.append(material)
-        evidence.append(_build_evidence(entry, materials.index(material), assembly))
-    return tuple(evidence)
+        yield _build_evidence(entry, materials.index(material), tool)
 
 
-def _build_evidence(cut: CutEntry, material: int, assembly: Assembly) -> CutEvidence:
-    feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
+def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
+    angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
     return CutEvidence(
         cut=cut.cut,
         speed_rpm=cut.speed_rpm,
         depth=cut.depth,
         verdict=cut.word,
         frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
-        feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
+        feed_angles=tuple(angles),
         material=material,
         speed_found=cut.by != "ear",
-        frequency_ratio=_frequency_ratio(cut, assembly),
+        frequency_ratio=_frequency_ratio(cut, tool),
         id=cut.id,
         power=None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter),
     )
 
 
-def _frequency_ratio(cut: CutEntry, assembly: Assembly) -> float:
+def _frequency_ratio(cut: CutEntry, tool: Assembly) -> float:
     """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
-    pairs = [
-        (interpolate_frequency(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series
-    ]
+    known = [series for series in tool.series.values() if series]
+    pairs = [(interpolate_frequency(series, cut.at), series[-1].frequency) for series in known]
     ratios = [before / now for before, now in pairs if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0

@@ -74,23 +74,19 @@ def suggest_cut(
     chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by
     semi-discretization. programmed: depth of the program (m); the first cut is about as deep, or chatters hardly.
     """
-    best, few = (
-        find_best_removal_rate([cut for cut in cuts if cut not in rejected]),
-        posterior.resample(N_SUGGESTION_SAMPLES),
-    )
+    best = find_best_removal_rate([cut for cut in cuts if cut not in rejected])
+    few = posterior.resample(N_SUGGESTION_SAMPLES)
     samples, chart = few.samples, LimitCharts.of(few.samples, grid)
     if (again := _find_repeat(few, [cut for cut in cuts if grid.contains(cut.speed_rpm)], left, rejected)) is not None:
         return replace(_build_suggestion(grid, again.speed_rpm, again.depth, best, samples), repeats=again.id)
-    true = np.maximum(
-        chart.true_best_rates(cuts), find_best_removal_rate([cut for cut in cuts if cut not in posterior.cuts])
-    )
+    unlearned = find_best_removal_rate([cut for cut in cuts if cut not in posterior.cuts])
+    true = np.maximum(chart.true_best_rates(cuts), unlearned)
     least = MIN_EXPECTED_GAIN * max(best, MIN_REMOVAL_RATE_SHARE * float(np.max(chart.removal_rates)))
     careful_from = np.inf if cuts else FIRST_CUT_DEPTH_FACTOR * programmed
-    speeds = grid.speeds.tolist()
-    places = [
-        (row, deep) for row, deep in chart.candidates(true) if not is_setting_taken(speeds[row], deep, cuts, rejected)
-    ]
-    worth = {place: chart.expected_worth(place[0], place[1], true, left) for place in places}
+    speeds, worth = grid.speeds.tolist(), dict[tuple[int, float], float]()
+    for row, depth in chart.candidates(true):
+        if not is_setting_taken(speeds[row], depth, cuts, rejected):
+            worth[row, depth] = chart.expected_worth(row, depth, true, left)
     for row, depth in sorted(worth, key=lambda place: -worth[place]):
         if worth[row, depth] < least:
             return None
@@ -127,9 +123,8 @@ def _find_likely_stable(
         deep = floor_depth(share * depth)
         if deep > 0:
             suggestion = _build_suggestion(grid, speed, deep, best, samples)
-            if suggestion.chatter_probability < 1 - MIN_STABLE_PROBABILITY and (
-                deep <= careful_from or suggestion.chatter_probability <= MAX_FIRST_CUT_RISK
-            ):
+            risk = suggestion.chatter_probability
+            if risk < 1 - MIN_STABLE_PROBABILITY and (deep <= careful_from or risk <= MAX_FIRST_CUT_RISK):
                 return suggestion
     return None
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from acquisition import DataError, Remark
+from acquisition import DataError
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.cut_evidence import CutEntries
 from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
 from lobewatch.cuts.learning.posterior import Posterior
 from lobewatch.cuts.learning.program_learning import LearningResult, learn_program
 from lobewatch.machine import CutTable, Machine, ProgramTable
-from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 from lobewatch.verdicts.program_case import build_program
@@ -30,9 +31,7 @@ INTERVAL_QUANTILES = (0.025, 0.975)
 """Quantiles of a 95 % interval."""
 
 
-def evaluate_at_speed(
-    table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: Sequence[CutEntry]
-) -> Verdict:
+def evaluate_at_speed(table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: CutEntries) -> Verdict:
     """Evaluate a program, at speed as far as cuts have been learned from."""
     posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
     verdict = evaluate_program(table, tool, machine, posterior)
@@ -41,7 +40,7 @@ def evaluate_at_speed(
     return apply_test_cuts(verdict, tool, machine, cuts)
 
 
-def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[CutEntry]) -> SpindleAtSpeed:
+def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> SpindleAtSpeed:
     """Learn the spindle at speed from the cuts of a program; nothing for the reference cut."""
     if not isinstance(table, ProgramTable) or not tool.directions:
         return NO_TEST_CUTS
@@ -49,44 +48,28 @@ def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: Seque
         return NO_TEST_CUTS
     learning = learn_program(table, tool, machine, cuts)
     remarks = tuple(inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
-    return (
-        _build_spindle(learning, tool, machine, remarks) if learning.accepted_cuts else SpindleAtSpeed(remarks=remarks)
-    )
+    return replace(_build_spindle(learning, tool, machine) if learning.accepted_cuts else NO_TEST_CUTS, remarks=remarks)
 
 
-def _build_spindle(
-    learning: LearningResult, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]
-) -> SpindleAtSpeed:
+def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -> SpindleAtSpeed:
     """Build the spindle at speed from a learning result."""
-    at_rest, samples = (
-        build_median_row(build_program(learning.program, machine), tool),
-        learning.posterior.draw(N_PROGRAM_SAMPLES),
-    )
+    at_rest = build_median_row(build_program(learning.program, machine), tool)
+    samples = learning.posterior.draw(N_PROGRAM_SAMPLES)
     rows = samples.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
     parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
     median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
     force, direction = (samples.ratios()[name] for name in ("tangential", "ratio"))
     push, ratio = float(np.mean(force)), float(np.mean(direction))
-    left = LearnedSamples(
-        frequency=parts[0] / median[0],
-        damping_ratio=parts[1] / median[1],
-        stiffness=parts[2] / median[2],
-        phase_change=phases,
-        tangential=force / np.mean(force),
-        ratio=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
-    )
+    frequency, damping, stiffness = (part / mean for part, mean in zip(parts, median, strict=True))
+    direction_over_mean = direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape)
+    left = LearnedSamples(frequency, damping, stiffness, phases, force / np.mean(force), direction_over_mean)
+    widths = {TEST_CUTS.name: _half_widths(parts, phases)}
+    mixing, speed = np.tile(np.eye(4), (at_rest.direction.size, 1, 1)), machine.doubt.speed_percent / 100
+    ranges, axes = (_factor_range(force), _factor_range(direction)), tool.principal_directions
+    uncertainty = Uncertainty(widths, mixing, speed, *ranges, axes=axes, learned=left)
     return SpindleAtSpeed(
         n_cuts=len(learning.accepted_cuts),
-        remarks=remarks,
-        uncertainty=Uncertainty(
-            modes={TEST_CUTS.name: _half_widths(parts, phases)},
-            tap_correlation=np.tile(np.eye(4), (at_rest.direction.size, 1, 1)),
-            speed=machine.doubt.speed_percent / 100,
-            tangential=_factor_range(force),
-            ratio=_factor_range(direction),
-            axes=tool.principal_directions,
-            learned=left,
-        ),
+        uncertainty=uncertainty,
         factors=np.stack(median, axis=1),
         tangential=float(at_rest.tangential[0]) * push / 1e6,
         radial=float(at_rest.radial[0]) * push * ratio / 1e6,
@@ -97,9 +80,8 @@ def _build_spindle(
 
 def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
     """Return 95 % half-widths of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
-    relative = [
-        np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
-    ]
+    widths = [np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 for part in parts]
+    relative = [width / np.mean(part, axis=0) for width, part in zip(widths, parts, strict=True)]
     return np.stack([*relative, np.std(turned, axis=0) * 2], axis=1)
 
 

@@ -232,14 +232,12 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
-    amount = _find_root(
-        lambda value: dampers.follow(low, value).mode.damping_ratio - target,
-        low.amount,
-        high.amount,
-        xtol=1e-15 * high.amount,
-        rtol=1e-13,
-    )
-    return dampers.follow(low, amount)
+
+    def excess(amount: float) -> float:
+        return dampers.follow(low, amount).mode.damping_ratio - target
+
+    root = _find_root(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
+    return dampers.follow(low, root)
 
 
 def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tuple[_DampingPoint, _DampingPoint]:

@@ -83,12 +83,8 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
         half_power_damping=_half_power_damping(band, mode),
     )
     assessed = with_truncation_error(figures)
-    remarks = chain(
-        _edit_remarks(band, i, assessed),
-        _position_remarks(state, band, i, assessed),
-        _value_remarks(band, i, assessed, share),
-        _error_remarks(assessed),
-    )
+    of_value = _value_remarks(band, i, assessed, share), _error_remarks(assessed)
+    remarks = chain(_edit_remarks(band, i, assessed), _position_remarks(state, band, i, assessed), *of_value)
     return replace(assessed, remarks=tuple(remarks))
 
 

@@ -58,14 +58,8 @@ def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
     area, moment = np.pi * (outer**2 - bore**2) / 4, np.pi * (outer**4 - bore**4) / 64
     steel = spindle.material
     ratio = steel.youngs_modulus / (2 * steel.shear_modulus) - 1
-    section = np.array(
-        [
-            steel.youngs_modulus * moment,
-            _cowper(ratio, bore / outer) * steel.shear_modulus * area,
-            steel.density * area,
-            steel.density * moment,
-        ]
-    )
+    shear = _cowper(ratio, bore / outer) * steel.shear_modulus * area
+    section = np.array([steel.youngs_modulus * moment, shear, steel.density * area, steel.density * moment])
     return np.repeat(length / count, count), np.repeat(section, count, axis=1)
 
 
@@ -112,14 +106,8 @@ def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tu
             length * (x**3 - x**2 - softness * bump / 2),
         ]
     )
-    rotation = np.array(
-        [
-            -6 * bump / length,
-            1 - 4 * x + 3 * x**2 + softness * (1 - x),
-            6 * bump / length,
-            3 * x**2 - 2 * x + softness * x,
-        ]
-    )
+    ends = 1 - 4 * x + 3 * x**2 + softness * (1 - x), 3 * x**2 - 2 * x + softness * x
+    rotation = np.array([-6 * bump / length, ends[0], 6 * bump / length, ends[1]])
     return deflection / (1 + softness), rotation / (1 + softness)
 
 
@@ -130,9 +118,8 @@ def _strains(x: float, length: Floats, softness: Floats, kind: ElementKind) -> t
         rotation = _shapes(x, length, softness, kind)[1]
         return np.array([none, -one, none, one]) / length, np.array([-one, none, one, none]) / length - rotation
     turn = 1 - 2 * x
-    curvature = np.array([-6 * turn / length, 6 * x - 4 - softness, 6 * turn / length, 6 * x - 2 + softness]) / (
-        length * (1 + softness)
-    )
+    bend = [-6 * turn / length, 6 * x - 4 - softness, 6 * turn / length, 6 * x - 2 + softness]
+    curvature = np.array(bend) / (length * (1 + softness))
     slide = softness / (1 + softness) * np.array([-1 / length, -one / 2, 1 / length, -one / 2])
     return curvature, slide
 

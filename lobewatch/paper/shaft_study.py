@@ -172,11 +172,8 @@ def study_stiffness(old: Calibration) -> StiffnessStudy:
     """Study the tip stiffness from the bearings calibrated to the frequency before and after the drop."""
     pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
     before, after = (dsm.static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
-    return StiffnessStudy(
-        (old.static_stiffness_before, old.static_stiffness_after),
-        (before, after),
-        (old.modal_stiffness_before, old.modal_stiffness_after),
-    )
+    static = old.static_stiffness_before, old.static_stiffness_after
+    return StiffnessStudy(static, (before, after), (old.modal_stiffness_before, old.modal_stiffness_after))
 
 
 def stiffness_section(study: StiffnessStudy) -> NumberGroup:

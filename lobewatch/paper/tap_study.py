@@ -41,9 +41,8 @@ def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[
     structure = Structure(values[:, 0], values[:, 1], values[:, 2])
     for seed in range(tests):
         signal = HammeredStructure(structure, EMULATED_TAP_RATE, np.random.default_rng(seed), Hammering())
-        source = SimulatedSource(
-            signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
-        )
+        n_samples = int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
+        source = SimulatedSource(signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, n_samples)
         source.start()
         good = (hit for hit in capture_hits(source, EMULATED_TAP_TRIGGER) if not check_hit(hit))
         yield estimate_frf(list(islice(good, hits)))

@@ -181,6 +181,7 @@ def calibrate_damping(
     damped = _find_damping(dampers, start, damping_ratio)
     viscous = dampers.at(damped.amount).viscous
     mean, per_amount = float(np.mean(viscous[chosen])), float(np.mean(dampers.ratio[chosen]))
+    bearings = [replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
     return DampingCalibration(
         damping_ratio=damping_ratio,
         damping_ratio_std=damping_ratio_std,
@@ -192,9 +193,7 @@ def calibrate_damping(
         bearing_damping_std=None if damping_ratio_std is None else per_amount * damping_ratio_std / damped.slope,
         sensitivity=damped.slope * damped.amount,
         given=spindle,
-        spindle=replace(
-            spindle, bearings=[replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
-        ),
+        spindle=replace(spindle, bearings=bearings),
     )
 
 

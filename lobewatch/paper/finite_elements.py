@@ -163,17 +163,12 @@ class FiniteElementStudy:
 def study_meshes(plain: Spindle, shear: Spindle, exact: tuple[float, float]) -> FiniteElementStudy:
     """Compare elements with the exact first frequency (Hz) by Euler-Bernoulli (plain) and Timoshenko theory (shear)."""
     exacts: Mapping[ElementKind, float] = {"euler-bernoulli": exact[0], "timoshenko": exact[1], "linear": exact[1]}
-    return FiniteElementStudy(
-        exacts,
-        {
-            kind: tuple(
-                first_frequency(plain if kind == "euler-bernoulli" else shear, count, kind, "rigid")
-                for count in ELEMENT_COUNTS
-            )
-            for kind in exacts
-        },
-        first_frequency(shear, printed.FEM_ELEMENTS, "timoshenko", "clamped"),
-    )
+    frequencies = {}
+    for kind in exacts:
+        spindle = plain if kind == "euler-bernoulli" else shear
+        frequencies[kind] = tuple(first_frequency(spindle, count, kind, "rigid") for count in ELEMENT_COUNTS)
+    clamped = first_frequency(shear, printed.FEM_ELEMENTS, "timoshenko", "clamped")
+    return FiniteElementStudy(exacts, frequencies, clamped)
 
 
 def mesh_section(study: FiniteElementStudy) -> NumberGroup:
@@ -187,14 +182,11 @@ def mesh_section(study: FiniteElementStudy) -> NumberGroup:
     apart = f"as many, {off['euler-bernoulli']}: by a code that shares nothing with the model"
     name = f"{printed.FEM_ELEMENTS} elements"
     held = "clamped in all bearings, the stiffest way to hold it: still below"
-    return NumberGroup(
-        "Finite elements, rigid bearings",
-        ("convergence",),
-        (
-            Comparison(f"f_1, {name}", "", printed.FEM_FREQUENCY, straight, "Hz", 6, mesh),
-            Comparison("it is above f_1 of the model by", "", above, ours, "%", 3, softer),
-            Comparison("f_1, cubics without shear", "", None, plain, "Hz", 7, apart),
-            Comparison("f_1, cubics with shear", "", None, cubic, "Hz", 7, f"as many, {off['timoshenko']}"),
-            Comparison("the same, slopes held too", "", None, study.clamped, "Hz", 6, held),
-        ),
+    numbers = (
+        Comparison(f"f_1, {name}", "", printed.FEM_FREQUENCY, straight, "Hz", 6, mesh),
+        Comparison("it is above f_1 of the model by", "", above, ours, "%", 3, softer),
+        Comparison("f_1, cubics without shear", "", None, plain, "Hz", 7, apart),
+        Comparison("f_1, cubics with shear", "", None, cubic, "Hz", 7, f"as many, {off['timoshenko']}"),
+        Comparison("the same, slopes held too", "", None, study.clamped, "Hz", 6, held),
     )
+    return NumberGroup("Finite elements, rigid bearings", ("convergence",), numbers)

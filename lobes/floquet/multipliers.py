@@ -172,7 +172,7 @@ class _KrylovSpace:
     def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
         """Select c of the cases, as (c, 1)."""
         basis, matrix = self.basis[which], self.matrix[which]
-        return _KrylovSpace(self.over_period[*which], basis[:, np.newaxis], matrix[:, np.newaxis])
+        return _KrylovSpace(self.over_period[which[0], which[1]], basis[:, np.newaxis], matrix[:, np.newaxis])
 
     def grown(self, vectors: int) -> _KrylovSpace:
         """Return the spaces with so many vectors, at most the number of states."""

@@ -226,9 +226,6 @@ def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
         "zeta too large, K too small by percents"
     )
     cure = "export the lines without smoothing or window"
-    return [
-        replace(mode, remarks=(*mode.remarks, Remark("smoothed-lines", _frequency_text(mode), text, cure)))
-        if is_narrow
-        else mode
-        for mode, is_narrow in zip(modes, narrow, strict=True)
-    ]
+    remarks = [(Remark("smoothed-lines", _frequency_text(mode), text, cure),) for mode in modes]
+    added = zip(modes, narrow, remarks, strict=True)
+    return [replace(mode, remarks=(*mode.remarks, *own)) if is_narrow else mode for mode, is_narrow, own in added]

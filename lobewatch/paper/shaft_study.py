@@ -69,12 +69,12 @@ def study_shaft(theory: Theory) -> ShaftStudy:
     turning = dsm.whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
     old = surrogate_spindle(printed.OLD_BEARING_STIFFNESS, theory)
     frequencies = float(dsm.natural_frequencies(shaft, 1)[0]), float(dsm.natural_frequencies(old, 1)[0])
-    calibrations = new, dsm.calibrate(new.spindle, printed.OLD_FREQUENCY)
+    dropped = dsm.calibrate(new.spindle, printed.OLD_FREQUENCY)
     speeds = dsm.critical_speed(rigid), dsm.critical_speed(new.spindle)
     curve = dsm.stiffness_curve(shaft, frequency), frequency
-    whirls = (dsm.whirl_map(spindle, WHIRL_SPEEDS_RPM, 1) for spindle in (rigid, new.spindle))
+    rigid_whirl, whirl = (dsm.whirl_map(spindle, WHIRL_SPEEDS_RPM, 1) for spindle in (rigid, new.spindle))
     at_speed = float(turning.backward[0, 0]), float(turning.forward[0, 0])
-    return ShaftStudy(rigid, highest, frequencies, *calibrations, speeds, curve, *whirls, at_speed)
+    return ShaftStudy(rigid, highest, frequencies, new, dropped, speeds, curve, rigid_whirl, whirl, at_speed)
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:

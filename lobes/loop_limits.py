@@ -109,11 +109,10 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
     setting = np.zeros(speed_rpm.shape, dtype=np.intp)
     responses = [branch.on_grid for branch in branches]
     for i, branch in enumerate(branches):
-        limit, frequency = (
-            uneven_limits(branch, cut, tooth_frequency)
-            if cut.pitch
-            else _branch_limits(branch, responses[i], tooth_frequency)
-        )
+        if cut.pitch:
+            limit, frequency = uneven_limits(branch, cut, tooth_frequency)
+        else:
+            limit, frequency = _branch_limits(branch, responses[i], tooth_frequency)
         lower = limit < depth
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
     limited = np.isfinite(depth)

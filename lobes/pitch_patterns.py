@@ -104,9 +104,8 @@ def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
     """
     if teeth < 2:
         raise ValueError(f"teeth={teeth}: a cutter of one tooth has no pitch to divide; pitches need two teeth or more")
-    unit = (
-        COARSE_PITCH_STEP_DEG if half_wave >= PITCH_STEPS_PER_HALF_WAVE * COARSE_PITCH_STEP_DEG else FINE_PITCH_STEP_DEG
-    )
+    is_coarse = half_wave >= PITCH_STEPS_PER_HALF_WAVE * COARSE_PITCH_STEP_DEG
+    unit = COARSE_PITCH_STEP_DEG if is_coarse else FINE_PITCH_STEP_DEG
     wanted = half_wave * np.arange(1, PITCH_STEPS_PER_HALF_WAVE * MAX_HALF_WAVES + 1) / PITCH_STEPS_PER_HALF_WAVE
     for block in (number for number in range(2, teeth + 1) if teeth % number == 0):
         for difference in np.unique(np.maximum(np.round(wanted / unit), 1)) * unit:

@@ -219,11 +219,9 @@ def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
     """
     first = diagrams[0]
     lowest, speed = np.argmin([diagram.depth for diagram in diagrams], axis=0), np.arange(first.speed_rpm.size)
-    width = max(diagram.crossings.shape[1] for diagram in diagrams)
-    crossings = [
-        np.pad(diagram.crossings, ((0, 0), (0, width - diagram.crossings.shape[1])), constant_values=np.inf)
-        for diagram in diagrams
-    ]
+    given = [diagram.crossings for diagram in diagrams]
+    width = max(crossing.shape[1] for crossing in given)
+    crossings = [np.pad(own, ((0, 0), (0, width - own.shape[1])), constant_values=np.inf) for own in given]
     columns = ("depth", "chatter_frequency", "kind")
     return replace(
         first,

@@ -7,7 +7,7 @@ and at least a quarter on both sides of its middle.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -161,16 +161,10 @@ def _finest_group_rows(
     name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind
 ) -> list[dict[str, str]]:
     """Return the rows of the finest group that has any."""
-    for group in (
-        f"VDI {material.vdi_3323_group}",
-        material.iso_group,
-        *([ANY_MATERIAL_GROUP] if material.iso_group else ()),
-    ):
-        rows = [
-            row
-            for row in read_table(name)
-            if group in row["of"].split(";") and tool in row["tool_material"].split(";") and cut == row["cut"]
-        ]
+    table = [row for row in read_table(name) if tool in row["tool_material"].split(";") and cut == row["cut"]]
+    any_group = [ANY_MATERIAL_GROUP] if material.iso_group else []
+    for group in (f"VDI {material.vdi_3323_group}", material.iso_group, *any_group):
+        rows = [row for row in table if group in row["of"].split(";")]
         if rows:
             return rows
     return []
@@ -180,16 +174,11 @@ def _feed_at_diameter(rows: Sequence[dict[str, str]], diameter: float) -> tuple[
     """Return the feeds (m) of one source at a diameter (m)."""
     if rows[0]["unit"] == "D":
         return float(rows[0]["low"]) * diameter, float(rows[0]["high"]) * diameter
-    points = sorted(point for row in rows for point in _diameter_points(row))
+    diameters = [(float(diameter), row) for row in rows for diameter in row["diameter_mm"].split("..")]
+    points = sorted((diameter, float(row["low"]), float(row["high"])) for diameter, row in diameters)
     at, low, high = np.array(points).T * 1e-3
     share = min(diameter / float(at[0]), 1.0)
     return float(np.interp(diameter, at, low)) * share, float(np.interp(diameter, at, high)) * share
-
-
-def _diameter_points(row: dict[str, str]) -> Iterator[tuple[float, float, float]]:
-    """Yield the diameters of a row (mm), each with smallest and largest feed (mm)."""
-    for diameter in row["diameter_mm"].split(".."):
-        yield float(diameter), float(row["low"]), float(row["high"])
 
 
 def _join_ranges(ranges: Sequence[tuple[float, float]], rows: Sequence[dict[str, str]]) -> PublishedRange | None:

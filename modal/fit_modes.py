@@ -335,9 +335,8 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
     """Return the modes of a band with their peak heights, rms over the decays."""
     enough = len(state.frfs) >= MIN_HITS_FOR_JACKKNIFE
-    modes = modes_from_band(
-        state, band, 0, _decay_covariance(band) if enough else None, len(state.frfs) if enough else 0
-    )
+    scatter, n_hits = (_decay_covariance(band), len(state.frfs)) if enough else (None, 0)
+    modes = modes_from_band(state, band, 0, scatter, n_hits)
     heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
     return list(zip(modes, heights.tolist(), strict=True))
 

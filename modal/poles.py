@@ -154,9 +154,8 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
     above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
     overlap = [b.values.conj().T @ part for b, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)]
     for order in range(1, orders + 1):
-        left = np.eye(order + 1) - sum(
-            part.conj().T @ part for part in (o[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for o in overlap)
-        )
+        parts = (full[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for full in overlap)
+        left = np.eye(order + 1) - sum(part.conj().T @ part for part in parts)
         poles = below.roots(np.linalg.eigh(left)[1][:, 0]) * model.half + model.middle
         poles = poles[_is_inside_band(model, poles)]
         yield poles, _flexibilities(model, above, poles)
@@ -188,10 +187,9 @@ def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> Integers:
     distance = np.abs(here[0][:, None] - below[0])
     nearest = np.argmin(distance, axis=1)
     change = np.linalg.norm(here[1] - below[1][nearest], axis=1)
-    same = (distance.min(axis=1) < POLE_TOLERANCE * here[0].imag) & (
-        change < FLEXIBILITY_TOLERANCE * np.linalg.norm(here[1], axis=1)
-    )
-    return np.where(same, nearest, -1)
+    is_near = distance.min(axis=1) < POLE_TOLERANCE * here[0].imag
+    is_alike = change < FLEXIBILITY_TOLERANCE * np.linalg.norm(here[1], axis=1)
+    return np.where(is_near & is_alike, nearest, -1)
 
 
 def _build_chart(orders: list[_OrderPoles], p: int) -> StabilisationChart:

@@ -181,6 +181,7 @@ def calibrate_damping(
     damped = _find_damping(dampers, start, damping_ratio)
     viscous = dampers.at(damped.amount).viscous
     mean, per_amount = float(np.mean(viscous[chosen])), float(np.mean(dampers.ratio[chosen]))
+    bearings = [replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
     return DampingCalibration(
         damping_ratio=damping_ratio,
         damping_ratio_std=damping_ratio_std,
@@ -192,9 +193,7 @@ def calibrate_damping(
         bearing_damping_std=None if damping_ratio_std is None else per_amount * damping_ratio_std / damped.slope,
         sensitivity=damped.slope * damped.amount,
         given=spindle,
-        spindle=replace(
-            spindle, bearings=[replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
-        ),
+        spindle=replace(spindle, bearings=bearings),
     )
 
 
@@ -232,14 +231,12 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
-    amount = _find_root(
-        lambda value: dampers.follow(low, value).mode.damping_ratio - target,
-        low.amount,
-        high.amount,
-        xtol=1e-15 * high.amount,
-        rtol=1e-13,
-    )
-    return dampers.follow(low, amount)
+
+    def excess(amount: float) -> float:
+        return dampers.follow(low, amount).mode.damping_ratio - target
+
+    root = _find_root(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
+    return dampers.follow(low, root)
 
 
 def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tuple[_DampingPoint, _DampingPoint]:

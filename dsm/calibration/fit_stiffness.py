@@ -184,6 +184,7 @@ def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan
     measured = problem.measured
     covariance = _covariance(problem, state)
     unsure = identifiability_remarks(problem, state, covariance, around)
+    checks = _collinear_group_remarks, _close_mode_remarks, _misfit_remarks
     return StiffnessFit(
         groups=problem.names,
         mode=measured.mode,
@@ -193,12 +194,7 @@ def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan
         factor=np.exp(state.log_factor),
         log_covariance=covariance,
         energy_share=state.share,
-        remarks=(
-            *unsure,
-            *_collinear_group_remarks(problem, state),
-            *_close_mode_remarks(problem, state),
-            *_misfit_remarks(problem, state),
-        ),
+        remarks=(*unsure, *(remark for check in checks for remark in check(problem, state))),
         shaft=measured.shaft,
         given=problem.spindles,
         spindles=state.spindles,
@@ -254,17 +250,12 @@ def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRe
     for number, frequency in enumerate(state.frequency):
         gap, numbers = np.diff(frequency) / frequency[1:], measured.mode[measured.shaft == number]
         where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
-        remarks += [
-            FitRemark(
-                "modes-exchange-shapes",
-                f"modes {low} and {low + 1}{where}",
-                f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: standard "
-                "errors hold for small changes only",
-                "check which of them was measured",
-            )
-            for low in range(1, frequency.size)
-            if gap[low - 1] < CLOSE_MODE_SHARE and np.any((numbers == low) | (numbers == low + 1))
-        ]
+        for low in range(1, frequency.size):
+            if gap[low - 1] < CLOSE_MODE_SHARE and np.any((numbers == low) | (numbers == low + 1)):
+                text = f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: "
+                text += "standard errors hold for small changes only"
+                pair, cure = f"modes {low} and {low + 1}{where}", "check which of them was measured"
+                remarks.append(FitRemark("modes-exchange-shapes", pair, text, cure))
     return remarks
 
 

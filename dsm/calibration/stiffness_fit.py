@@ -161,9 +161,8 @@ class StiffnessFit:
         if correlation is None or len(self.groups) == 1:
             return []
         pairs = zip(*np.triu_indices(len(self.groups), 1), strict=True)
-        return [
-            "correlation " + ", ".join(f"{self.groups[i]}-{self.groups[j]} {correlation[i, j]:.2f}" for i, j in pairs)
-        ]
+        texts = (f"{self.groups[i]}-{self.groups[j]} {correlation[i, j]:.2f}" for i, j in pairs)
+        return ["correlation " + ", ".join(texts)]
 
     def _mode_lines(self) -> list[str]:
         several = len(self.spindles) > 1
@@ -171,10 +170,8 @@ class StiffnessFit:
         lines = [f"{head}  measured, fitted less measured, share of each group in the strain energy"]
         for index, number in enumerate(self.mode):
             std = None if self.frequency_std is None else float(self.frequency_std[index])
-            shares = ", ".join(
-                f"{group} {100 * share:.1f} %"
-                for group, share in zip(self.groups, self.energy_share[index], strict=True)
-            )
+            energies = zip(self.groups, self.energy_share[index], strict=True)
+            shares = ", ".join(f"{group} {100 * share:.1f} %" for group, share in energies)
             measured = format_with_error(float(self.frequency[index]), std, unit="Hz", percent=True)
             place = f"{self.shaft[index] + 1:7d}, {number:4d}" if several else f"{number:4d}"
             lines.append(f"{place}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
@@ -182,9 +179,9 @@ class StiffnessFit:
 
     def _remark_lines(self) -> list[str]:
         chi = self.reduced_chi_square
-        lines = (
-            [] if chi is None else [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
-        )
+        lines = []
+        if chi is not None:
+            lines = [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
         return [*lines, *(f"warning: {remark}" for remark in self.remarks)]
 
 
@@ -278,9 +275,8 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
     squares = np.sum(np.square(changes), axis=0)
     if fit.tolerance > 0 and fit.frequency_std is not None:
         slope = (axes / sizes) @ changes / values
-        squares = squares + values**2 * _diameter_variance(
-            fit, _joint_diameter_effects(fit, fit.apply_to(spindle), of), slope
-        )
+        effects = _joint_diameter_effects(fit, fit.apply_to(spindle), of)
+        squares = squares + values**2 * _diameter_variance(fit, effects, slope)
     errors = np.sqrt(np.maximum(squares, 0.0)).tolist()
     return PredictedMode(float(values[0]), errors[0], float(values[1]), errors[1])
 

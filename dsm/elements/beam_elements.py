@@ -147,26 +147,21 @@ class Nodes(NamedTuple):
 
 
 def place_nodes(
-    shaft: Sections,
-    wanted: Sequence[float],
-    theory: Theory,
-    top_frequency: float,
-    spin: float | None,
-    links: bool = False,
+    shaft: Sections, wanted: Sequence[float], theory: Theory, top: float, spin: float | None, links: bool = False
 ) -> Nodes:
     """Place nodes at the ends of segments and the `wanted` places (m), and divide elements that are too long.
 
-    Too long for the series at `top_frequency` (Hz), or for the steepness of a cone; spin (rad/s) and links as in
+    Too long for the series at `top` (Hz), or for the steepness of a cone; spin (rad/s) and links as in
     assemble. Raises ValueError for a place off the shaft, ArithmeticError for too many elements.
     """
     nodes = _part_nodes(shaft, wanted)
     segment = shaft.segment_at((nodes[:-1] + nodes[1:]) / 2)
-    size = _element_size(shaft, segment, nodes, theory, top_frequency, spin)
+    size = _element_size(shaft, segment, nodes, theory, top, spin)
     longest = MAX_LINK_SHARE if links else 1.0
     parts = np.ceil(size / longest * (1 - 1e-12)).clip(1, MAX_SHAFT_ELEMENTS + 1).astype(int)
     if parts.sum() > MAX_SHAFT_ELEMENTS:
         raise ArithmeticError(
-            f"{top_frequency:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements: ask for lower frequencies and "
+            f"{top:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements: ask for lower frequencies and "
             "modes, and look for segments far too thin or soft, and for wrong units"
         )
     if parts.max() > 1:

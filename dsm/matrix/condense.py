@@ -89,14 +89,8 @@ def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes
     """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a free tip."""
     shape = near[0].shape
     a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
-    both = np.array(
-        [
-            [a, b, near[0], near[1]],
-            [b, d, near[2], near[3]],
-            [near[0], near[2], force[0], force[1]],
-            [near[1], near[3], force[1], force[2]],
-        ]
-    )
+    lower = [near[0], near[2], force[0], force[1]], [near[1], near[3], force[1], force[2]]
+    both = np.array([[a, b, near[0], near[1]], [b, d, near[2], near[3]], *lower])
     zero = np.zeros_like(a)
     right = np.array([[zero, zero], [zero, zero], [far[0], far[1]], [far[2], far[3]]])
     solved = np.linalg.solve(both.transpose(2, 0, 1), right.transpose(2, 0, 1)).transpose(1, 2, 0)

@@ -88,21 +88,16 @@ class DampedShaft:
     def matrices(self, damping: Damping, w: complex) -> tuple[Complexes, Complexes]:
         """Return K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
         at = np.array([w], dtype=np.complex128)
-        stiffness, by_w = (
-            full_matrices(*damped_blocks(self.model, self.spindle, at, damping, derivative))[0]
-            for derivative in (False, True)
-        )
+        blocks = (damped_blocks(self.model, self.spindle, at, damping, derivative) for derivative in (False, True))
+        stiffness, by_w = (full_matrices(*pair)[0] for pair in blocks)
         return stiffness, by_w
 
     def damper_sensitivity(self, damping: Damping, mode: DampedMode) -> Complexes:
         """Return dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
         bearings = self.spindle.bearings
         movable = [index for index, bearing in enumerate(bearings) if np.isfinite(bearing.stiffness)]
-        held = supports(
-            [bearings[index] for index in movable],
-            np.array([mode.w]),
-            Damping(damping.viscous[movable], damping.loss_factor),
-        )
+        damping = Damping(damping.viscous[movable], damping.loss_factor)
+        held = supports([bearings[index] for index in movable], np.array([mode.w]), damping)
         dof = [2 * self.model.node(bearings[index].position) for index in movable]
         change = np.zeros(len(bearings), dtype=np.complex128)
         change[movable] = -1j * mode.w * held.stiffness_slope[0] * mode.shape[dof] ** 2

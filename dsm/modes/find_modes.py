@@ -123,17 +123,11 @@ def _finite_element_start(
 
 @lru_cache(maxsize=4)
 def _modes_at_rest(
-    spindle: Spindle,
-    count: int,
-    top: float,
-    places: tuple[float, ...],
-    held: tuple[HeldDof, ...],
-    spin: float,
-    links: bool,
+    spindle: Spindle, n: int, top: float, places: tuple[float, ...], held: tuple[HeldDof, ...], spin: float, links: bool
 ) -> tuple[Floats, Floats]:
     """Return the start values for all speeds that share nodes with `spin`."""
     model = assemble(spindle, top, places, held, spin=spin, links=links)
-    return finite_element_modes(model, min(count, int(np.count_nonzero(~model.held[~model.is_link]))))
+    return finite_element_modes(model, min(n, int(np.count_nonzero(~model.held[~model.is_link]))))
 
 
 @lru_cache(maxsize=32)

@@ -46,9 +46,8 @@ def evaluate_between_nodes(
     start, end = position[left], position[left + 1]
     segment = shaft.segment_at((start + end) / 2)
     powers = np.vander((2 * np.pi * frequency) ** 2, count_series_terms(apart=False), increasing=True)
-    whole, part = (
-        np.moveaxis(transfer_series(shaft, theory, segment, start, to) @ powers.T, 3, 0) for to in (end, places)
-    )
+    transfer = (transfer_series(shaft, theory, segment, start, to) for to in (end, places))
+    whole, part = (np.moveaxis(series @ powers.T, 3, 0) for series in transfer)
     near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
     strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]
     forces = np.linalg.solve(whole[..., :2, 2:], strain)
@@ -119,16 +118,9 @@ class Modes:
         deflection, slope = self.deflection[:, node], self.slope[:, node]
         inside = np.minimum(from_left, from_right) > slack
         if np.any(inside):
-            shape = self.deflection, self.slope
-            state = evaluate_between_nodes(
-                sections(self.spindle),
-                self.spindle.theory,
-                self.frequency,
-                self.position,
-                shape,
-                places[inside],
-                left[inside],
-            )
+            nodes = self.frequency, self.position, (self.deflection, self.slope)
+            shaft, theory = sections(self.spindle), self.spindle.theory
+            state = evaluate_between_nodes(shaft, theory, *nodes, places[inside], left[inside])
             deflection[:, inside], slope[:, inside] = state.deflection, state.slope
         return replace(self, position=places, deflection=deflection, slope=slope)
 

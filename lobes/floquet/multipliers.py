@@ -93,22 +93,17 @@ def spectral_radii(
 
 
 def _largest_in_batches(
-    rows: MillingRows,
-    depth: Floats,
-    numbers: Integers,
-    tolerance: float,
-    kind: type[np.floating[Any]],
-    ritz: RitzFunction,
+    rows: MillingRows, depth: Floats, numbers: Integers, tol: float, kind: type[np.floating[Any]], ritz: RitzFunction
 ) -> Complexes:
     """Compute values of the largest multipliers (r, d) in batches."""
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
         flat = np.repeat(np.arange(len(rows)), depth.shape[1])
-        found = _largest_in_batches(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance, kind, ritz)
+        found = _largest_in_batches(rows[flat], depth.reshape(-1, 1), numbers[flat], tol, kind, ritz)
         return found.reshape(depth.shape)
     multipliers = np.empty(depth.shape, dtype=np.complex128)
     for which, pieces in _equal_division_groups(rows, depth, numbers):
         over_period = build_period_map(rows[which], depth[which], pieces, kind)
-        multipliers[which] = _arnoldi_multipliers(rows[which], depth[which], over_period, tolerance, ritz)
+        multipliers[which] = _arnoldi_multipliers(rows[which], depth[which], over_period, tol, ritz)
     return multipliers
 
 
@@ -177,7 +172,7 @@ class _KrylovSpace:
     def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
         """Select c of the cases, as (c, 1)."""
         basis, matrix = self.basis[which], self.matrix[which]
-        return _KrylovSpace(self.over_period[*which], basis[:, np.newaxis], matrix[:, np.newaxis])
+        return _KrylovSpace(self.over_period[which[0], which[1]], basis[:, np.newaxis], matrix[:, np.newaxis])
 
     def grown(self, vectors: int) -> _KrylovSpace:
         """Return the spaces with so many vectors, at most the number of states."""

@@ -152,10 +152,8 @@ def _locate_angles(angle: Floats, starts: Floats, lengths: Floats) -> list[tuple
     within = np.clip((angle - starts[rows, piece]) / lengths[rows, piece], 0.0, 1.0)
     own = np.swapaxes(interpolation_weights(within), 2, 3)
     first, last = np.min(piece, axis=(0, 2)), np.max(piece, axis=(0, 2)) + 1
-    return [
-        (int(a), int(b), _spread_weights(own[:, k], piece[:, k] - a, b - a))
-        for k, (a, b) in enumerate(zip(first, last, strict=True))
-    ]
+    ranges = enumerate(zip(first, last, strict=True))
+    return [(int(a), int(b), _spread_weights(own[:, k], piece[:, k] - a, b - a)) for k, (a, b) in ranges]
 
 
 def _spread_weights(own: Floats, piece: Indices, number: int) -> Floats:

@@ -134,22 +134,16 @@ class PieceResponse:
             forced = of_place * forced + of_velocity * tx
         pushes = (give[..., np.newaxis] * _weighted_sums(of, weights) for of in (tx, x))
         at_begin, at_ones = begin @ nodes.weight, ones @ nodes.weight
-        return cls(
-            end_state=_block_matrix(
-                1 - theta**2 * _weighted_sums(x, at_begin),
-                theta * _weighted_sums(x, at_ones),
-                theta**2 * _weighted_sums(both, at_begin) - theta,
-                1 - theta * _weighted_sums(both, at_ones),
-            ),
-            node_displacement=_tip_displacements(rows, place),
-            node_flexibility=_weighted_sums(
-                np.einsum("rnk,rnp,rnq->rpqk", forced / rows.stiffness[..., np.newaxis], rows.vector, rows.vector),
-                nodes.share,
-            ),
-            end_state_per_force=np.concatenate(
-                [np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1
-            ),
+        end_state = _block_matrix(
+            1 - theta**2 * _weighted_sums(x, at_begin),
+            theta * _weighted_sums(x, at_ones),
+            theta**2 * _weighted_sums(both, at_begin) - theta,
+            1 - theta * _weighted_sums(both, at_ones),
         )
+        flexible = forced / rows.stiffness[..., np.newaxis]
+        flexible = np.einsum("rnk,rnp,rnq->rpqk", flexible, rows.vector, rows.vector)
+        per_force = np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1)
+        return cls(end_state, _tip_displacements(rows, place), _weighted_sums(flexible, nodes.share), per_force)
 
     def as_precision(self, kind: type[np.floating[Any]]) -> PieceResponse:
         """Return the response with numbers of another precision."""

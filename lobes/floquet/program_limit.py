@@ -101,9 +101,8 @@ def program_limit(
     chatter, kind = np.array([np.nan]), np.array([""])
     if np.isfinite(crossing[worst]):
         here = slice(worst, worst + 1)
-        chatter, kind = chatter_at_limits(
-            system, _program_rows(system, program, [cuts[worst]]), crossing[here], number[here]
-        )
+        row = _program_rows(system, program, [cuts[worst]])
+        chatter, kind = chatter_at_limits(system, row, crossing[here], number[here])
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),

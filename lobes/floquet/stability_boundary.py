@@ -38,7 +38,8 @@ def loudest_chatter_frequency(system: MillingSystem, cut: Cut, mu: Complexes, de
     harmonics = waves + np.arange(-reach, reach + 1)
     frequency = harmonics * base[:, np.newaxis]
     receptance = -depth[:, np.newaxis, np.newaxis, np.newaxis] * system.receptance(frequency)
-    regenerated = 1 - np.exp(-2j * np.pi * harmonics[..., np.newaxis] * _relative_delays(cut))
+    delays = np.array(cut.delays) / sum(cut.pitch_pattern)
+    regenerated = 1 - np.exp(-2j * np.pi * harmonics[..., np.newaxis] * delays)
     forces = np.einsum("gklpq,nlg->nkplq", _force_harmonics(system, cut, harmonics.shape[1]), regenerated)
     balance = np.einsum("gkpr,gkrlq->gkplq", receptance, forces)
     size = harmonics.shape[1] * system.axes.size
@@ -61,11 +62,6 @@ def _nearest_to_mean_force_loop(system: MillingSystem, cut: Cut, mu: Complexes, 
     loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * (force @ receptance)
     best = np.argmin(np.abs(np.linalg.det(loop)), axis=1)[:, np.newaxis]
     return np.take_along_axis(waves, best, axis=1)[:, 0]
-
-
-def _relative_delays(cut: Cut) -> Floats:
-    """Return the delays over the time after which the cut repeats, shape (delays,)."""
-    return np.array(cut.delays) / sum(cut.pitch_pattern)
 
 
 def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,38 +67,30 @@ def element_section(spindle: Spindle) -> NumberGroup:
     """Return the numbers of the element: of the segments of a round shaft, and of a cantilever that is not round."""
     segments, frequency = list(_spinning_segments(spindle)), printed.FREQUENCY
     root_error = max(_root_error(segment) for segment in segments)
-    error, critical_error = (
-        max(_element_error(segment, frequency, speed) for segment in segments)
-        for speed in (ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6))
-    )
-    at_rest, at_speed = (
-        "exists" if np.all(np.isfinite(printed_element(segments[0], frequency, speed))) else "does not exist"
-        for speed in (0.0, 60 * frequency)
-    )
+    speeds = ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6)
+    error, critical_error = (max(_element_error(segment, frequency, speed) for segment in segments) for speed in speeds)
+    singular = (printed_element(segments[0], frequency, speed) for speed in (0.0, 60 * frequency))
+    at_rest, at_speed = ("exists" if np.all(np.isfinite(k)) else "does not exist" for k in singular)
     as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
     asymmetry = float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed)))
     right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
     solver = "against an eigenvalue solver, 26 segments at 1722 Hz: right as printed"
-    rounding = (
-        f"signs put right, 26 segments, {ELEMENT_SPEED_RPM:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
-    )
+    rpm = ELEMENT_SPEED_RPM
+    rounding = f"signs put right, 26 segments, {rpm:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
     near = f"1e-6 beside the speed of 1722 Hz; where both are equal A B^-1 {at_speed}, ours does"
     shapes = f"a cantilever that is not round; {right[0]:.5f} with the right sign: shapes alone are changed"
     symmetric = "in its largest entry: end forces have one sign as printed; with the right ones K is symmetric"
     highest = f"{ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s"
     none = f"assembled as printed, that cantilever has so many frequencies below {highest}; right are {len(right)}"
-    return NumberGroup(
-        "The spinning element: eqs. (5) and (13) to (25)",
-        (),
-        (
-            Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
-            Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),
-            Comparison("the same next to w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
-            Comparison("first root with the sign of (5)", "(5)", None, other[0], "rad/s", 6, shapes),
-            Comparison("K less its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
-            Comparison("roots with the signs of (23)", "(23)", None, len(wrong), "", 1, none),
-        ),
+    numbers = (
+        Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
+        Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),
+        Comparison("the same next to w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
+        Comparison("first root with the sign of (5)", "(5)", None, other[0], "rad/s", 6, shapes),
+        Comparison("K less its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
+        Comparison("roots with the signs of (23)", "(23)", None, len(wrong), "", 1, none),
     )
+    return NumberGroup("The spinning element: eqs. (5) and (13) to (25)", (), numbers)
 
 
 def _spinning_segments(spindle: Spindle) -> Iterator[SpinningSegment]:
@@ -118,12 +111,8 @@ def _element_error(segment: SpinningSegment, frequency: float, speed_rpm: float)
 def _root_error(segment: SpinningSegment) -> float:
     w, spin = 2 * np.pi * printed.FREQUENCY, ELEMENT_SPEED_RPM * np.pi / 30
     same, other = segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin
-    pencil = np.array(
-        [
-            [same / segment.rigidity_yy, other / segment.rigidity_yy],
-            [other / segment.rigidity_xx, same / segment.rigidity_xx],
-        ]
-    )
+    xx, yy = segment.rigidity_xx, segment.rigidity_yy
+    pencil = np.array([[same / yy, other / yy], [other / xx, same / xx]])
     exact = np.sort(np.linalg.eigvals(pencil).real)[::-1]
     return float(np.max(np.abs(fourth_powers(segment, printed.FREQUENCY, ELEMENT_SPEED_RPM) / exact - 1)))
 
@@ -140,10 +129,5 @@ def _cantilever_roots(coupling: float, one_sign: bool) -> list[float]:
         sign, size = np.linalg.slogdet(whole[4:, 4:])
         return float(sign * np.exp(size / 8))
 
-    values = [determinant(w) for w in ROOT_SCAN_FREQUENCIES]
-    pairs = [
-        (a, b)
-        for a, b, x, y in zip(ROOT_SCAN_FREQUENCIES, ROOT_SCAN_FREQUENCIES[1:], values, values[1:], strict=False)
-        if x * y < 0
-    ]
-    return [float(brentq(determinant, a, b, xtol=1e-12)) for a, b in pairs]
+    points = pairwise((w, determinant(w)) for w in ROOT_SCAN_FREQUENCIES)
+    return [float(brentq(determinant, a, b, xtol=1e-12)) for (a, x), (b, y) in points if x * y < 0]

@@ -58,14 +58,8 @@ def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
     area, moment = np.pi * (outer**2 - bore**2) / 4, np.pi * (outer**4 - bore**4) / 64
     steel = spindle.material
     ratio = steel.youngs_modulus / (2 * steel.shear_modulus) - 1
-    section = np.array(
-        [
-            steel.youngs_modulus * moment,
-            _cowper(ratio, bore / outer) * steel.shear_modulus * area,
-            steel.density * area,
-            steel.density * moment,
-        ]
-    )
+    shear = _cowper(ratio, bore / outer) * steel.shear_modulus * area
+    section = np.array([steel.youngs_modulus * moment, shear, steel.density * area, steel.density * moment])
     return np.repeat(length / count, count), np.repeat(section, count, axis=1)
 
 
@@ -112,14 +106,8 @@ def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tu
             length * (x**3 - x**2 - softness * bump / 2),
         ]
     )
-    rotation = np.array(
-        [
-            -6 * bump / length,
-            1 - 4 * x + 3 * x**2 + softness * (1 - x),
-            6 * bump / length,
-            3 * x**2 - 2 * x + softness * x,
-        ]
-    )
+    ends = 1 - 4 * x + 3 * x**2 + softness * (1 - x), 3 * x**2 - 2 * x + softness * x
+    rotation = np.array([-6 * bump / length, ends[0], 6 * bump / length, ends[1]])
     return deflection / (1 + softness), rotation / (1 + softness)
 
 
@@ -130,9 +118,8 @@ def _strains(x: float, length: Floats, softness: Floats, kind: ElementKind) -> t
         rotation = _shapes(x, length, softness, kind)[1]
         return np.array([none, -one, none, one]) / length, np.array([-one, none, one, none]) / length - rotation
     turn = 1 - 2 * x
-    curvature = np.array([-6 * turn / length, 6 * x - 4 - softness, 6 * turn / length, 6 * x - 2 + softness]) / (
-        length * (1 + softness)
-    )
+    bend = [-6 * turn / length, 6 * x - 4 - softness, 6 * turn / length, 6 * x - 2 + softness]
+    curvature = np.array(bend) / (length * (1 + softness))
     slide = softness / (1 + softness) * np.array([-1 / length, -one / 2, 1 / length, -one / 2])
     return curvature, slide
 
@@ -176,17 +163,12 @@ class FiniteElementStudy:
 def study_meshes(plain: Spindle, shear: Spindle, exact: tuple[float, float]) -> FiniteElementStudy:
     """Compare elements with the exact first frequency (Hz) by Euler-Bernoulli (plain) and Timoshenko theory (shear)."""
     exacts: Mapping[ElementKind, float] = {"euler-bernoulli": exact[0], "timoshenko": exact[1], "linear": exact[1]}
-    return FiniteElementStudy(
-        exacts,
-        {
-            kind: tuple(
-                first_frequency(plain if kind == "euler-bernoulli" else shear, count, kind, "rigid")
-                for count in ELEMENT_COUNTS
-            )
-            for kind in exacts
-        },
-        first_frequency(shear, printed.FEM_ELEMENTS, "timoshenko", "clamped"),
-    )
+    frequencies = {}
+    for kind in exacts:
+        spindle = plain if kind == "euler-bernoulli" else shear
+        frequencies[kind] = tuple(first_frequency(spindle, count, kind, "rigid") for count in ELEMENT_COUNTS)
+    clamped = first_frequency(shear, printed.FEM_ELEMENTS, "timoshenko", "clamped")
+    return FiniteElementStudy(exacts, frequencies, clamped)
 
 
 def mesh_section(study: FiniteElementStudy) -> NumberGroup:
@@ -200,14 +182,11 @@ def mesh_section(study: FiniteElementStudy) -> NumberGroup:
     apart = f"as many, {off['euler-bernoulli']}: by a code that shares nothing with the model"
     name = f"{printed.FEM_ELEMENTS} elements"
     held = "clamped in all bearings, the stiffest way to hold it: still below"
-    return NumberGroup(
-        "Finite elements, rigid bearings",
-        ("convergence",),
-        (
-            Comparison(f"f_1, {name}", "", printed.FEM_FREQUENCY, straight, "Hz", 6, mesh),
-            Comparison("it is above f_1 of the model by", "", above, ours, "%", 3, softer),
-            Comparison("f_1, cubics without shear", "", None, plain, "Hz", 7, apart),
-            Comparison("f_1, cubics with shear", "", None, cubic, "Hz", 7, f"as many, {off['timoshenko']}"),
-            Comparison("the same, slopes held too", "", None, study.clamped, "Hz", 6, held),
-        ),
+    numbers = (
+        Comparison(f"f_1, {name}", "", printed.FEM_FREQUENCY, straight, "Hz", 6, mesh),
+        Comparison("it is above f_1 of the model by", "", above, ours, "%", 3, softer),
+        Comparison("f_1, cubics without shear", "", None, plain, "Hz", 7, apart),
+        Comparison("f_1, cubics with shear", "", None, cubic, "Hz", 7, f"as many, {off['timoshenko']}"),
+        Comparison("the same, slopes held too", "", None, study.clamped, "Hz", 6, held),
     )
+    return NumberGroup("Finite elements, rigid bearings", ("convergence",), numbers)

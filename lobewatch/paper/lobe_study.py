@@ -71,12 +71,9 @@ def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -
         average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM)
         for tip in ([measured], [aged[0]], [aged[1]], first, modes)
     )
-    wide = (
-        zero_order_lobes(first, first, STUDY_CUT, LOBE_SPEEDS_RPM),
-        zero_order_lobes(modes, modes, STUDY_CUT, LOBE_SPEEDS_RPM),
-    )
+    narrow, full = (zero_order_lobes(tip, tip, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in (first, modes))
     masses = (_modal_mass(measured), _modal_mass(aged[0]), _modal_mass(aged[1]))
-    return LobeStudy(new, by_rule, by_model, one_mode, six_modes, wide, masses)
+    return LobeStudy(new, by_rule, by_model, one_mode, six_modes, (narrow, full), masses)
 
 
 def _modal_mass(mode: Mode) -> float:
@@ -85,11 +82,8 @@ def _modal_mass(mode: Mode) -> float:
 
 def lobe_section(study: LobeStudy) -> NumberGroup:
     """Return the numbers of the lobes."""
-    return NumberGroup(
-        "Stability lobes, new and old: Fig. 10",
-        ("fig-10",),
-        (*_limit_numbers(study), *_pocket_numbers(study), *_further_numbers(study)),
-    )
+    numbers = (*_limit_numbers(study), *_pocket_numbers(study), *_further_numbers(study))
+    return NumberGroup("Stability lobes, new and old: Fig. 10", ("fig-10",), numbers)
 
 
 def _limit_numbers(study: LobeStudy) -> list[Comparison]:

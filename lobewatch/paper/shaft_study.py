@@ -68,27 +68,21 @@ def study_shaft(theory: Theory) -> ShaftStudy:
     frequency = np.linspace(0.13, 0.9985, STIFFNESS_CURVE_POINTS) * highest
     turning = dsm.whirl_map(new.spindle, np.array([OPERATING_SPEED_RPM]), 1)
     old = surrogate_spindle(printed.OLD_BEARING_STIFFNESS, theory)
-    return ShaftStudy(
-        rigid,
-        highest,
-        (float(dsm.natural_frequencies(shaft, 1)[0]), float(dsm.natural_frequencies(old, 1)[0])),
-        new,
-        dsm.calibrate(new.spindle, printed.OLD_FREQUENCY),
-        (dsm.critical_speed(rigid), dsm.critical_speed(new.spindle)),
-        (dsm.stiffness_curve(shaft, frequency), frequency),
-        dsm.whirl_map(rigid, WHIRL_SPEEDS_RPM, 1),
-        dsm.whirl_map(new.spindle, WHIRL_SPEEDS_RPM, 1),
-        (float(turning.backward[0, 0]), float(turning.forward[0, 0])),
-    )
+    frequencies = float(dsm.natural_frequencies(shaft, 1)[0]), float(dsm.natural_frequencies(old, 1)[0])
+    dropped = dsm.calibrate(new.spindle, printed.OLD_FREQUENCY)
+    speeds = dsm.critical_speed(rigid), dsm.critical_speed(new.spindle)
+    curve = dsm.stiffness_curve(shaft, frequency), frequency
+    rigid_whirl, whirl = (dsm.whirl_map(spindle, WHIRL_SPEEDS_RPM, 1) for spindle in (rigid, new.spindle))
+    at_speed = float(turning.backward[0, 0]), float(turning.forward[0, 0])
+    return ShaftStudy(rigid, highest, frequencies, new, dropped, speeds, curve, rigid_whirl, whirl, at_speed)
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
     """Return the numbers at rest and of the spinning spindle; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    at_rest, spinning = tuple(_numbers_at_rest(plain, shear)), tuple(_spinning_numbers(plain, shear))
     return (
-        NumberGroup(
-            "The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_numbers_at_rest(plain, shear))
-        ),
-        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), tuple(_spinning_numbers(plain, shear))),
+        NumberGroup("The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), at_rest),
+        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), spinning),
     )
 
 
@@ -133,16 +127,9 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     for i, (name, where, value, exact) in enumerate(pairs):
         off = format_share(value / exact - 1, "+")
         reason = lifted if i else f"{lifted}, shear and rotary inertia lower f_1 more"
+        text = f"exact is 60 f_1, {exact:.0f} rpm with the paper's: {off} off, as if read in the figure"
         rows += [
-            Comparison(
-                name,
-                where,
-                value,
-                plain.critical_speeds[i],
-                "rpm",
-                6,
-                f"exact is 60 f_1, {exact:.0f} rpm with the paper's: {off} off, as if read in the figure",
-            ),
+            Comparison(name, where, value, plain.critical_speeds[i], "rpm", 6, text),
             Comparison("the same with shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
         ]
     seen = "seen from the housing: spin changes the view from the shaft alone"
@@ -172,11 +159,8 @@ def study_stiffness(old: Calibration) -> StiffnessStudy:
     """Study the tip stiffness from the bearings calibrated to the frequency before and after the drop."""
     pair = (old.given, printed.FREQUENCY), (old.spindle, printed.OLD_FREQUENCY)
     before, after = (dsm.static_stiffness(spindle, linearized_at=frequency) for spindle, frequency in pair)
-    return StiffnessStudy(
-        (old.static_stiffness_before, old.static_stiffness_after),
-        (before, after),
-        (old.modal_stiffness_before, old.modal_stiffness_after),
-    )
+    static = old.static_stiffness_before, old.static_stiffness_after
+    return StiffnessStudy(static, (before, after), (old.modal_stiffness_before, old.modal_stiffness_after))
 
 
 def stiffness_section(study: StiffnessStudy) -> NumberGroup:
@@ -191,16 +175,13 @@ def stiffness_section(study: StiffnessStudy) -> NumberGroup:
     exact = "term 0 of the dynamic stiffness, exact"
     part = "by (30) to (36) at both frequencies: the bearings are a part of the softness only"
     shown = "what an FRF shows and the lobes need: it hardly falls"
-    return NumberGroup(
-        "Tip stiffness of the old spindle: eqs. (30) to (36)",
-        (),
-        (
-            Comparison("f_1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
-            Comparison("K_theo by the rule 0.9 K_exp", "(36)", old, 0.9 * printed.STIFFNESS, "N/m", 6, rule),
-            Comparison("K_theo by (30) to (36)", "(36)", old, study.linearized[1], "N/m", 5, cost),
-            Comparison("K static, new", "(35)", None, study.static[0], "N/m", 5, exact),
-            Comparison("K static, old", "(35)", None, study.static[1], "N/m", 5, exact),
-            Comparison("K static, old over new", "(36)", ratio, static, "-", 4, part),
-            Comparison("K of mode 1, old over new", "", ratio, modal, "-", 4, shown),
-        ),
+    numbers = (
+        Comparison("f_1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
+        Comparison("K_theo by the rule 0.9 K_exp", "(36)", old, 0.9 * printed.STIFFNESS, "N/m", 6, rule),
+        Comparison("K_theo by (30) to (36)", "(36)", old, study.linearized[1], "N/m", 5, cost),
+        Comparison("K static, new", "(35)", None, study.static[0], "N/m", 5, exact),
+        Comparison("K static, old", "(35)", None, study.static[1], "N/m", 5, exact),
+        Comparison("K static, old over new", "(36)", ratio, static, "-", 4, part),
+        Comparison("K of mode 1, old over new", "", ratio, modal, "-", 4, shown),
     )
+    return NumberGroup("Tip stiffness of the old spindle: eqs. (30) to (36)", (), numbers)

@@ -25,13 +25,8 @@ def evaluate_claims(
     plain: ShaftStudy, shear: ShaftStudy, meshes: FiniteElementStudy, stiffness: StiffnessStudy, lobes: LobeStudy
 ) -> tuple[Claim, ...]:
     """Evaluate the claims in the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
-    return (
-        _validation_claim(meshes),
-        *_bearing_claims(plain, shear),
-        _spin_claim(shear),
-        *_decay_claims(stiffness, lobes),
-        _mode_claim(lobes),
-    )
+    of_shaft = _validation_claim(meshes), *_bearing_claims(plain, shear), _spin_claim(shear)
+    return (*of_shaft, *_decay_claims(stiffness, lobes), _mode_claim(lobes))
 
 
 def _validation_claim(meshes: FiniteElementStudy) -> Claim:
@@ -131,15 +126,8 @@ class PaperStudy:
     def sections(self) -> tuple[NumberGroup, ...]:
         """Every number of the paper with ours, in the order of the paper."""
         at_rest, spinning = shaft_sections(self.plain, self.shear)
-        return (
-            self.element,
-            at_rest,
-            mesh_section(self.meshes),
-            spinning,
-            tap_section(self.tap),
-            stiffness_section(self.stiffness),
-            lobe_section(self.lobes),
-        )
+        of_shaft = self.element, at_rest, mesh_section(self.meshes), spinning
+        return (*of_shaft, tap_section(self.tap), stiffness_section(self.stiffness), lobe_section(self.lobes))
 
     @property
     def claims(self) -> tuple[Claim, ...]:

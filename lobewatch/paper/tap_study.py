@@ -41,9 +41,8 @@ def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[
     structure = Structure(values[:, 0], values[:, 1], values[:, 2])
     for seed in range(tests):
         signal = HammeredStructure(structure, EMULATED_TAP_RATE, np.random.default_rng(seed), Hammering())
-        source = SimulatedSource(
-            signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
-        )
+        n_samples = int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
+        source = SimulatedSource(signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, n_samples)
         source.start()
         good = (hit for hit in capture_hits(source, EMULATED_TAP_TRIGGER) if not check_hit(hit))
         yield estimate_frf(list(islice(good, hits)))
@@ -108,18 +107,9 @@ def study_tap(spindle: Spindle) -> TapStudy:
     frf, other = synthesize_frf([measured], TAP_FREQUENCY_LINES), synthesize_frf(modes, TAP_FREQUENCY_LINES)
     taps = list(emulate_taps(modes, EMULATED_TESTS))
     picked, fitted = ([_nearest_mode(method(tap, TAP_BAND)) for tap in taps] for method in (pick_peaks, fit_modes))
-    return TapStudy(
-        measured,
-        frf,
-        pick_peaks(frf)[0],
-        fit_modes(frf)[0],
-        modes,
-        other,
-        pick_peaks(other)[0],
-        taps[0],
-        _relative_scatter(picked, modes[0]),
-        _relative_scatter(fitted, modes[0]),
-    )
+    scatter = _relative_scatter(picked, modes[0]), _relative_scatter(fitted, modes[0])
+    of_paper = measured, frf, pick_peaks(frf)[0], fit_modes(frf)[0]
+    return TapStudy(*of_paper, modes, other, pick_peaks(other)[0], taps[0], *scatter)
 
 
 def _nearest_mode(modes: Sequence[Mode]) -> Mode:
@@ -149,23 +139,20 @@ def tap_section(study: TapStudy) -> NumberGroup:
     often = f"rms over {EMULATED_TESTS} emulated tap tests of ten hits, against the truth"
     rest = f"{often}: picking takes three lines, 4 Hz apart, for all"
     (zeta_picked, k_picked), (zeta_fitted, k_fitted) = study.scatter_picked, study.scatter_fitted
-    return NumberGroup(
-        "The tap test: Figs. 5 and 6, eqs. (28) and (29)",
-        ("fig-5", "fig-6"),
-        (
-            Comparison("f_1", "Fig. 5, 6", printed.FREQUENCY, fitted.frequency, "Hz", 6, "the same mode, fitted"),
-            Comparison("omega_A", "(28)", None, below, "Hz", 6, closed),
-            Comparison("omega_B", "(28)", None, above, "Hz", 6, closed),
-            Comparison("zeta, picked", "(28)", zeta, picked.damping_ratio, "-", 5, high),
-            Comparison("zeta, fitted", "", zeta, fitted.damping_ratio, "-", 5, exact),
-            Comparison("D = Im G(f_1)", "(29)", None, study.depth, "m/N", 5, closed),
-            Comparison("K_exp, picked", "(29)", stiffness, picked.stiffness, "N/m", 5, low),
-            Comparison("K_exp, fitted", "", stiffness, fitted.stiffness, "N/m", 5, exact),
-            Comparison("K of the surrogate's mode 1", "", stiffness, model.stiffness, "N/m", 5, other),
-            Comparison("the same, picked", "(29)", None, study.surrogate_picked.stiffness, "N/m", 5, tails),
-            Comparison("error of zeta, picked", "(28)", None, 100 * zeta_picked, "%", 2, rest),
-            Comparison("error of zeta, fitted", "", None, 100 * zeta_fitted, "%", 2, often),
-            Comparison("error of K, picked", "(29)", None, 100 * k_picked, "%", 2, rest),
-            Comparison("error of K, fitted", "", None, 100 * k_fitted, "%", 2, often),
-        ),
+    numbers = (
+        Comparison("f_1", "Fig. 5, 6", printed.FREQUENCY, fitted.frequency, "Hz", 6, "the same mode, fitted"),
+        Comparison("omega_A", "(28)", None, below, "Hz", 6, closed),
+        Comparison("omega_B", "(28)", None, above, "Hz", 6, closed),
+        Comparison("zeta, picked", "(28)", zeta, picked.damping_ratio, "-", 5, high),
+        Comparison("zeta, fitted", "", zeta, fitted.damping_ratio, "-", 5, exact),
+        Comparison("D = Im G(f_1)", "(29)", None, study.depth, "m/N", 5, closed),
+        Comparison("K_exp, picked", "(29)", stiffness, picked.stiffness, "N/m", 5, low),
+        Comparison("K_exp, fitted", "", stiffness, fitted.stiffness, "N/m", 5, exact),
+        Comparison("K of the surrogate's mode 1", "", stiffness, model.stiffness, "N/m", 5, other),
+        Comparison("the same, picked", "(29)", None, study.surrogate_picked.stiffness, "N/m", 5, tails),
+        Comparison("error of zeta, picked", "(28)", None, 100 * zeta_picked, "%", 2, rest),
+        Comparison("error of zeta, fitted", "", None, 100 * zeta_fitted, "%", 2, often),
+        Comparison("error of K, picked", "(29)", None, 100 * k_picked, "%", 2, rest),
+        Comparison("error of K, fitted", "", None, 100 * k_fitted, "%", 2, often),
     )
+    return NumberGroup("The tap test: Figs. 5 and 6, eqs. (28) and (29)", ("fig-5", "fig-6"), numbers)

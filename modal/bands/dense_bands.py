@@ -59,10 +59,8 @@ def _is_well_determined(band: FittedBand) -> bool:
     more, fit = systematic_error(band), band.fit
     error = np.sqrt(np.diag(more.factor * fit.covariance + more.covariance)).reshape(-1, fit.frequency.size)
     sizes = error[2 : 2 + len(fit.constant)] / np.abs(fit.constant)
-    return bool(
-        np.all(error[1] < MAX_HIDDEN_MODE_ERROR * fit.damping_ratio)
-        and np.all(np.any(sizes < MAX_HIDDEN_MODE_ERROR, axis=0))
-    )
+    is_certain = np.any(sizes < MAX_HIDDEN_MODE_ERROR, axis=0)
+    return bool(np.all(is_certain & (error[1] < MAX_HIDDEN_MODE_ERROR * fit.damping_ratio)))
 
 
 def _trial_modes(band: FittedBand, split: bool) -> Iterator[Floats]:

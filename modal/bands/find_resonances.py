@@ -191,9 +191,8 @@ def _has_deep_valleys(size: Floats, tops: Indices) -> Flags:
     if tops.size < 2:
         return np.ones(tops.size, dtype=bool)
     height = size[tops]
-    valley = np.minimum.reduceat(size, tops)[:-1] > np.minimum(height[1:], height[:-1]) * 10 ** (
-        -MIN_PEAK_PROMINENCE_DB / 20
-    )
+    limit = np.minimum(height[1:], height[:-1]) * 10 ** (-MIN_PEAK_PROMINENCE_DB / 20)
+    valley = np.minimum.reduceat(size, tops)[:-1] > limit
     shallow = np.zeros(tops.size, dtype=bool)
     shallow[1:] |= valley & (height[:-1] > height[1:])
     shallow[:-1] |= valley & (height[1:] > height[:-1])

@@ -160,9 +160,8 @@ def _residual_share(fit: BandFit, data: BandData) -> float:
 
 def _better_fit(a: tuple[BandFit, Floats] | None, b: tuple[BandFit, Floats] | None) -> tuple[BandFit, Floats] | None:
     """Return the fit with more modes, or with the smaller residual."""
-    return max(
-        (fit for fit in (a, b) if fit is not None), key=lambda fit: (fit[1].size, -fit[0].sum_of_squares), default=None
-    )
+    fits = [fit for fit in (a, b) if fit is not None]
+    return max(fits, key=lambda fit: (fit[1].size, -fit[0].sum_of_squares), default=None)
 
 
 def _fit_valid_modes(data: BandData, starts: Floats, height: Floats, terms: int) -> tuple[BandFit, Floats] | None:
@@ -197,9 +196,8 @@ def iterate_bands(state: Extraction) -> Extraction:
 def _refit_changed_band(state: Extraction, band: FittedBand) -> FittedBand | None:
     """Fit a band to the data without the modes of all others; return it as it is if that has not changed."""
     data = state.data(band.lines, without=band)
-    return (
-        band if np.array_equal(data.weight, band.data.weight) and _has_converged(band, data) else refit_band(band, data)
-    )
+    has_same_weight = np.array_equal(data.weight, band.data.weight)
+    return band if has_same_weight and _has_converged(band, data) else refit_band(band, data)
 
 
 def _has_converged(band: FittedBand, data: BandData) -> bool:

@@ -93,11 +93,8 @@ def remove_drift(frf: Frf) -> Frf:
     if scatter > MAX_DRIFT_SCATTER:
         return frf
     without_drift = frf.receptance - drift / frf.frequency**2
-    return (
-        replace(frf, receptance=without_drift)
-        if np.any(np.abs(without_drift) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance))
-        else frf
-    )
+    is_rounding = not np.any(np.abs(without_drift) > DRIFT_ROUNDING_SHARE * np.abs(frf.receptance))
+    return frf if is_rounding else replace(frf, receptance=without_drift)
 
 
 def _fit_drift(frf: Frf, lines: slice) -> tuple[float, complex]:

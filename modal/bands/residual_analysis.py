@@ -37,10 +37,8 @@ def passes_f_test(more: BandFit, fewer: BandFit, least: float) -> bool:
 def has_lower_aic(fit: BandFit, other: BandFit) -> bool:
     """Return whether a fit has the lower Akaike information criterion."""
     variance = min(candidate.sum_of_squares / candidate.degrees_of_freedom for candidate in (fit, other))
-    return (
-        fit.sum_of_squares - 2 * variance * fit.degrees_of_freedom
-        < other.sum_of_squares - 2 * variance * other.degrees_of_freedom
-    )
+    own, others = (each.sum_of_squares - 2 * variance * each.degrees_of_freedom for each in (fit, other))
+    return own < others
 
 
 NEAR_MODE_HALF_WIDTHS, MIN_NEAR_MODE_LINES = 3.0, 16
@@ -51,10 +49,8 @@ def residual_near_mode(band: FittedBand, i: int) -> tuple[float, float]:
     """Return the residual rms near mode i over its peak, and over the noise rms from third differences."""
     fit, weight = band.fit, band.data.weight
     distance = np.abs(band.data.frequency - fit.frequency[i])
-    reach = max(
-        NEAR_MODE_HALF_WIDTHS * fit.damping_ratio[i] * fit.frequency[i],
-        np.sort(distance)[min(MIN_NEAR_MODE_LINES, distance.size) - 1],
-    )
+    width = NEAR_MODE_HALF_WIDTHS * fit.damping_ratio[i] * fit.frequency[i]
+    reach = max(width, np.sort(distance)[min(MIN_NEAR_MODE_LINES, distance.size) - 1])
     near = fit.complex_residual[:, distance <= reach]
     rms = np.sqrt(np.mean(np.abs(near) ** 2) * fit.residual.size / fit.degrees_of_freedom)
     noise = residual_noise(fit)
@@ -119,22 +115,17 @@ def systematic_error(band: FittedBand) -> SystematicError:
         return SystematicError(1.0, fit.degrees_of_freedom, np.diag(hidden**2))
     moved = np.array(list(_trial_changes(band))).reshape(-1, hidden.size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
-    return SystematicError(
-        max(fit.degrees_of_freedom / independent, 1.0),
-        min(fit.degrees_of_freedom, independent),
-        np.diag(most**2 + hidden**2),
-    )
+    freedom = fit.degrees_of_freedom
+    covariance = np.diag(most**2 + hidden**2)
+    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), covariance)
 
 
 def _hidden_error(band: FittedBand) -> Floats:
     """Return the errors that the residual near each mode may hide, in the order of `BandFit`."""
     fit, left = band.fit, [residual_near_mode(band, i) for i in range(band.fit.frequency.size)]
     of_peak, of_noise = np.array(left).T
-    share = (
-        HIDDEN_ERROR_FACTOR
-        * of_peak
-        * np.sqrt(1 - (MAX_UNEVEN_NOISE_RATIO / np.maximum(of_noise, MAX_UNEVEN_NOISE_RATIO)) ** 2)
-    )
+    noise_share = MAX_UNEVEN_NOISE_RATIO / np.maximum(of_noise, MAX_UNEVEN_NOISE_RATIO)
+    share = HIDDEN_ERROR_FACTOR * of_peak * np.sqrt(1 - noise_share**2)
     share = np.zeros(share.size) if has_rounding_residual(band) else share
     sizes = (share * np.abs(fit.constant)).ravel()
     free = np.where(fit.held, 0.0, share)
@@ -157,11 +148,8 @@ def _trial_changes(band: FittedBand) -> Iterator[Floats]:
     """Yield the changes of the modes in trial fits, in the order of `BandFit`; 0 for modes whose peak a trial cuts."""
     fit, data, n = band.fit, band.data, band.data.frequency.size
     everything = slice(0, n)
-    trials = [
-        (everything, terms)
-        for terms in range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
-        if terms != band.terms
-    ]
+    counts = range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
+    trials = [(everything, terms) for terms in counts if terms != band.terms]
     for part, terms in [
         *trials,
         *((slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES),

@@ -273,9 +273,8 @@ class BandFit:
 
     def of_mode(self, i: int, frequency: Floats) -> Complexes:
         """Return the receptance of mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""
-        return replace(
-            self, frequency=self.frequency[[i]], damping_ratio=self.damping_ratio[[i]], constant=self.constant[:, [i]]
-        ).receptance(frequency)
+        f, zeta, constant = self.frequency[[i]], self.damping_ratio[[i]], self.constant[:, [i]]
+        return replace(self, frequency=f, damping_ratio=zeta, constant=constant).receptance(frequency)
 
     def receptance(self, frequency: Floats) -> Complexes:
         """Return the receptance of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""

@@ -242,7 +242,8 @@ def _poles_for_real_constants(fit: BandFit) -> Floats:
 def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     freedom, size_error = state.degrees_of_freedom, np.zeros(state.constant.shape)
     held = np.array(~state.free[: state.poles.shape[1]])
-    return BandFit(*state.poles, state.constant, freedom, with_phases, state.residual, size_error, held)
+    f, zeta = state.poles
+    return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, size_error, held)
 
 
 def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:

@@ -83,12 +83,8 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
         half_power_damping=_half_power_damping(band, mode),
     )
     assessed = with_truncation_error(figures)
-    remarks = chain(
-        _edit_remarks(band, i, assessed),
-        _position_remarks(state, band, i, assessed),
-        _value_remarks(band, i, assessed, share),
-        _error_remarks(assessed),
-    )
+    of_value = _value_remarks(band, i, assessed, share), _error_remarks(assessed)
+    remarks = chain(_edit_remarks(band, i, assessed), _position_remarks(state, band, i, assessed), *of_value)
     return replace(assessed, remarks=tuple(remarks))
 
 
@@ -230,9 +226,6 @@ def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
         "zeta too large, K too small by percents"
     )
     cure = "export the lines without smoothing or window"
-    return [
-        replace(mode, remarks=(*mode.remarks, Remark("smoothed-lines", _frequency_text(mode), text, cure)))
-        if is_narrow
-        else mode
-        for mode, is_narrow in zip(modes, narrow, strict=True)
-    ]
+    remarks = [(Remark("smoothed-lines", _frequency_text(mode), text, cure),) for mode in modes]
+    added = zip(modes, narrow, remarks, strict=True)
+    return [replace(mode, remarks=(*mode.remarks, *own)) if is_narrow else mode for mode, is_narrow, own in added]

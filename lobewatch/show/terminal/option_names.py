@@ -53,45 +53,17 @@ OPTION_NAMES: Mapping[str, str] = {
     "Description.start": "--start",
     "Description.tacho": "--tacho",
     "Description.unit": "--unit",
-FIELD_OPTIONS = """
-    Circumstances.direction Circumstances.tool Conditions.hours Conditions.reclamped CutEntry.at=date
-    CutEntry.chatter_frequency_hz=frequency CutEntry.has_chatter=chatter Description.averages Description.columns
-    Description.date Description.date_pattern Description.decimal Description.direction Description.force
-    Description.force_unit Description.full_scale Description.pulses Description.quantity Description.rate
-    Description.response Description.sensitivity Description.sensor Description.skip Description.spacing
-    Description.start Description.tacho Description.unit EmulationSetup.tcp LobeChart.source MaintenanceEvent.time=date
-    ModeEdits.add ModeEdits.drop ModeEdits.fix MountingVariation.bad_share=bad-clampings MountingVariation.scatter
-    MountingVariation.temperature_swing=temperature ProgramTable.depth_mm=depth ProgramTable.direction
-    ProgramTable.feed_per_tooth_mm=feed-per-tooth ProgramTable.material ProgramTable.name=save
-    ProgramTable.radial_depth_mm=radial ProgramTable.speed_rpm=speed ProgramTable.teeth ProgramTable.tool
-    ProgramTable.tool_diameter_mm=diameter ScreenServer.listen SeriesStatus.direction SeriesStatus.tool Window.hit_at
-    Window.start=window-start Window.time_constant=window Workers.jobs Workers.scheduler accept_questions.codes=accept
-    accept_settings.keys=accept acknowledge_alarms.until acquire_cut.file acquire_cut.port add_event.new_baseline
-    build_power_reading.power_kw=power calibrate_joints.mode calibrate_joints.tools=tool choose_cut.cut
-    choose_cut.program compare_lobes.cut compute_lobe_chart.method evaluate_requested.names=program
-    exclude_entry.reason find_setup_question.name=edit fit_file_modes.accept fit_file_modes.conjugate
-    fit_file_modes.sensor=sensor-mass NO_MODE_EDITS=by-fit
-    list_comparison_files.beside plan_session.port record_cut.time_limit=seconds rotate_structure.degrees=askew
-    rotate_structure.direction screen.ScreenServer=screen store_recordings.keep_going
-"""
-"""Fields with the name of their option where it is another one."""
-OPTION_NAMES: Mapping[str, str] = {
-    **{
-        field: f"--{name or field.partition('.')[2].replace('_', '-')}"
-        for field, _, name in (entry.partition("=") for entry in FIELD_OPTIONS.split())
-    },
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
-    "Logbook.verdicts": "lobewatch check",
-    "MachineFolder.accept": "replay --accept",
-    "MachineFolder.contents": "lobewatch history",
-    "TapSession.run": "lobewatch tap",
-    "acquisition.measure_rate": "lobewatch sensors",
-    "acquisition.scan_ports": "lobewatch ports",
+    "EmulationSetup.tcp": "--tcp",
+    "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",
     "exclude_entry.reason": "--reason",
     "find_setup_question.name": "--edit",
     "fit_file_modes": "lobewatch modes",
+    "fit_file_modes.accept": "--accept",
+    "fit_file_modes.conjugate": "--conjugate",
+    "fit_file_modes.sensor": "--sensor-mass",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_files.make_machine_folder.template": "lobewatch init --example",
     "folder_updates.accept_settings": "lobewatch check MACHINE --accept",
@@ -99,7 +71,13 @@ OPTION_NAMES: Mapping[str, str] = {
     "folder_updates.exclude_entry": "lobewatch exclude",
     "folder_updates.store_cut": "observe",
     "folder_updates.store_mode_edits": "lobewatch modes MACHINE TAP",
+    "list_comparison_files.beside": "--beside",
+    "LobeChart.source": "--source",
     "lobes.materials_by_name": "lobewatch materials",
+    "Logbook.verdicts": "lobewatch check",
+    "MachineFolder.accept": "replay --accept",
+    "MachineFolder.contents": "lobewatch history",
+    "MaintenanceEvent.time": "--date",
     "make_machine_folder": "lobewatch init",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "modal.synthesize_frf": "lobewatch modes --figure",
@@ -112,12 +90,37 @@ OPTION_NAMES: Mapping[str, str] = {
     "NO_MODE_EDITS": "--by-fit",
     "numpy.conj": "on the command line: --conjugate",
     "operator_entries.acknowledge_alarms": "lobewatch ack",
+    "plan_session.port": "--port",
     "plan_session.resume=False": "--new",
     "pocket_depth.find_pocket_depths": "lobewatch suggest",
     "program_learning.find_next_cut": "lobewatch suggest",
+    "ProgramTable.depth_mm": "--depth",
+    "ProgramTable.direction": "--direction",
+    "ProgramTable.feed_per_tooth_mm": "--feed-per-tooth",
+    "ProgramTable.material": "--material",
+    "ProgramTable.name": "--save",
+    "ProgramTable.radial_depth_mm": "--radial",
+    "ProgramTable.speed_rpm": "--speed",
+    "ProgramTable.teeth": "--teeth",
+    "ProgramTable.tool": "--tool",
+    "ProgramTable.tool_diameter_mm": "--diameter",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
+    "record_cut.time_limit": "--seconds",
+    "rotate_structure.degrees": "--askew",
+    "rotate_structure.direction": "--direction",
+    "screen.ScreenServer": "--screen",
+    "ScreenServer.listen": "--listen",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
+    "SeriesStatus.direction": "--direction",
+    "SeriesStatus.tool": "--tool",
     "session.TapSession": "lobewatch tap",
+    "store_recordings.keep_going": "--keep-going",
+    "TapSession.run": "lobewatch tap",
+    "Window.hit_at": "--hit-at",
+    "Window.start": "--window-start",
+    "Window.time_constant": "--window",
+    "Workers.jobs": "--jobs",
+    "Workers.scheduler": "--scheduler",
 }
 """Option or command for each field or function that a message names."""
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import CutPower, FileOptions, add_file_options
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
 
 if TYPE_CHECKING:
@@ -25,16 +24,16 @@ if TYPE_CHECKING:
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
     cut: Annotated[str, typer.Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
     speed: Annotated[
         float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    depth: CutDepth = None,
     power: CutPower = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
-    date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    date: CutDate = None,
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
         "accelerometer"
     ),

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.shared_options import Flutes, Material, cut_fields, number
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
 from lobewatch.show.terminal.output import Json, emit
 
 
 def recommend(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
     material: Material = None,
     radial: Annotated[
@@ -25,7 +23,7 @@ def recommend(
     depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
     speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
+    diameter: Diameter = None,
     feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
     save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,

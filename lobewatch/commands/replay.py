@@ -8,14 +8,20 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import AddedModes, DroppedModes, FileOptions, FixedModes, add_file_options
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import (
+    AddedModes,
+    DroppedModes,
+    FileOptions,
+    FixedModes,
+    Machine,
+    add_file_options,
+)
 from lobewatch.show.terminal.output import Json, print_remarks
 
 
 @add_file_options()
 def replay(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     files: Annotated[
         list[Path], typer.Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')
     ],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import FleetFolder
+from lobewatch.commands.shared_options import AsCsv, FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, results
 
@@ -37,7 +37,7 @@ def status(
     scheduler: Annotated[
         str, typer.Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
     ] = "",
-    as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
+    as_csv: AsCsv = False,
     as_json: Json = False,
 ) -> None:
     """Show the status of all machines in a folder.

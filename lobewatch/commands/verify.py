@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
-def verify(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
-    as_json: Json = False,
-) -> None:
+def verify(machine: Machine, as_json: Json = False) -> None:
     """Verify every byte of a machine folder.
 
     Names every file that is altered, missing, extra, swapped, renamed or cut short, and what to do. A machine.toml that

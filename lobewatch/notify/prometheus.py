@@ -103,10 +103,7 @@ METRIC_FAMILIES: dict[str, tuple[str, Callable[[FleetMachine], MetricSamples]]] 
     ),
     "lobewatch_light": ("1 for the light that the machine has, 0 for the others.", _sample_status),
     "lobewatch_reasons": ("How many reasons of a code the light has.", _sample_reasons),
-    "lobewatch_alarms": (
-        "How many alarms are open.",
-        lambda machine: iter([((), float(len(machine.summary.alarms)))]),
-    ),
+    "lobewatch_alarms": ("How many alarms are open.", lambda machine: iter([((), float(len(machine.summary.alarms)))])),
     "lobewatch_alarms_acknowledged": ("How many of them a person has acknowledged.", _sample_acknowledged),
     "lobewatch_alarm_raised_timestamp_seconds": ("When each open alarm was raised.", _sample_alarm_times),
     "lobewatch_frequency_fall_ratio": (

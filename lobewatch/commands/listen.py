@@ -119,9 +119,7 @@ def _store(
         earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
         publisher.show(saved=stored[-1].id)
         remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
-        rows = [
-            {"id": cut.id, "remarks": [remark.code for remark in cut_remarks]}
-            for cut, cut_remarks in zip(stored, remarks, strict=True)
-        ]
+        codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
+        rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
         emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
     print_remarks(itertools.chain.from_iterable(remarks))

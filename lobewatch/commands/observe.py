@@ -45,10 +45,8 @@ def observe(
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)
-    remarks = [
-        *untapped_remarks(logbook, heard),
-        *map(contradiction_remark, find_contradicting_cuts(heard, logbook.cuts)),
-    ]
+    contradicting = find_contradicting_cuts(heard, logbook.cuts)
+    remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting)]
     with publish_on_change(logbook):
         stored = store_cut(logbook.folder, heard)
         payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}

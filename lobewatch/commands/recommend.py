@@ -44,9 +44,8 @@ def recommend(
     from lobewatch.machine.folder_updates import check_program_name, save_program
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
-    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction) | {
-        "feed_per_tooth_mm": feed_per_tooth
-    }
+    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
+    cut["feed_per_tooth_mm"] = feed_per_tooth
     logbook = Logbook.open(machine)
     if save is not None:
         check_program_name(logbook.machine, save)
@@ -54,11 +53,11 @@ def recommend(
     if save is not None and answer.setting is not None:
         save_program(logbook.folder, answer.program)
     saved = save if answer.setting is not None else None
-    emit(
-        recommendation_json(answer, logbook.remarks) | {"saved": saved},
-        as_json,
+    payload = recommendation_json(answer, logbook.remarks) | {"saved": saved}
+    lines = [
         *recommendation_lines(answer, logbook.remarks),
         *(saved_lines(logbook.folder.path, saved) if saved else ()),
-    )
+    ]
+    emit(payload, as_json, *lines)
     if answer.setting is None:
         raise typer.Exit(1)

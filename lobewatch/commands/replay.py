@@ -90,13 +90,9 @@ def replay(
     from lobewatch.show.replays import ReplayProgress, emit_preview, emit_replay
     from modal import parse_mode_edits
 
-    description = file_options.description(
-        date=date,
-        date_pattern=date_pattern,
-        tool=tool,
-        direction=direction,
-        conditions=Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped),
-    )
+    conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
+    known = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
+    description = file_options.description(**known, conditions=conditions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)

@@ -53,10 +53,5 @@ def suggest(
     assembly = assembly.check()
     suggestion = find_next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *learned_remarks(suggestion.learning)]
-    emit(
-        suggestion_json(suggestion) | {"remarks": list(remarks)},
-        as_json,
-        *suggestion_lines(suggestion, logbook.folder.path),
-        *learned_texts(suggestion.learning),
-        *remark_lines(remarks),
-    )
+    texts = [*suggestion_lines(suggestion, logbook.folder.path), *learned_texts(suggestion.learning)]
+    emit(suggestion_json(suggestion) | {"remarks": remarks}, as_json, *texts, *remark_lines(remarks))

@@ -24,15 +24,11 @@ def verify(machine: Machine, as_json: Json = False) -> None:
 
     verification = verify_folder(machine)
     notes = [remark for remark in verification.remarks if remark.code not in DAMAGE_CODES]
-    payload = {
-        "damage": list(verification.damage),
-        "remarks": list(notes),
-        "adopted": verification.entered,
-        "sound_taps": verification.n_taps,
-    }
-    texts = [*(f"damaged: {remark}" for remark in verification.damage), *(f"note: {remark}" for remark in notes)]
+    damage, n_taps = list(verification.damage), verification.n_taps
+    payload = {"damage": damage, "remarks": notes, "adopted": verification.entered, "sound_taps": n_taps}
+    texts = [*(f"damaged: {remark}" for remark in damage), *(f"note: {remark}" for remark in notes)]
     texts += [f"entered in the journal: {name}" for name in verification.entered]
-    last = f"{len(verification.damage)} damaged" if verification.damage else "nothing is damaged"
-    emit(payload, as_json, *texts, f"{verification.n_taps} tap test(s) as they were committed, {last}")
-    if verification.damage:
+    last = f"{len(damage)} damaged" if damage else "nothing is damaged"
+    emit(payload, as_json, *texts, f"{n_taps} tap test(s) as they were committed, {last}")
+    if damage:
         raise typer.Exit(1)

@@ -279,13 +279,6 @@ class Analysis:
         now
             Time of the assessment. None for the present time.
         """
-        files = self.files
-        return assess_status(
-            self.machine,
-            self.history,
-            now or datetime.now(UTC),
-            self.folder.path,
-            files.remarks,
-            files.acknowledgements,
-            files.fleet_scatter,
-        )
+        files, path, time = self.files, self.folder.path, now or datetime.now(UTC)
+        found = files.remarks, files.acknowledgements, files.fleet_scatter
+        return assess_status(self.machine, self.history, time, path, *found)

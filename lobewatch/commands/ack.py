@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def ack(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     alarm: Annotated[
         str, typer.Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
     ] = "",
     until: Annotated[
-        datetime | None,
-        typer.Option(help="When it is to ring again, local time; never where not given."),
+        datetime | None, typer.Option(help="When it is to ring again, local time; never where not given.")
     ] = None,
     note: Annotated[str, typer.Option(help="What is being done, for those who come next.")] = "",
     operator: Annotated[str, typer.Option(help="Who says so; the name of the login where not given.")] = "",

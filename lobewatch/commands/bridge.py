@@ -47,9 +47,8 @@ def bridge(
     print_note = partial(notes.print, markup=False)
     folder, kind = None if machine is None else MachineFolder(machine), find_driver(driver)
     if folder is None and kind.sensor_data is None:
-        raise DataError(
-            f"{kind.title} does not know its sensors: give the machine folder whose [[daq.channel]] names them"
-        )
+        text = "does not know its sensors: give the machine folder whose [[daq.channel]] names them"
+        raise DataError(f"{kind.title} {text}")
     daq = DaqTable(driver=driver) if folder is None else folder.machine.daq
     if folder is not None and daq.driver != driver:
         raise DataError(f'{folder.toml}: driver = "{daq.driver}", not "{driver}"; give the same one')
@@ -60,7 +59,6 @@ def bridge(
     identity = server.device.identity
     results.print(json.dumps({"port": server.port}) if as_json else f"port {server.port}", markup=False)
     results.file.flush()
-    print_note(
-        f"{identity.model} on {port}, {server.device.sample_rate:g} Hz; tap with --port {server.port} (Ctrl-C ends it)"
-    )
+    rate = f"{server.device.sample_rate:g} Hz"
+    print_note(f"{identity.model} on {port}, {rate}; tap with --port {server.port} (Ctrl-C ends it)")
     server.run()

@@ -8,14 +8,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import SpindleMachine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def calibrate(
-    machine: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
-    ],
+    machine: SpindleMachine,
     frequency: Annotated[
         list[float] | None, typer.Option(help="Measured natural frequency (Hz); may be repeated.")
     ] = None,

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import monotonic
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import Flutes, Material, cut_fields, number
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import (
+    Diameter,
+    Flutes,
+    Material,
+    MillingDirection,
+    TappedMachine,
+    cut_fields,
+    number,
+)
 from lobewatch.show.terminal.output import Json, emit, notes
 
 PROGRESS_DELAY = 5.0
@@ -17,7 +23,7 @@ PROGRESS_DELAY = 5.0
 
 
 def check(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     program: Annotated[
         list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
     ] = None,
@@ -28,9 +34,9 @@ def check(
     tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
     material: Material = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
+    diameter: Diameter = None,
     radial: Annotated[float | None, typer.Option(parser=number, help="Its radial depth, mm.")] = None,
-    direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
+    direction: MillingDirection = None,
     accept: Annotated[
         list[str] | None,
         typer.Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),

@@ -38,12 +38,8 @@ def convert(
     from lobewatch.show.modes import fact_lines
 
     written = write(file, out, file_options.description(date=date, direction=direction), hits=hits)
-    payload = {
-        "file": str(written.path),
-        "format": written.title,
-        "holds": written.content,
-        "precision": written.precision,
-        "facts": [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in written.recording.facts],
-    }
+    facts = [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in written.recording.facts]
+    payload = {"file": str(written.path), "format": written.title, "holds": written.content}
+    said = {"precision": written.precision, "facts": facts}
     summary = f"{written.path}: {written.title}, {written.content}, {written.precision}"
-    emit(payload, as_json, summary, *fact_lines(written.recording.facts))
+    emit(payload | said, as_json, summary, *fact_lines(written.recording.facts))

@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -39,56 +39,40 @@ class EmulateOptions:
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    story: Annotated[WearScenarioName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = (
-        "none"
-    )
+    story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings over 24 months.")] = "none"
     """Wear scenario of the bearings."""
-    month: Annotated[int, typer.Option("--month", min=0, max=60, help="Of the story, in which it is tapped.")] = 0
+    month: Annotated[int, typer.Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
     """Month of the wear scenario."""
     scatter: ReclampingScatter = 0.0
     """Reclamping repeatability of f1: standard deviation (%)."""
-    bad: Annotated[
-        float, typer.Option("--bad-clampings", help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")
-    ] = 0.0
+    bad_clampings: Annotated[float, typer.Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
     """Chance of a bad clamping (%)."""
-    warm: Annotated[
-        float | None, typer.Option("--temperature", help="Swing over the year, 0 to 30 K; f_1 moves with it.")
-    ] = None
+    temperature: Annotated[float | None, typer.Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
     """Swing of the temperature over the year (K)."""
     direction: Annotated[
-        Literal["x", "y", "xy"], typer.Option("--direction", help="Of hammer and sensor; xy: hit in x, sensor in y.")
+        Literal["x", "y", "xy"], typer.Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")
     ] = "x"
     """Direction of hammer and sensor."""
     askew: Annotated[
         float | None,
-        typer.Option("--askew", help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
+        typer.Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
-    cut: Annotated[
-        str | None, typer.Option("--cut", metavar="PROGRAM", help="It cuts this, and is heard on its housing.")
-    ] = None
+    cut: Annotated[str | None, typer.Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = (
+        None
+    )
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[float | None, typer.Option("--speed", help="Of the cut, as it is told (rpm).")] = None
+    speed: Annotated[float | None, typer.Option(help="Of the cut, as it is told (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, typer.Option("--depth", help="Of the cut (mm).")] = None
+    depth: Annotated[float | None, typer.Option(help="Of the cut (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""
 
 
-class Emulation(NamedTuple):
-    """Emulated device, with its true values."""
-
-    device: acquisition.EmulatorThread
-    """Emulator, which serves while its context lasts."""
-    truth: Mapping[str, float | None]
-    """True values of the emulated spindle, by JSON key."""
-    truth_text: str
-    """True values, as text."""
-    command: str
-    """Name of the next command."""
-    command_options: str = ""
-    """Options of the next command, without its port."""
+Emulation = tuple[acquisition.EmulatorThread, Mapping[str, float | None], str, str, str]
+"""Emulator, which serves while its context lasts; its true values by JSON key, and as text; the next command and its
+options without the port."""
 
 
 def _add_commands() -> None:
@@ -132,22 +116,14 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 
     folder = MachineFolder(options.machine)
-    mounting = MountingVariation(options.scatter / 100, options.bad / 100, options.warm)
+    mounting = MountingVariation(options.scatter / 100, options.bad_clampings / 100, options.temperature)
     mounting.check()
-    story = WearScenario(options.story)
-    as_built = story is WearScenario.NONE and not any(mounting)
-    shared = {
-        "folder": folder,
-        "seed": options.seed,
-        "realtime": not options.fast,
-        "tcp": options.tcp,
-        "spindle": None
-        if as_built
-        else build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, options.seed),
-    }
-    emulation = (
-        _emulate_tap(name, options, shared) if options.cut is None else _emulate_cut(name, options, options.cut, shared)
-    )
+    story, seed, spindle = WearScenario(options.story), options.seed, None
+    if story is not WearScenario.NONE or any(mounting):
+        spindle = build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, seed)
+    shared = {"folder": folder, "seed": seed, "realtime": not options.fast, "tcp": options.tcp, "spindle": spindle}
+    cut = options.cut
+    emulation = _emulate_tap(name, options, shared) if cut is None else _emulate_cut(name, options, cut, shared)
     _serve_until_interrupted(emulation, options)
 
 
@@ -158,14 +134,12 @@ def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) 
     from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    emulated = emulate_machine(
-        driver=find_driver(name), direction=options.direction, axes_angle=options.askew, **shared
-    )
+    driver = find_driver(name)
+    emulated = emulate_machine(driver=driver, direction=options.direction, axes_angle=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
-    return Emulation(
-        emulated.device, truth, text, "tap", f" --direction {options.direction}" * (options.direction != "x")
-    )
+    words = f" --direction {options.direction}" * (options.direction != "x")
+    return emulated.device, truth, text, "tap", words
 
 
 def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
@@ -183,19 +157,19 @@ def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mappi
     stable = "any depth" if limit is None else f"{limit:.3g} mm"
     text = f"{emulated.speed_rpm:.1f} rpm, stable up to {stable} there ({1e3 * setting.depth:g} mm is cut)"
     words = f" --program {shlex.quote(program)} --speed {setting.speed_rpm:g} --depth {1e3 * setting.depth:g}"
-    return Emulation(emulated.device, truth, text, "listen", words)
+    return emulated.device, truth, text, "listen", words
 
 
 def _serve_until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
     """Print the port and the true values, and serve until Ctrl-C."""
-    with emulation.device as device:
-        line = json.dumps({"port": device.port, **emulation.truth}) if options.as_json else f"port {device.port}"
+    emulator, truth, truth_text, next_command, next_options = emulation
+    with emulator as device:
+        line = json.dumps({"port": device.port, **truth}) if options.as_json else f"port {device.port}"
         results.print(line, markup=False)
         results.file.flush()
-        notes.print(f"the truth: {emulation.truth_text}", markup=False)
-        command = f"lobewatch {emulation.command} {shlex.quote(str(options.machine))} --port {device.port}"
-        next_step = f"{emulation.command} with: {command}{emulation.command_options}"
-        notes.print(f"{next_step}   (Ctrl-C ends the emulator)", markup=False)
+        notes.print(f"the truth: {truth_text}", markup=False)
+        command = f"lobewatch {next_command} {shlex.quote(str(options.machine))} --port {device.port}"
+        notes.print(f"{next_command} with: {command}{next_options}   (Ctrl-C ends the emulator)", markup=False)
         device.wait()
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def event(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     text: Annotated[str, typer.Argument(help="What was done; with --withdraw not needed.")] = "",
     date: Annotated[datetime | None, typer.Option(help="When it was done, local time; now where not given.")] = None,
     new_baseline: Annotated[

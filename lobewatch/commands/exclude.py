@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def exclude(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
-    tap: Annotated[
-        str,
-        typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1."),
-    ],
+    machine: Machine,
+    tap: ExcludableEntry,
     reason: Annotated[str, typer.Option(help="Why it does not count.")],
     as_json: Json = False,
 ) -> None:

@@ -88,10 +88,6 @@ def _format_list(rows: Collection[tuple[str, str]], width: int, longest: int) ->
 
 def _wrap_words(text: str, width: int, subsequent_indent: str = "") -> list[str]:
     """Wrap text at spaces only, so that option names stay whole."""
-    return textwrap.wrap(
-        " ".join(text.split()),
-        width,
-        subsequent_indent=subsequent_indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    wrapper = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
+    wrapper.subsequent_indent = subsequent_indent
+    return wrapper.wrap(" ".join(text.split()))

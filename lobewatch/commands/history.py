@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import AsCsv, Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 
 def history(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
-    as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
+    machine: Machine,
+    as_csv: AsCsv = False,
     hdf5: Annotated[
         Path | None, typer.Option(help="Write all values and the diagrams of every test to this file (HDF5).")
     ] = None,

@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
-def include(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
-    tap: Annotated[
-        str,
-        typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1."),
-    ],
-    as_json: Json = False,
-) -> None:
+def include(machine: Machine, tap: ExcludableEntry, as_json: Json = False) -> None:
     """Include an excluded tap test or test cut again.
 
     Examples

@@ -81,12 +81,8 @@ def init(
         change = "change what is not as in your shop" if example else "fill it in"
         next_step = f"{change}, then tap with: {next_step} --port PORT"
     write_machine_file(machine, text)
-    emit(
-        {"machine": str(machine), "machine_toml": str(toml)},
-        as_json,
-        f"{'altered' if edit else 'made'} {toml}",
-        f"next: {next_step}",
-    )
+    payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'altered' if edit else 'made'} {toml}"
+    emit(payload, as_json, text, f"next: {next_step}")
 
 
 def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import CutPower, FileOptions, add_file_options
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
 
 if TYPE_CHECKING:
@@ -25,16 +24,16 @@ if TYPE_CHECKING:
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
     cut: Annotated[str, typer.Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
     speed: Annotated[
         float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    depth: CutDepth = None,
     power: CutPower = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
-    date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    date: CutDate = None,
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
         "accelerometer"
     ),
@@ -120,9 +119,7 @@ def _store(
         earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
         publisher.show(saved=stored[-1].id)
         remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
-        rows = [
-            {"id": cut.id, "remarks": [remark.code for remark in cut_remarks]}
-            for cut, cut_remarks in zip(stored, remarks, strict=True)
-        ]
+        codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
+        rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
         emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
     print_remarks(itertools.chain.from_iterable(remarks))

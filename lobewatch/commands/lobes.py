@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import TappedMachine
 from lobewatch.show.terminal.output import Json, emit, notes
 
 DynamicsName = Literal["modes", "frf"]
@@ -15,7 +15,7 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
 def lobes(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
     tool: Annotated[
         str | None, typer.Option(help="If not given: that of the program, else that was tapped last.")

@@ -7,14 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import SpindleMachine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def model(
-    machine: Annotated[
-        Path, typer.Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
-    ],
+    machine: SpindleMachine,
     tool: Annotated[str | None, typer.Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,

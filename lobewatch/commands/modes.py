@@ -49,8 +49,7 @@ def modes(
         typer.Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it."),
     ] = None,
     averages: Annotated[
-        int | None,
-        typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence."),
+        int | None, typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
     ] = None,
     hammer: Annotated[
         Literal["none"] | None, typer.Option(help="No force was measured: f_n and zeta alone, from the response.")

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import CutPower
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
 def observe(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     program: Annotated[str, typer.Option(help='Cutting program that was cut, or "reference cut".')],
     speed: Annotated[
         float | None, typer.Option(help="Spindle speed, rpm; that of the program where not given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    depth: CutDepth = None,
     stable: Annotated[bool, typer.Option("--stable", help="It ran quietly.")] = False,
     chatter: Annotated[bool, typer.Option("--chatter", help="It chattered.")] = False,
     frequency: Annotated[float | None, typer.Option(help="What it chattered at, Hz, where somebody knows.")] = None,
     power: CutPower = None,
-    date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    date: CutDate = None,
     as_json: Json = False,
 ) -> None:
     """Store whether a test cut was stable by ear.
@@ -48,10 +45,8 @@ def observe(
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)
-    remarks = [
-        *untapped_remarks(logbook, heard),
-        *map(contradiction_remark, find_contradicting_cuts(heard, logbook.cuts)),
-    ]
+    contradicting = find_contradicting_cuts(heard, logbook.cuts)
+    remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting)]
     with publish_on_change(logbook):
         stored = store_cut(logbook.folder, heard)
         payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import Flutes, Material, cut_fields
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Flutes, Material, MillingDirection, TappedMachine, cut_fields
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def pitch(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     speed: Annotated[float, typer.Option(help="Spindle speed, rpm: pitches are for one speed.")],
     tool: Annotated[str | None, typer.Option(help="Tool whose teeth are to be spaced.")] = None,
     depth: Annotated[float | None, typer.Option(help="Axial depth to be judged too, mm.")] = None,
@@ -21,7 +19,7 @@ def pitch(
     teeth: Flutes = None,
     diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
     radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
-    direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
+    direction: MillingDirection = None,
     as_json: Json = False,
 ) -> None:
     """Propose unequal pitches for a cutter at one speed.

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.commands.shared_options import Flutes, Material, cut_fields, number
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
 from lobewatch.show.terminal.output import Json, emit
 
 
 def recommend(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
     material: Material = None,
     radial: Annotated[
@@ -25,7 +23,7 @@ def recommend(
     depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
     speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
+    diameter: Diameter = None,
     feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
     save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
@@ -46,9 +44,8 @@ def recommend(
     from lobewatch.machine.folder_updates import check_program_name, save_program
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
-    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction) | {
-        "feed_per_tooth_mm": feed_per_tooth
-    }
+    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
+    cut["feed_per_tooth_mm"] = feed_per_tooth
     logbook = Logbook.open(machine)
     if save is not None:
         check_program_name(logbook.machine, save)
@@ -56,11 +53,11 @@ def recommend(
     if save is not None and answer.setting is not None:
         save_program(logbook.folder, answer.program)
     saved = save if answer.setting is not None else None
-    emit(
-        recommendation_json(answer, logbook.remarks) | {"saved": saved},
-        as_json,
+    payload = recommendation_json(answer, logbook.remarks) | {"saved": saved}
+    lines = [
         *recommendation_lines(answer, logbook.remarks),
         *(saved_lines(logbook.folder.path, saved) if saved else ()),
-    )
+    ]
+    emit(payload, as_json, *lines)
     if answer.setting is None:
         raise typer.Exit(1)

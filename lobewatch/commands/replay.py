@@ -8,14 +8,20 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import AddedModes, DroppedModes, FileOptions, FixedModes, add_file_options
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import (
+    AddedModes,
+    DroppedModes,
+    FileOptions,
+    FixedModes,
+    Machine,
+    add_file_options,
+)
 from lobewatch.show.terminal.output import Json, print_remarks
 
 
 @add_file_options()
 def replay(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     files: Annotated[
         list[Path], typer.Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')
     ],
@@ -84,13 +90,9 @@ def replay(
     from lobewatch.show.replays import ReplayProgress, emit_preview, emit_replay
     from modal import parse_mode_edits
 
-    description = file_options.description(
-        date=date,
-        date_pattern=date_pattern,
-        tool=tool,
-        direction=direction,
-        conditions=Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped),
-    )
+    conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
+    known = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
+    description = file_options.description(**known, conditions=conditions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def sensors(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
         float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")

@@ -7,6 +7,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,9 +29,24 @@ def number(text: str | float) -> float:
 
 Command = Callable[..., None]
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
+Machine = Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")]
+TappedMachine = Annotated[
+    Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")
+]
+SpindleMachine = Annotated[
+    Path, typer.Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
+]
 FleetFolder = Annotated[
     Path, typer.Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")
 ]
+ExcludableEntry = Annotated[
+    str, typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1.")
+]
+AsCsv = Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")]
+Diameter = Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")]
+MillingDirection = Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")]
+CutDepth = Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")]
+CutDate = Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")]
 Seed = Annotated[int, typer.Option(help="Of the random numbers.")]
 ReclampingScatter = Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")]
 Material = Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")]
@@ -85,10 +101,9 @@ class FileOptions:
     """File of the force."""
     rate: Annotated[float | None, typer.Option(help="Samples a second (Hz).")] = None
     """Sample rate (Hz)."""
-    averages: Annotated[
-        int | None,
-        typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says."),
-    ] = None
+    averages: Annotated[int | None, typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says.")] = (
+        None
+    )
     """Number of hits that an FRF was averaged from."""
     response: Annotated[int | None, typer.Option(help="Which of several responses, from 1.")] = None
     """Number of the response, from 1."""

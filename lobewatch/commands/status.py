@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.commands.shared_options import FleetFolder
+from lobewatch.commands.shared_options import AsCsv, FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, results
 
@@ -37,7 +37,7 @@ def status(
     scheduler: Annotated[
         str, typer.Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
     ] = "",
-    as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
+    as_csv: AsCsv = False,
     as_json: Json = False,
 ) -> None:
     """Show the status of all machines in a folder.
@@ -71,10 +71,8 @@ def status(
         levels = [row["light"] for row in rows]
         counted = ", ".join(f"{levels.count(level)} {level.value}" for level in StatusLevel if level in levels)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
-        without_points = [
-            {name: value for name, value in row.items() if name not in DASHBOARD_ONLY_KEYS} for row in shown
-        ]
-        emit({"machines": without_points}, as_json, "" if as_json else fleet_text(shown), count)
+        machine_rows = [{key: row[key] for key in row if key not in DASHBOARD_ONLY_KEYS} for row in shown]
+        emit({"machines": machine_rows}, as_json, "" if as_json else fleet_text(shown), count)
     if prometheus is not None:
         from acquisition.file_io import atomic_write
         from lobewatch.notify.prometheus import format_prometheus

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import TappedMachine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def suggest(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")],
+    machine: TappedMachine,
     program: Annotated[str, typer.Option(help="Cutting program to find the limits of.")],
     cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
     as_json: Json = False,
@@ -54,10 +53,5 @@ def suggest(
     assembly = assembly.check()
     suggestion = find_next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *learned_remarks(suggestion.learning)]
-    emit(
-        suggestion_json(suggestion) | {"remarks": list(remarks)},
-        as_json,
-        *suggestion_lines(suggestion, logbook.folder.path),
-        *learned_texts(suggestion.learning),
-        *remark_lines(remarks),
-    )
+    texts = [*suggestion_lines(suggestion, logbook.folder.path), *learned_texts(suggestion.learning)]
+    emit(suggestion_json(suggestion) | {"remarks": remarks}, as_json, *texts, *remark_lines(remarks))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, serve_screen
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def tap(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 
 def trend(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
+    machine: Machine,
     tool: Annotated[str | None, typer.Option(help="Of this tool; else that of the series that fell most.")] = None,
     direction: Annotated[str | None, typer.Option(help="x or y; else the one that fell more.")] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="The points with commas on stdout instead of text.")] = False,

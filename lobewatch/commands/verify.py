@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
-def verify(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="Machine folder.")],
-    as_json: Json = False,
-) -> None:
+def verify(machine: Machine, as_json: Json = False) -> None:
     """Verify every byte of a machine folder.
 
     Names every file that is altered, missing, extra, swapped, renamed or cut short, and what to do. A machine.toml that
@@ -30,15 +24,11 @@ def verify(
 
     verification = verify_folder(machine)
     notes = [remark for remark in verification.remarks if remark.code not in DAMAGE_CODES]
-    payload = {
-        "damage": list(verification.damage),
-        "remarks": list(notes),
-        "adopted": verification.entered,
-        "sound_taps": verification.n_taps,
-    }
-    texts = [*(f"damaged: {remark}" for remark in verification.damage), *(f"note: {remark}" for remark in notes)]
+    damage, n_taps = list(verification.damage), verification.n_taps
+    payload = {"damage": damage, "remarks": notes, "adopted": verification.entered, "sound_taps": n_taps}
+    texts = [*(f"damaged: {remark}" for remark in damage), *(f"note: {remark}" for remark in notes)]
     texts += [f"entered in the journal: {name}" for name in verification.entered]
-    last = f"{len(verification.damage)} damaged" if verification.damage else "nothing is damaged"
-    emit(payload, as_json, *texts, f"{verification.n_taps} tap test(s) as they were committed, {last}")
-    if verification.damage:
+    last = f"{len(damage)} damaged" if damage else "nothing is damaged"
+    emit(payload, as_json, *texts, f"{n_taps} tap test(s) as they were committed, {last}")
+    if damage:
         raise typer.Exit(1)

@@ -3,8 +3,4 @@
 from .fleet import Fleet
 from .summarize import summarize_folder, summarize_with_rows
 
-__all__ = [
-    "Fleet",
-    "summarize_folder",
-    "summarize_with_rows",
-]
+__all__ = ["Fleet", "summarize_folder", "summarize_with_rows"]

@@ -46,17 +46,6 @@ class FleetMachine(NamedTuple):
     """Status at the time of the assessment."""
 
 
-class _CachedSummary(NamedTuple):
-    """Summary of a machine in memory."""
-
-    mark: tuple[int, ...]
-    """Change mark of the summarized files."""
-    time: datetime
-    """Time of reading."""
-    summary: MachineSummary
-    """Summary of the files."""
-
-
 def find_machines(path: Path) -> dict[str, Path]:
     """Find the machine folder at a path, or all machine folders in it, by name. DataError if there is none."""
     if _is_machine(path):
@@ -91,7 +80,7 @@ class Fleet:
         self.machines = machines
         """Path of each machine folder, by name."""
         self._render_text = render_text
-        self._summaries: dict[str, _CachedSummary] = {}
+        self._summaries: dict[str, tuple[tuple[int, ...], datetime, MachineSummary]] = {}
         self._damage: dict[str, tuple[Remark, ...]] = {}
         self._outdated: set[str] = set()
         self._renewals_left = MAX_RENEWALS_PER_POLL
@@ -127,7 +116,7 @@ class Fleet:
         with self._lock:
             missing = {path: key for key, path in self.machines.items() if read_summary(path, now) is None}
             for path, mark, summary in make([*missing], now) if missing else ():
-                self._summaries[missing[path]] = _CachedSummary(mark, now, summary)
+                self._summaries[missing[path]] = mark, now, summary
 
     def assess_machines(self, now: datetime | None = None) -> list[FleetMachine]:
         """Assess all machines, unreadable ones first, then the most severe first.
@@ -176,20 +165,21 @@ class Fleet:
         return FleetMachine(key, path, summary, summary.status_at(now, path, self._damage.get(key, ())))
 
     def _current_summary(self, key: str, path: Path, now: datetime) -> MachineSummary:
-        last = self._summaries.get(key)
-        if last is not None and last.mark == compute_change_mark(path, last.summary.newest_file):
-            if now - last.time < SUMMARY_LIFETIME or not self._renewals_left:
-                return last.summary
+        """Return the cached summary if it is up to date, else renew it."""
+        last_mark, last_time, last = self._summaries.get(key, ((), now, None))
+        if last is not None and last_mark == compute_change_mark(path, last.newest_file):
+            if now - last_time < SUMMARY_LIFETIME or not self._renewals_left:
+                return last
             self._renewals_left -= 1
         mark = compute_change_mark(path)
         try:
             summary = None if key in self._outdated else read_summary(path, now)
             summary = summary or fleet.summarize_folder(path, now, self._render_text)
         except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
-            return summarize_unreadable(last.summary.name if last else key, format_error(error))
+            return summarize_unreadable(last.name if last else key, format_error(error))
         self._outdated.discard(key)
         if mark == compute_change_mark(path):  # else another program has written meanwhile
-            self._summaries[key] = _CachedSummary(compute_change_mark(path, summary.newest_file), now, summary)
+            self._summaries[key] = compute_change_mark(path, summary.newest_file), now, summary
         return summary
 
 

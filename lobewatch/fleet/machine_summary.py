@@ -141,15 +141,13 @@ class MachineSummary(
         left, remarks = None, self.remarks
         if self.time is not None:
             left = count_days_left(self.time, self.interval_days, now)
-            remarks = sort_by_severity(
-                [*remarks, *date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)]
-            )
+            dated = date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
+            remarks = sort_by_severity([*remarks, *dated])
         if damage:
             remarks = add_damage_remarks(remarks, damage)
         acknowledged = add_acknowledgements(remarks, self.alarms, now)
-        return DatedStatus(
-            worst_status(remarks), acknowledged, find_next_step(remarks, self.default_next_step), left, now
-        )
+        next_step = find_next_step(remarks, self.default_next_step)
+        return DatedStatus(worst_status(remarks), acknowledged, next_step, left, now)
 
     def mentions_path(self, path: str) -> bool:
         """Return whether a reason names a path."""

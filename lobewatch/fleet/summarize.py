@@ -14,7 +14,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -93,36 +92,27 @@ def summarize_in_parallel(
 
     Workers must see the folders under the same paths. Folders that fail are left out. Errors as `share_work`.
     """
-    tasks = [_SummaryTask(os.getcwd(), str(folder), now, render_text) for folder in folders]  # noqa: PTH109
+    tasks = [(os.getcwd(), str(folder), now, render_text) for folder in folders]  # noqa: PTH109
     for folder, content in zip(folders, share_work(_make_summary_content, tasks, workers), strict=True):
         summary = decode_summary(folder, content, now)
         if summary is not None:
             yield folder, compute_change_mark(folder, summary.newest_file), summary
 
 
-class _SummaryTask(NamedTuple):
-    """Machine to be summarized by a worker."""
+def _make_summary_content(task: tuple[str, str, datetime, RenderText]) -> bytes:
+    """Make the content of standing.json. Empty if that fails or the files change meanwhile.
 
-    working_directory: str
-    """Directory that the path counts from."""
-    path: str
-    """Path of the machine folder."""
-    now: datetime
-    """Time of the summary."""
-    render_text: RenderText
-    """Function that replaces names of the library in the texts."""
-
-
-def _make_summary_content(task: _SummaryTask) -> bytes:
-    """Make the content of standing.json. Empty if that fails or the files change meanwhile."""
-    folder = Path(task.path)
+    `task` holds the directory that the path counts from, the path, and `now` and `render_text` of `summarize_folder`.
+    """
+    directory, path, now, render_text = task
+    folder = Path(path)
     try:
-        with contextlib.chdir(task.working_directory):
+        with contextlib.chdir(directory):
             mark = compute_change_mark(folder)
-            summary = summarize_folder(folder, task.now, task.render_text)
+            summary = summarize_folder(folder, now, render_text)
             if mark != compute_change_mark(folder):
                 return b""
-            return encode_summary(summary, compute_change_mark(folder, summary.newest_file), task.now)
+            return encode_summary(summary, compute_change_mark(folder, summary.newest_file), now)
     except Exception:  # noqa: BLE001 - the next assessment shows what is wrong
         return b""
 
@@ -264,6 +254,5 @@ def _collect_earlier_scatters(history: History) -> Iterator[SeriesScatterPrior]:
         for rows, other_direction in ((x, y), (y, ())):
             trend = build_series_history(rows, other_direction).frequency.trend if rows else None
             if trend is not None:
-                yield SeriesScatterPrior(
-                    estimate_scatter(trend.readings.y), estimate_scatter(trend.readings.mean_of_directions.y)
-                )
+                both = trend.readings.mean_of_directions
+                yield SeriesScatterPrior(estimate_scatter(trend.readings.y), estimate_scatter(both.y))

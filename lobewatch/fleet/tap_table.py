@@ -131,10 +131,8 @@ def _join_codes(remarks: Sequence[_RemarkCode]) -> str:
 def _make_number_array(rows: Sequence[_TableRow]) -> NDArray[np.float64]:
     estimates = np.fromiter(chain.from_iterable(chain.from_iterable(map(_get_estimates, rows))), np.float64)
     modelled = np.fromiter(chain.from_iterable(map(_get_modelled, rows)), np.float64)
-    conditions = [
-        [row.conditions.get(name, math.nan) if row.conditions else math.nan for row in rows]
-        for name in TAP_CONDITION_COLUMNS
-    ]
+    known = [row.conditions or {} for row in rows]
+    conditions = [[fields.get(name, math.nan) for fields in known] for name in TAP_CONDITION_COLUMNS]
     return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(conditions).T])
 
 

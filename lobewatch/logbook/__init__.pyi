@@ -4,11 +4,4 @@ from .analysis import Analysis
 from .chart_data import LobeComparison, ModelFigureData, collect_model_figure, compare_lobes
 from .logbook import Logbook
 
-__all__ = [
-    "Analysis",
-    "LobeComparison",
-    "Logbook",
-    "ModelFigureData",
-    "collect_model_figure",
-    "compare_lobes",
-]
+__all__ = ["Analysis", "LobeComparison", "Logbook", "ModelFigureData", "collect_model_figure", "compare_lobes"]

@@ -284,13 +284,8 @@ class Analysis:
         now
             Time of the assessment. None for the present time.
         """
-        files = self.files
+        files, time = self.files, now or datetime.now(UTC)
+        acknowledgements, scatter = files.contents.acknowledgements, files.fleet_scatter
         return assess_status(
-            self.machine,
-            self.history,
-            now or datetime.now(UTC),
-            self.folder.path,
-            files.remarks,
-            files.contents.acknowledgements,
-            files.fleet_scatter,
+            self.machine, self.history, time, self.folder.path, files.remarks, acknowledgements, scatter
         )

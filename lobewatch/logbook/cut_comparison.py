@@ -66,11 +66,10 @@ class CutComparison:
     @property
     def frequency_difference(self) -> float | None:
         """Detected less predicted chatter frequency, modulo tooth passing (Hz). None without both."""
-        if self.detected.chatter is None or self.predicted is None:
+        chatter, predicted = self.detected.chatter, self.predicted
+        if chatter is None or predicted is None:
             return None
-        return float(
-            sideband_distance(self.predicted.frequency, self.detected.chatter.frequency, self.tooth_passing_frequency)
-        )
+        return float(sideband_distance(predicted.frequency, chatter.frequency, self.tooth_passing_frequency))
 
     def nearest_mode_frequency(self, frequency: float) -> float | None:
         """Return the frequency (Hz) of the tapped mode nearest to a frequency, or None without modes."""
@@ -95,23 +94,14 @@ class CutComparison:
 
 def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> list[CutComparison]:
     """Evaluate each cut in a recording and predict its chatter."""
-    cut = setting.cut
-    recording = CutRecording(
-        signal.acceleration,
-        signal.sample_rate,
-        cut.repeats_per_turn,
-        cut.immersion,
-        setting.speed_rpm,
-        signal.clipped,
-        signal.lost_scans,
-        signal.speed_rpm,
-    )
+    as_set = setting.cut.repeats_per_turn, setting.cut.immersion, setting.speed_rpm
+    found = signal.clipped, signal.lost_scans, signal.speed_rpm
+    recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found)
     tool = logbook.query(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
-    comparisons = [
-        CutComparison(setting, detected, assembly, sensor, None) for detected in evaluate_recording(recording)
-    ]
+    evaluated = evaluate_recording(recording)
+    comparisons = [CutComparison(setting, detected, assembly, sensor, None) for detected in evaluated]
     if assembly is None:
         return comparisons
     return [replace(cut, predicted=predict_chatter(setting, assembly, cut.speed_rpm)) for cut in comparisons]

@@ -154,12 +154,9 @@ def _select_distinct(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
 
 
 def _scale_joints(spindle: Spindle, radial: float, tilting: float) -> Spindle:
+    factors = {"stiffness": radial, "rotational_stiffness": tilting}
     return _replace_grouped_joints(
-        spindle,
-        lambda joint: {
-            "stiffness": radial * joint.stiffness,
-            "rotational_stiffness": tilting * joint.rotational_stiffness,
-        },
+        spindle, lambda joint: {name: factor * getattr(joint, name) for name, factor in factors.items()}
     )
 
 

@@ -328,12 +328,8 @@ class Logbook:
         """
         entries = {tap_id: self.files.by_id[tap_id] for tap_id in tap_ids}
         fits = {tap_id: fit_tap(self.folder.read(entry), self.machine, edits) for tap_id, entry in entries.items()}
-        reasons = {
-            tap_id: remark.text
-            for tap_id, fit in fits.items()
-            for remark in fit.remarks
-            if remark.code == EDITS_NOT_APPLIED_CODE
-        }
+        remarks = [(tap_id, remark) for tap_id, fit in fits.items() for remark in fit.remarks]
+        reasons = {tap_id: remark.text for tap_id, remark in remarks if remark.code == EDITS_NOT_APPLIED_CODE}
         fits = {tap_id: fit for tap_id, fit in fits.items() if tap_id not in reasons}
         store_mode_edits(self.folder, [*fits], edits)
         self.fits |= fits

@@ -43,10 +43,8 @@ class MachineForecast:
         for series in self.status.series:
             if tool in (None, series.tool) and direction in (None, series.direction):
                 return series
-        names = "; ".join(
-            f"SeriesStatus.tool {series.tool} SeriesStatus.direction {series.direction}"
-            for series in self.status.series
-        )
+        known = [(series.tool, series.direction) for series in self.status.series]
+        names = "; ".join(f"SeriesStatus.tool {name} SeriesStatus.direction {axis}" for name, axis in known)
         raise DataError(f"tool {tool or 'any'}, direction {direction or 'any'}: no such series; there are: {names}")
 
 
@@ -61,14 +59,11 @@ def forecast_from_analysis(analysis: Analysis, now: datetime) -> MachineForecast
     status, machine = analysis.status(now), analysis.machine
     verdicts = _newest_verdicts(analysis, status)
     limits = machine.limits.frequency_warn_percent, machine.limits.frequency_alarm_percent
+    programs = machine.program if verdicts else ()
     return MachineForecast(
         status,
         {name: verdict.critical for name, verdict in verdicts.items() if verdict.critical is not None},
-        {
-            table.name: _forecast_program(verdicts[table.name], table.tool, status)
-            for table in machine.program
-            if verdicts
-        },
+        {table.name: _forecast_program(verdicts[table.name], table.tool, status) for table in programs},
         frozenset(name for name, verdict in verdicts.items() if verdict.stability is Stability.UNKNOWN),
         tuple((percent, _forecast_limit(status, percent)) for percent in limits if status.series),
     )

@@ -33,19 +33,13 @@ def acknowledge_alarms(
     check_name(note, "note")
     check_name(operator, "operator")
     status, baseline = logbook.status(now), logbook.history.baseline
-    newest, by = status.last_tap or now, operator or _get_login_name()
-    alarms = [
-        msgspec.structs.replace(
-            alarm,
-            acknowledgement=Acknowledgement(
-                alarm.code, alarm.about, alarm.triggered_by, newest, baseline, now, by, end, note
-            ),
-        )
-        for alarm in select_alarms(status.alarms, name, now)
-    ]
+    said = status.last_tap or now, baseline, now, operator or _get_login_name(), end, note
+    chosen = select_alarms(status.alarms, name, now)
+    entries = [Acknowledgement(alarm.code, alarm.about, alarm.triggered_by, *said) for alarm in chosen]
     with logbook.folder.locked():
-        logbook.folder.journal.append(*(alarm.acknowledgement.line for alarm in alarms if alarm.acknowledgement))
-    return alarms
+        logbook.folder.journal.append(*(entry.line for entry in entries))
+    known = zip(chosen, entries, strict=True)
+    return [msgspec.structs.replace(alarm, acknowledgement=entry) for alarm, entry in known]
 
 
 def _get_login_name() -> str:

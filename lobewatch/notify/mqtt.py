@@ -81,9 +81,8 @@ class _BrokerThread(threading.Thread):
         except ImportError as error:
             raise DataError('MQTT needs paho-mqtt; install it with: pip install "lobewatch[mqtt]"') from error
         client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
-        client.connect_timeout = (
-            MQTT_TIMEOUT / 2
-        )  # for each address of a name: the second has a chance where one is silent
+        # For each address of a name: the second has a chance where one is silent.
+        client.connect_timeout = MQTT_TIMEOUT / 2
         if self._broker.user:
             client.username_pw_set(self._broker.user, self._broker.password or None)
         if self._broker.scheme == "mqtts":

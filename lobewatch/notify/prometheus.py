@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.monitoring.status_rules import StatusLevel
@@ -12,7 +14,7 @@ PROMETHEUS_CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 SECONDS_PER_DAY = 86400.0
 MetricLabels = tuple[tuple[str, str], ...]
 """Names and values of labels."""
-MetricSamples = Iterator[tuple[MetricLabels, float]]
+MetricSamples = Iterable[tuple[MetricLabels, float]]
 """Samples of one machine: further labels, and the value in the unit of the metric."""
 
 
@@ -35,17 +37,6 @@ def _escape_label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _sample_status(machine: FleetMachine) -> MetricSamples:
-    for level in StatusLevel:
-        yield (("light", level.value),), float(machine.current.status is level)
-
-
-def _sample_reasons(machine: FleetMachine) -> MetricSamples:
-    codes = [remark.code for remark in machine.current.remarks]
-    for code in dict.fromkeys(codes):
-        yield (("code", code),), float(codes.count(code))
-
-
 def _sample_series(machine: FleetMachine, field: str, scale: float = 1.0) -> MetricSamples:
     for series in machine.summary.series:
         value = getattr(series, field)
@@ -53,23 +44,9 @@ def _sample_series(machine: FleetMachine, field: str, scale: float = 1.0) -> Met
             yield (("tool", series.tool), ("direction", series.direction)), value / scale
 
 
-def _sample_acknowledged(machine: FleetMachine) -> MetricSamples:
-    yield (), float(sum(alarm.is_acknowledged(machine.current.time) for alarm in machine.summary.alarms))
-
-
-def _sample_alarm_times(machine: FleetMachine) -> MetricSamples:
-    for alarm in machine.summary.alarms:
-        yield (("alarm", alarm.id), ("code", alarm.code), ("about", alarm.about)), alarm.triggered_at.timestamp()
-
-
 def _sample_last_tap(machine: FleetMachine, added_days: float = 0.0) -> MetricSamples:
     if machine.summary.time is not None:
         yield (), machine.summary.time.timestamp() + SECONDS_PER_DAY * added_days
-
-
-def _sample_limits(machine: FleetMachine) -> MetricSamples:
-    for percent, dates in machine.summary.limits:
-        yield from _sample_date(machine, (("fall_percent", f"{percent:g}"),), dates)
 
 
 def _sample_program_forecasts(machine: FleetMachine) -> MetricSamples:
@@ -87,49 +64,64 @@ def _sample_date(machine: FleetMachine, labels: MetricLabels, dates: ThresholdDa
         yield labels, SECONDS_PER_DAY * dates.probable
 
 
-def _sample_verdicts(machine: FleetMachine) -> MetricSamples:
-    for program, verdict in machine.summary.programs.items():
-        yield (("program", program), ("word", verdict)), 1.0
-
-
 METRIC_FAMILIES: dict[str, tuple[str, Callable[[FleetMachine], MetricSamples]]] = {
     "lobewatch_judged_timestamp_seconds": (
         "When the machine was judged last.",
-        lambda machine: iter([((), machine.current.time.timestamp())]),
+        lambda m: [((), m.current.time.timestamp())],
     ),
     "lobewatch_can_be_judged": (
         "1 where the machine can be judged, 0 where its files do not let.",
-        lambda machine: iter([((), float(machine.current.is_readable))]),
+        lambda m: [((), float(m.current.is_readable))],
     ),
-    "lobewatch_light": ("1 for the light that the machine has, 0 for the others.", _sample_status),
-    "lobewatch_reasons": ("How many reasons of a code the light has.", _sample_reasons),
-    "lobewatch_alarms": (
-        "How many alarms are open.",
-        lambda machine: iter([((), float(len(machine.summary.alarms)))]),
+    "lobewatch_light": (
+        "1 for the light that the machine has, 0 for the others.",
+        lambda m: [((("light", level.value),), float(m.current.status is level)) for level in StatusLevel],
     ),
-    "lobewatch_alarms_acknowledged": ("How many of them a person has acknowledged.", _sample_acknowledged),
-    "lobewatch_alarm_raised_timestamp_seconds": ("When each open alarm was raised.", _sample_alarm_times),
+    "lobewatch_reasons": (
+        "How many reasons of a code the light has.",
+        lambda m: [
+            ((("code", code),), float(count))
+            for code, count in Counter(remark.code for remark in m.current.remarks).items()
+        ],
+    ),
+    "lobewatch_alarms": ("How many alarms are open.", lambda m: [((), float(len(m.summary.alarms)))]),
+    "lobewatch_alarms_acknowledged": (
+        "How many of them a person has acknowledged.",
+        lambda m: [((), float(sum(alarm.is_acknowledged(m.current.time) for alarm in m.summary.alarms)))],
+    ),
+    "lobewatch_alarm_raised_timestamp_seconds": (
+        "When each open alarm was raised.",
+        lambda m: [
+            ((("alarm", alarm.id), ("code", alarm.code), ("about", alarm.about)), alarm.triggered_at.timestamp())
+            for alarm in m.summary.alarms
+        ],
+    ),
     "lobewatch_frequency_fall_ratio": (
         "Fall of the followed frequency since the first tests, 0.05 for 5 %.",
-        lambda machine: _sample_series(machine, "drop", 100.0),
+        lambda m: _sample_series(m, "drop", 100.0),
     ),
     "lobewatch_frequency_hertz": (
         "Followed frequency at the newest point of its series.",
-        lambda machine: _sample_series(machine, "frequency"),
+        lambda m: _sample_series(m, "frequency"),
     ),
     "lobewatch_last_tap_timestamp_seconds": ("When the machine was tapped last.", _sample_last_tap),
     "lobewatch_tap_due_timestamp_seconds": (
         "When the next tap test is due.",
-        lambda machine: _sample_last_tap(machine, machine.summary.interval_days),
+        lambda m: _sample_last_tap(m, m.summary.interval_days),
     ),
     "lobewatch_limit_timestamp_seconds": (
         "When a fixed limit is probably reached; none where not in sight.",
-        _sample_limits,
+        lambda m: chain.from_iterable(
+            _sample_date(m, (("fall_percent", f"{percent:g}"),), dates) for percent, dates in m.summary.limits
+        ),
     ),
     "lobewatch_program_timestamp_seconds": (
         "When a program probably becomes doubtful, or not stable; none where not in sight.",
         _sample_program_forecasts,
     ),
-    "lobewatch_program_word": ("1 for the word on each cutting program.", _sample_verdicts),
+    "lobewatch_program_word": (
+        "1 for the word on each cutting program.",
+        lambda m: [((("program", name), ("word", verdict)), 1.0) for name, verdict in m.summary.programs.items()],
+    ),
 }
 """Metric families of machines by name: meaning, and function that yields the samples of a machine."""

@@ -202,20 +202,14 @@ def check_token(token: str | None) -> str:
     return token
 
 
-@dataclass(frozen=True)
-class AccessTokens:
-    """Tokens of a server; a browser must send one of them."""
-
-    full: str
-    """Token for full access."""
-    watch: str
-    """Token for read-only access."""
+AccessTokens = tuple[str, str]
+"""Token for full access and token for read-only access. A browser must send one of them."""
 
 
 def check_tokens(full: str | None, watch: str | None) -> AccessTokens:
     """Check both tokens, or make them for None. ValueError for an invalid token and for equal tokens."""
-    tokens = AccessTokens(check_token(full), check_token(watch))
-    if tokens.full == tokens.watch:
+    tokens = check_token(full), check_token(watch)
+    if tokens[0] == tokens[1]:
         raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
     return tokens
 
@@ -261,13 +255,10 @@ def _check_host(request: web.Request, listen: str) -> None:
     """Reject a host name that is neither numeric nor our own, against DNS rebinding."""
     try:
         host = URL(f"http://{request.host}").host or ""
-    except ValueError:
-        host = ""
-    if host not in ("localhost", listen):
-        try:
+        if host not in ("localhost", listen):
             ipaddress.ip_address(host)
-        except ValueError:
-            raise web.HTTPForbidden(text="this host name is not ours; use the address that lobewatch printed") from None
+    except ValueError:
+        raise web.HTTPForbidden(text="this host name is not ours; use the address that lobewatch printed") from None
 
 
 def _check_origin(request: web.Request) -> None:
@@ -283,8 +274,8 @@ def _check_request_token(request: web.Request, tokens: AccessTokens, changes: bo
     given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
     protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
     given += [name.strip().removeprefix("token.") for name in protocols]
-    request[HAS_FULL_ACCESS] = _matches_any(given, tokens.full)
-    if not request[HAS_FULL_ACCESS] and not _matches_any(given, tokens.watch):
+    request[HAS_FULL_ACCESS], can_watch = (_matches_any(given, token) for token in tokens)
+    if not (request[HAS_FULL_ACCESS] or can_watch):
         raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")
     if changes and not request[HAS_FULL_ACCESS]:
         raise web.HTTPForbidden(text="this address is only to watch; open the other one that lobewatch printed")

@@ -68,11 +68,8 @@ class ChoiceRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def add_pages(application: web.Application, pages: dict[str, str]) -> None:
     """Serve pages (path: file in static/) and all static files at /static/, from memory."""
     folder = resources.files("lobewatch.screen").joinpath("static")
-    files = {
-        file.name: file.read_bytes()
-        for file in folder.iterdir()
-        if file.name.rpartition(".")[2] in STATIC_CONTENT_TYPES
-    }
+    static_files = [file for file in folder.iterdir() if file.name.rpartition(".")[2] in STATIC_CONTENT_TYPES]
+    files = {file.name: file.read_bytes() for file in static_files}
 
     def respond(name: str) -> web.Response:
         content_type = STATIC_CONTENT_TYPES[name.rpartition(".")[2]]
@@ -116,12 +113,8 @@ def add_feed(
 def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], WatchedTest]) -> None:
     """Serve the screen of a tap test: feed, undo, stop and next step. `find` raises HTTPNotFound if there is none."""
 
-    async def undo(request: web.Request) -> web.Response:
-        await asyncio.to_thread(find(request).undo)
-        return web.json_response({})
-
-    async def stop(request: web.Request) -> web.Response:
-        await asyncio.to_thread(find(request).stop)
+    async def undo_or_stop(request: web.Request) -> web.Response:
+        await asyncio.to_thread(getattr(find(request), request.path.rpartition("/")[2]))
         return web.json_response({})
 
     async def choose(request: web.Request) -> web.Response:
@@ -131,8 +124,8 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         return web.json_response({})
 
     add_feed(application, prefix, find, StateEncoder(encode_tap_state, encode_plots))
-    for action in (undo, stop, choose):
-        application.router.add_post(f"{prefix}{action.__name__}", action)
+    for name, action in {"undo": undo_or_stop, "stop": undo_or_stop, "choose": choose}.items():
+        application.router.add_post(f"{prefix}{name}", action)
 
 
 async def read_body(request: web.Request, kind: type[Body], hint: str) -> Body:
@@ -151,7 +144,7 @@ class WebServerThread:
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
         tokens = check_tokens(token, watch_token)
-        self.token, self.watch_token = tokens.full, tokens.watch
+        self.token, self.watch_token = tokens
         self._listen = listen.lower()
         self.limiter = ConnectionLimiter()
         """Limiter that accepts and counts connections."""
@@ -169,9 +162,8 @@ class WebServerThread:
         self._ready.wait()
         if self._error is not None:
             why = getattr(self._error, "strerror", None) or self._error
-            raise DeviceError(
-                f"cannot listen on {self._listen} port {self._port} ({why})", "choose another port or address"
-            ) from self._error
+            text = f"cannot listen on {self._listen} port {self._port} ({why})"
+            raise DeviceError(text, "choose another port or address") from self._error
         return self
 
     def __exit__(

@@ -72,11 +72,8 @@ def find_recordings(places: Sequence[Path | str]) -> tuple[list[Path], list[Path
 
 def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     """Find the recordings in a folder, and the other files that are not hidden."""
-    files = sorted(
-        file
-        for file in folder.rglob("*")
-        if file.is_file() and not any(part.startswith(".") for part in file.relative_to(folder).parts)
-    )
+    paths = [path for path in folder.rglob("*") if path.is_file()]
+    files = sorted(p for p in paths if not any(part.startswith(".") for part in p.relative_to(folder).parts))
     extensions = {extension for file_format in list_formats() for extension in file_format.extensions}
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:

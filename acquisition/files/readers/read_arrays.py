@@ -130,9 +130,8 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
     signals, groups = list[Signal](), dict[str, int]()
     for number, channel in enumerate(channels, 1):
         where = f"{place}: channel {number}"
-        missing = [key for key in _SEP005_KEYS if key not in channel] + (
-            [] if {"fs", "time"} & channel.keys() else ["fs"]
-        )
+        missing = [key for key in _SEP005_KEYS if key not in channel]
+        missing += [] if {"fs", "time"} & channel.keys() else ["fs"]
         if missing:
             raise DataError(f"{where} has no {', '.join(missing)}; SEP005 asks for them")
         record = groups.setdefault(str(channel.get("group", "")), len(groups))
@@ -148,13 +147,9 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}
-    return Contents(
-        tuple(signals),
-        created=_parse_timestamp(first.get("start_timestamp")),
-        direction=str(first.get("direction", "")),
-        tool=str(first.get("tool", "")),
-        machines=list_distinct_names(groups),
-    )
+    direction, tool = (str(first.get(key, "")) for key in ("direction", "tool"))
+    created, machines = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
+    return Contents(tuple(signals), created=created, direction=direction, tool=tool, machines=machines)
 
 
 def _parse_timestamp(text: object) -> datetime | None:

@@ -73,15 +73,10 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
-        return _make_array_contents(_split_array_fields(loaded))
+        fields = loaded.dtype.names
+        return _make_array_contents({"array": loaded} if fields is None else {name: loaded[name] for name in fields})
     with loaded:
         return _make_array_contents({name: loaded[name][()] for name in loaded.files})
-
-
-def _split_array_fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Return an array by a name, or its fields where it has some."""
-    names = array.dtype.names
-    return {"array": array} if names is None else {name: array[name] for name in names}
 
 
 def _check_zip_size(file: BinaryIO, path: Path) -> None:

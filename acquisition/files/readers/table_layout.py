@@ -172,11 +172,8 @@ def find_heading_above(lines: Sequence[str], form: RowLayout, width: int) -> Hea
     in_turn = _split_words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
     if in_turn and all(in_turn[::2]) and is_unit(in_turn[1]):
         return _pair_alternating(in_turn)
-    return _pair_names_and_units(max(names, key=_count_known_roles), units, is_ratio=_RATIO_LABEL in lines)
-
-
-def _count_known_roles(words: Sequence[str]) -> int:
-    return sum(bool(infer_role(*split_heading(word))) for word in words)
+    best = max(names, key=lambda words: sum(bool(infer_role(*split_heading(word))) for word in words))
+    return _pair_names_and_units(best, units, is_ratio=_RATIO_LABEL in lines)
 
 
 def find_heading_behind(row: str, form: RowLayout) -> Heading:

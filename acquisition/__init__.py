@@ -1,4 +1,4 @@
-"""From the DAQ to hits, averaged FRF and HDF5 files."""
+"""Data acquisition: devices, hits, averaged FRFs, HDF5 files and imported recordings."""
 
 import lazy_loader
 

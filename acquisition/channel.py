@@ -148,7 +148,7 @@ class SensorInput:
     channel: Channel
     """Sensor; its full scale is the range to set."""
     iepe: bool = True
-    """Whether the device feeds the sensor (IEPE, ICP), where it can."""
+    """True if the device powers the sensor (IEPE, ICP), if it can."""
 
 
 @dataclass(frozen=True, eq=False)

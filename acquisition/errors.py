@@ -1,4 +1,4 @@
-"""Errors, remarks for people, and checked names.
+"""Errors and remarks with codes and remedies, and checks of names.
 
 OSError
 └── DeviceError     no device, a port in use, an unplugged cable, a device that falls silent
@@ -43,9 +43,9 @@ class DeviceError(OSError):
         """
         super().__init__(f"{text}; {cure}" if cure else text)
         self.text = text
-        """What is wrong, without a full stop."""
+        """Problem, without a full stop."""
         self.cure = cure
-        """What to do about it; empty where that is not known."""
+        """Remedy; empty if unknown."""
 
 
 class DataError(ValueError):
@@ -138,7 +138,7 @@ def merge_remarks(remarks: Iterable[Remark]) -> list[Remark]:
     Examples
     --------
     >>> remarks = [Remark("small", program, "it is small") for program in ("A", "B")]
-    >>> [(remark.code, remark.about) for remark in joined(remarks)]
+    >>> [(remark.code, remark.about) for remark in merge_remarks(remarks)]
     [('small', 'A, B')]
     """
     about: dict[Remark, list[str]] = {}

@@ -95,7 +95,7 @@ class Frf:
 
     @property
     def has_random_error(self) -> bool:
-        """Whether there are a coherence and at least three averages."""
+        """True if there are a coherence and at least three averages."""
         return self.coherence is not None and self.n_averages >= 3
 
     @property

@@ -111,7 +111,7 @@ class Hit:
 
     @property
     def has_force(self) -> bool:
-        """Whether the force was measured."""
+        """True if the force was measured."""
         return bool(self.force.size)
 
     @property

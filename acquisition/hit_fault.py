@@ -33,11 +33,11 @@ class HitFlags(enum.Flag):
     TOO_SOFT = enum.auto()
     """The peak of the force is near the noise, or small against its range."""
     NOT_DECAYED = enum.auto()
-    """The response still rings when the record ends."""
+    """The response still vibrates when the record ends."""
     LOST_SCANS = enum.auto()
     """Scans are missing inside the record."""
     NO_HIT = enum.auto()
-    """No pulse stands out of the noise."""
+    """No pulse exceeds the noise."""
     SWAPPED_CHANNELS = enum.auto()
     """The pulse is on the channel of the response."""
     TOO_HARD = enum.auto()

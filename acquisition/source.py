@@ -31,7 +31,7 @@ class Event:
     kind: int
     """Kind of the event, an EventKind; unknown kinds are passed on."""
     begins: bool = True
-    """Whether a button is pressed or a fault begins; False where it ends."""
+    """True if a button is pressed or a fault begins; False if it ends."""
     channel: int | None = None
     """Index of the channel of the cable or sensor; None without one."""
     scan: int = 0
@@ -110,11 +110,11 @@ class Device(Source, Protocol):
 
     @property
     def follows_clock(self) -> bool:
-        """Whether scans follow the clock, so that their rate can be measured."""
+        """True if scans follow the clock, so that their rate can be measured."""
 
     @property
     def loss_detection(self) -> str:
-        """How lost scans are detected, in two words; empty where none can be lost."""
+        """Method of detecting lost scans, in two words; empty if none can be lost."""
 
     @property
     def events(self) -> deque[Event]:

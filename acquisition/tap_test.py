@@ -32,7 +32,7 @@ class Conditions:
     Examples
     --------
     >>> usual = Conditions(stick_out_mm=42.0, state="cold")
-    >>> Conditions(temperature_c=35.0, state="warm").over(usual).known
+    >>> Conditions(temperature_c=35.0, state="warm").with_defaults(usual).specified
     {'temperature_c': 35.0, 'stick_out_mm': 42.0, 'state': 'warm'}
     """
 
@@ -45,7 +45,7 @@ class Conditions:
     state: str = ""
     """State of the machine in a word or two: "warm", "gearbox low"."""
     reclamped: bool = False
-    """Whether the tool was reclamped for the test; False where unknown."""
+    """True if the tool was reclamped for the test; False if unknown."""
     note: str = ""
     """Free note."""
     hours: float | None = None
@@ -93,7 +93,7 @@ UNKNOWN_CONDITIONS = Conditions()
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Who tested what, when and where.
+    """Operator, machine, tool, direction and time of a tap test.
 
     Examples
     --------
@@ -161,7 +161,7 @@ class TapTest:
     id: str
     """UTC time to the microsecond, machine, tool, direction and four random hex digits."""
     circumstances: Circumstances
-    """Who tested what, when and where."""
+    """Operator, machine, tool, direction and time."""
     frf: Frf | None
     """Averaged FRF; None where no force was measured."""
     hits: tuple[Hit, ...] = ()

@@ -152,7 +152,7 @@ def live(seconds: float) -> None:
 
 
 def machine_folder(path: Path) -> MachineFolder:
-    """That of the example, with the record and the trigger of this bench."""
+    """Make the example machine folder with record length and trigger of this bench."""
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
     own = {

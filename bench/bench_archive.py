@@ -1,4 +1,4 @@
-"""What a commit costs: a tap test of 10 hits x 2 x 65 536 stored for good, beside a plain write of the same by h5py.
+"""Measure a commit: a tap test of 10 hits x 2 x 65 536 stored safely, compared with a plain write by h5py.
 
     python bench/bench_archive.py [--rounds 15]
 
@@ -32,7 +32,7 @@ from lobewatch.machine.folder_files import make_machine_folder
 HITS, SCANS, RATE = 10, 65_536, 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
-"""As a tap file is."""
+"""HDF5 options of a tap file."""
 
 
 def tap_test() -> TapTest:

@@ -1,4 +1,4 @@
-"""What an assumption costs when it is wrong: the true limit over the stated one, both by semi-discretisation.
+"""Cost of wrong assumptions: true limit over stated limit, both by semi-discretization.
 
 `python bench/bench_assumptions.py` prints a line each for docs/lobes.md. The spindle is that of the simulation in time
 which these figures stand beside: x 1500 Hz, 3 %, 20 N/um; y 1575 Hz, 2.8 %, 22 N/um; four teeth, Kt 800, Kr 240 N/mm2.

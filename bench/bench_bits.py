@@ -1,8 +1,8 @@
-"""What the converter of a board costs in accuracy: whole tap tests of one spindle at 24, 16 and 12 bits.
+"""Measure the accuracy that a converter costs: whole tap tests of one spindle at 24, 16 and 12 bits.
 
-`python bench/bench_bits.py [EMULATED_TESTS]`: so many for each converter (20), ten good hits each, through the emulated TAPS/1
-device. Errors of f, zeta and K against the emulated truth, and by how much they differ from those of 24 bits with the
-same hits.
+`python bench/bench_bits.py [EMULATED_TESTS]`: tests for each converter (20), ten good hits each,
+through the emulated TAPS/1 device. Prints errors of f, zeta and K against the emulated truth, and their difference from
+those of 24 bits with the same hits.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Converter(NamedTuple):
     name: str
     bits: int
     full_scale: tuple[float, float] = (5.0, 5.0)
-    """Of force and acceleration (V)."""
+    """Full scale of force and acceleration (V)."""
     effective: float | None = None
     """Bits that its own noise leaves; None: no noise of its own."""
 

@@ -30,7 +30,7 @@ from lobewatch.machine.folder_files import make_machine_folder
 from modal import Mode
 
 MODES = [Mode(1000.0, 0.02, 2e7), Mode(1713.0, 0.03, 3.5e7), Mode(2900.0, 0.025, 9e7)]
-"""Of the structure that is hit."""
+"""Modes of the tapped structure."""
 PROGRAMS, DEPTHS = 3, np.linspace(1e-4, 5e-3, 20)
 
 

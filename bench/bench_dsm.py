@@ -50,7 +50,7 @@ MACHINE = Path(__file__).parent.parent / "sim_data" / "surrogate_machine.toml"
 MEASURED = 1722.0
 """First natural frequency that is calibrated to (Hz)."""
 STIFFNESS = 1.28e9
-"""Of each bearing otherwise (N/m)."""
+"""Default stiffness of each bearing (N/m)."""
 LOSS_FACTOR = 0.05
 MODES = 6
 REFINED = 2e-6
@@ -59,7 +59,7 @@ REFINED = 2e-6
 
 @dataclass(frozen=True)
 class Bench:
-    """How much is measured."""
+    """Scope of the measurements."""
 
     repeats: int
     frequencies: int
@@ -139,7 +139,7 @@ def difference(found: Any, exact: Any) -> str:
 
 
 def nearest(found: Float, wanted: Float) -> Float:
-    """Of the frequencies found, the one nearest to each that is wanted."""
+    """Return the found frequency nearest to each wanted one."""
     return np.asarray(found[np.argmin(np.abs(found[:, np.newaxis] - wanted), axis=0)])
 
 

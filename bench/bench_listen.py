@@ -33,7 +33,7 @@ SAMPLES = 8192
 
 
 def recordings() -> Iterator[tuple[str, Floats, float]]:
-    """What is recorded, one to three axes of it, shape (axes, n), and the speed that is set (rpm)."""
+    """Yield name, signals of one to three axes, shape (axes, n), and commanded speed (rpm)."""
     whole, short = Passage(2.0, 0.05, 7.0, 0.95), Passage(0.4, 0.05, 0.8, 0.1)
     for (word, _), axes in zip(DEPTHS.items(), sounds(whole), strict=True):
         yield f"one cut, {word}", axes[:1], SET

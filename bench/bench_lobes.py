@@ -63,7 +63,7 @@ Modes = Sequence[Mode] | None
 
 
 def textbook(x: Modes, y: Modes, speeds: Floats, depths: Floats, exponentials: int = 3) -> Floats:
-    """As the listings of Insperger & Stepan: dense products, all eigenvalues, expm wherever it is written or once."""
+    """Compute multipliers as Insperger & Stepan's listings: dense products, all eigenvalues, expm each time or once."""
     system = build_milling_system(x, y)
     n, p = system.frequency.size, system.axes.size
     shape = (system.shape[:, np.newaxis] * system.vector).T
@@ -183,10 +183,10 @@ class Chart(NamedTuple):
     name: str
     work: Callable[[Floats, Floats], Floats]
     speeds: Floats
-    """What its time is taken of ..."""
+    """Speeds for the measurement of the time."""
     depths: Floats
     checked: Floats
-    """... and the speeds at which its error is looked at, all of `exact`."""
+    """Speeds for the error, all of `exact`."""
 
 
 def cpu_time(work: Callable[..., object], *given: object) -> float:

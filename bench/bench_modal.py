@@ -66,7 +66,7 @@ def ours(frf: Frf) -> Values:
 
 
 def theirs(frfs: Sequence[Frf], frequencies: list[float]) -> Values:
-    """Of the first FRF; poles are those of all."""
+    """Return the modes of the first FRF by common poles of all FRFs."""
     (frf, *_) = frfs
     model = EMA.Model(
         np.stack([one.accelerance for one in frfs]),
@@ -108,7 +108,7 @@ def time_measured(folder: Path) -> None:
 
 
 def five_points() -> list[Frf]:
-    """The same structure, answering in five places."""
+    """Return FRFs of one structure at five points."""
     frfs = []
     for place in range(POINTS):
         shapes = np.cos(np.arange(1, len(TRUE) + 1) * (0.3 + 0.5 * place))

@@ -1,4 +1,4 @@
-"""What a plant costs: the standing of many machines, fresh and made anew, and their export.
+"""Measure a fleet: the status of many machines, fresh and computed again, and their export.
 
     python bench/bench_plant.py [--machines 100] [--taps 720] [--keep FOLDER]
 
@@ -127,7 +127,7 @@ def exported(table: Path, path: Path) -> float:
 
 
 def served(path: Path) -> None:
-    """What the pages of lobewatch serve cost: the first, one where nothing has changed, one where one machine has."""
+    """Measure the pages of `lobewatch serve`: first load, without changes, and with one changed machine."""
     board = DashboardTable(path)
     known = ""
     for name in ("first page", "nothing changed", "a machine changed"):

@@ -21,7 +21,7 @@ from modal import Mode
 
 MACHINE: Machine = parse_machine_file('[machine]\nname = "bench"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
 DIAMETER = 20.0
-"""Of the tool (mm)."""
+"""Tool diameter (mm)."""
 
 
 def assembly(modes: int) -> Assembly:

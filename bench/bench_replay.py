@@ -81,7 +81,7 @@ def frf(number: int, of: int, lines: NDArray[np.float64]) -> Frf:
 
 
 def cpu() -> float:
-    """Of this process and of those it has waited for (s)."""
+    """Return the CPU time of this process and of its finished children (s)."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
@@ -116,7 +116,7 @@ def text_files(folder: Path, count: int) -> None:
 
 
 def peers(files: Sequence[Path]) -> None:
-    """What others do with the same files, step by step; nothing is stored, checked or compared with what was before."""
+    """Run other software on the same files, step by step, without storage, checks or comparison."""
     try:
         import pyFRF
         from sdypy import EMA

@@ -27,7 +27,7 @@ COMMANDS = (
     "check --help",
     "tap --help",
 )
-"""As typed; chek is a mistake, FOLDER a new one each time."""
+"""Commands as typed; `chek` is a typing error, FOLDER is a new folder each time."""
 
 
 GREETING = """

@@ -34,16 +34,16 @@ from modal import fit_modes
 
 SESSIONS = 100
 LIMITS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.5, 4.0, 6.0, 10.0, np.inf)
-"""Of pyFRF's check for a double impact; the first is its own."""
+"""Limits of pyFRF's check for a double impact; the first is its default."""
 SHARES = (0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.5)
 GAPS = (0.25, 0.5, 1.0, 3.0, 10.0, 100.0)
 """Between the 5 % levels of the two pulses, in widths of the first."""
 NOISES = (0.05, 1.0, 5.0)
 """rms (N)."""
 PEAK, WIDTH = 200.0, 0.65e-3
-"""Of the first pulse: N, s."""
+"""Peak (N) and width (s) of the first pulse."""
 BAND = (1300.0, 2200.0)
-"""Where the mode is whose K is followed (Hz)."""
+"""Band with the mode whose K is followed (Hz)."""
 
 
 def compare(setting: Setting, seed: int) -> None:

@@ -1,4 +1,4 @@
-"""What else answers the questions of bench_dsm.py: finite beam elements with scipy, and ROSS."""
+"""Competitors of bench_dsm.py: finite beam elements with scipy, and ROSS."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class FiniteElements:
         return float(brentq(lambda k: self.frequencies(k, 1)[0] - frequency, *BRACKET, rtol=1e-8))
 
     def calibrate_sparse(self, frequency: float) -> float:
-        """The same with sparse matrices, their eigenvalue looked for beside the wanted one."""
+        """Calibrate with sparse matrices and a shift-invert search near the wanted eigenvalue."""
         mass, springs = csc_matrix(self.mass), np.zeros(self.mass.shape[0])
         springs[self.bearings] = 1.0
         free, ground = csc_matrix(self.stiffness), csc_matrix(np.diag(springs))
@@ -69,7 +69,7 @@ class FiniteElements:
         return float(brentq(excess, *BRACKET, rtol=1e-8))
 
     def calibrate_by_eigenproblem(self, frequency: float) -> float:
-        """The same without a root search: -1/k is an eigenvalue of the compliance of the free shaft at the bearings."""
+        """Calibrate without a root search: -1/k is an eigenvalue of the free shaft's compliance at the bearings."""
         forces = np.eye(self.mass.shape[0])[:, self.bearings]
         dynamic = self.stiffness - (2 * np.pi * frequency) ** 2 * self.mass
         values = np.linalg.eigvalsh(np.linalg.solve(dynamic, forces)[self.bearings])
@@ -84,9 +84,9 @@ class FiniteElements:
 
 
 STIFFNESS = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
-"""Of a Hermite element of EI = L = 1; dofs are deflection and slope of both ends."""
+"""Stiffness matrix of a Hermite element with EI = L = 1; dofs are deflection and slope of both ends."""
 MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
-"""Of the same, times 420."""
+"""Mass matrix of the Hermite element times 420."""
 
 
 def refine(spindle: Spindle, frequency: float, exact: float, within: float) -> tuple[FiniteElements, int]:

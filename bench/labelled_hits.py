@@ -37,7 +37,7 @@ FALL = 0.157
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What is tapped, and how it is recorded."""
+    """Tapped structure and its recording."""
 
     structure: Structure
     sample_rate: float
@@ -87,7 +87,7 @@ class LabelledHit:
     expected: HitFlags
     """The flag that must be there; OK for a good hit."""
     mean: Frf
-    """Of the good hits of its session."""
+    """Mean of the good hits of its session."""
 
 
 @dataclass(frozen=True, eq=False)

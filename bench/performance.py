@@ -118,7 +118,7 @@ def _time(seconds: float) -> str:
 
 
 def worse(results: Iterable[Result], stated: Iterable[Result]) -> Iterator[str]:
-    """What is slower beside its peer than was stated, a line each."""
+    """Yield a line for each result that is slower relative to its competitor than stated."""
     before = {(result.question, result.peer): result.times for result in stated}
     for result in results:
         was = before.get((result.question, result.peer))

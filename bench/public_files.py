@@ -41,7 +41,7 @@ class PublicFile:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a command has made of a file."""
+    """Result of a command on a file."""
 
     modes: tuple[tuple[float, bool], ...]
     """Frequency (Hz) of each mode, and whether it is trusted."""
@@ -151,7 +151,7 @@ def read(file: Path, answers: list[str]) -> Reading:
 
 
 def row(folder: Path, entry: PublicFile) -> str:
-    """Of the table; empty where no such file is there."""
+    """Return a row of the table; empty if the file is missing."""
     files = sorted(folder.glob(entry.pattern))
     if not files:
         return ""

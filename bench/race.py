@@ -1,4 +1,4 @@
-"""CPU time of lobewatch beside that of a peer that answers the same question, in turns, in one run."""
+"""CPU time of lobewatch compared with that of a competitor on the same problem, in alternating turns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Race(NamedTuple):
     """Two ways to one answer."""
 
     question: str
-    """What is worked out, of what size."""
+    """Problem that is computed, with its size."""
     ours: Callable[[], object]
     """Way of lobewatch."""
     peer: str
@@ -31,22 +31,22 @@ class Race(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What a race has come to."""
+    """Result of a race."""
 
     question: str
-    """As in the race."""
+    """Problem of the race."""
     ours_s: float
     """CPU time of lobewatch, median (s)."""
     peer: str
-    """As in the race."""
+    """Competitor of the race."""
     theirs_s: float
     """CPU time of the peer for all of the work, median (s)."""
     times: float
-    """Theirs over ours, median of the rounds ..."""
+    """Time of the competitor over ours, median of the rounds."""
     least: float
-    """... smallest ..."""
+    """Smallest ratio of all rounds."""
     most: float
-    """... and largest."""
+    """Largest ratio of all rounds."""
 
 
 def run(race: Race, quick: bool = False) -> Result:
@@ -77,7 +77,7 @@ def cpu() -> float:
 
 
 def _count(work: Callable[[], object]) -> int:
-    """How many times over a turn is to do it."""
+    """Return the number of repetitions in a turn."""
     work()
     return math.ceil(LEAST / max(_seconds(work, 1), 1e-6))
 

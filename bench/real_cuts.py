@@ -41,7 +41,7 @@ AROUND, HARMONICS = 0.05, 16
 CLEAR = 3.0
 """A comb is clear from so many times the median over all frequencies that are tried."""
 PADDED, NEIGHBOURS = 2, 129
-"""How many times its length a part is transformed; bins from which the local median of its power is taken."""
+"""Zero-padding factor of a part, and number of bins for the local median power."""
 SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
@@ -60,13 +60,13 @@ class Source:
     pattern: str
     """Paths below FOLDER."""
     columns: tuple[str, ...]
-    """What its columns are, in their order: "*" for each axis in turn, else as in --columns."""
+    """Columns in order: "*" for each axis in turn, else as in --columns."""
     teeth: int
     immersion: float = 1.0
     rpm: float = 0.0
     """Speed as set; 0 where it stands in the path."""
     options: Description = EMPTY_DESCRIPTION
-    """What the files do not say."""
+    """Facts that the files do not state."""
 
 
 CUTS = "Yang51st/Machining-Chatter-Detection-Program/VibrationData"
@@ -115,13 +115,13 @@ class Comb:
 
     @property
     def is_clear(self) -> bool:
-        """Whether the speed is known by it."""
+        """True if the comb determines the speed."""
         return self.score > CLEAR
 
 
 @dataclass
 class Tally:
-    """What was told of one source."""
+    """Counts of verdicts for one source."""
 
     cuts: int = 0
     found: int = 0
@@ -148,14 +148,14 @@ class Tally:
 
 
 def listened(file: list[Axis], part: slice = slice(None)) -> list[CutEvaluation]:
-    """What is told of some axes together, or of a part of them."""
+    """Evaluate some axes together, or a part of them."""
     first, size = file[0], min(axis.signal.size for axis in file)
     signals = np.stack([axis.signal[:size][part] for axis in file])
     return evaluate_recording(CutRecording(signals, first.rate, first.source.teeth, first.source.immersion, first.rpm))
 
 
 def longest(cuts: list[CutEvaluation]) -> CutEvaluation:
-    """That of the longest cut."""
+    """Return the longest cut."""
     return max(cuts, key=lambda heard: np.nan_to_num(heard.parts.end - heard.parts.begin))
 
 
@@ -215,7 +215,7 @@ def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
 
 
 def steady_part(file: list[Axis], heard: CutEvaluation) -> slice:
-    """What was listened to, else the middle of what is loud."""
+    """Return the evaluated part, else the middle of the loud part."""
     if heard.parts.cut.stop > heard.parts.cut.start:
         return heard.parts.cut
     begin, end = loud_part(file[0].signal, file[0].rate)
@@ -224,7 +224,7 @@ def steady_part(file: list[Axis], heard: CutEvaluation) -> slice:
 
 
 def judge_file(file: list[Axis], each: Tally, together: Tally) -> None:
-    """All that is to be counted of a file, its axes each by itself, and heard together."""
+    """Count a file, its axes separately and together."""
     combs, speeds = comb_of(file, steady_part(file, longest(listened(file)))), []
     for axis, comb in zip(file, combs, strict=True):
         cuts = listened([axis])
@@ -245,7 +245,7 @@ def _speed_word(heard: CutEvaluation, comb: Comb) -> str:
 
 
 def _is_on_harmonic(heard: CutEvaluation, turn: float) -> bool:
-    """Whether chatter is said at a multiple of a turn (Hz)."""
+    """Return whether chatter was detected at a multiple of a turn (Hz)."""
     if heard.chatter is None or heard.verdict != "chatter":
         return False
     return bool(fold_frequency(heard.chatter.frequency, turn) < ON_HARMONIC * turn)
@@ -263,7 +263,7 @@ def words_on_air(file: list[Axis], only_air: bool) -> Iterator[str]:
 
 
 def row(source: Source, each: Tally, together: Tally) -> str:
-    """Of the table."""
+    """Return a row of the table."""
     words = ", ".join(f"{count} {word}" for word, count in together.words.most_common())
     words_told = sum(together.words[word] for word in ("stable", "chatter", "flip"))
     false = each.on_harmonic + together.on_harmonic

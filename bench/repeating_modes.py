@@ -27,11 +27,11 @@ STRUCTURES = {
     "tool": f"{SIGNALS}/ExperimentalModalAnalysis/",
     "beam before a vibrometer": f"{VIBROMETER}/*reflection/data/",
 }
-"""What was measured, and how the patterns of its files begin."""
+"""Structures and the patterns of their file names."""
 
 
 def readings(folder: Path, begin: str) -> tuple[list[Reading], list[Reading]]:
-    """What is read of a structure: each file by itself, and beside the others that are read alike."""
+    """Return the readings of a structure: each file by itself, and with the other files of its kind."""
     alone, looked = [], []
     for entry in FILES:
         if entry.pattern.startswith(begin):
@@ -49,13 +49,13 @@ def readings(folder: Path, begin: str) -> tuple[list[Reading], list[Reading]]:
 
 
 def repeats(frequency: float, structure: list[Reading]) -> bool:
-    """Whether a mode (Hz) repeats."""
+    """Return whether a mode (Hz) repeats."""
     has = [any(abs(other / frequency - 1) < NEAR for other, _ in reading.modes) for reading in structure]
     return float(np.mean(has)) >= OFTEN
 
 
 def shares(structure: list[Reading], alone: list[Reading]) -> list[str]:
-    """How many are trusted of those that repeat, and of the others."""
+    """Return how many modes are trusted among those that repeat, and among the others."""
     told: dict[bool, list[bool]] = {True: [], False: []}
     for reading in structure:
         for frequency, trusted in reading.modes:
@@ -64,7 +64,7 @@ def shares(structure: list[Reading], alone: list[Reading]) -> list[str]:
 
 
 def row(name: str, alone: list[Reading], looked: list[Reading]) -> str:
-    """Of the table."""
+    """Return a row of the table."""
     return f"| {name} | {len(alone)} | {' | '.join([*shares(alone, alone), *shares(looked, alone)])} |"
 
 

@@ -1,4 +1,4 @@
-"""How the house is divided: rooms and what they reach, circles, sizes, words.
+"""Report the structure of the code: folders and their imports, cycles, sizes, names.
 
     python bench/rooms.py [--root FOLDER] [--verbose]
 
@@ -50,7 +50,7 @@ class Import:
     name: str
     """The name itself; empty for a whole module."""
     is_hidden: bool
-    """Whether the import stands in a function or is made for type checking alone."""
+    """True if the import is in a function or only for type checking."""
 
 
 class House:
@@ -166,7 +166,7 @@ class House:
 
 
 def _hides(node: ast.AST) -> bool:
-    """Whether what is imported below a node is not imported with its module."""
+    """Return whether imports below a node are not made with its module."""
     is_check = isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
     return is_check or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
 
@@ -242,7 +242,7 @@ def field_docstrings(tree: ast.AST) -> Iterator[tuple[str, str]]:
 
 
 def begins_without_a_noun(docstring: str) -> bool:
-    """Whether the first word of a docstring is one that no noun begins with."""
+    """Return whether a docstring begins with a word that no noun phrase begins with."""
     word = re.match(r"\W*([A-Za-z]+)", docstring)
     return docstring.startswith("...") or (word is not None and word[1].lower() in NO_NOUN)
 

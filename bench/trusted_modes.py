@@ -46,7 +46,7 @@ def nearest(modes: list[Mode], mode: Mode) -> Mode | None:
 
 
 def agreements(hits: Hits) -> Iterator[NDArray[np.bool_]]:
-    """Whether f and zeta of each pair of trusted modes agree within the root sum of squares of their intervals."""
+    """Yield for each pair of trusted modes whether f and zeta agree within the joint uncertainty of their intervals."""
     trusted = [[mode for mode in sensor if assess_trust(mode) is Trust.TRUSTED] for sensor in hits]
     for some, others in combinations(trusted, 2):
         for mode in some:
@@ -61,13 +61,13 @@ def is_trusted(mode: Mode) -> bool:
 
 
 def beside(hits: Hits, moved: float = 1.0) -> Hits:
-    """The same, the other sensors of the hits looked at for each, their frequencies moved by a factor."""
+    """Return the modes matched with the other sensors of the hits, whose frequencies are scaled by a factor."""
     away = [[mode.scaled(moved, 1.0, "") for mode in sensor] for sensor in hits]
     return [match_modes(sensor, away[:k] + away[k + 1 :]) for k, sensor in enumerate(hits)]
 
 
 def row(files: list[Hits]) -> str:
-    """Of the table."""
+    """Return a row of the table."""
     agree = np.array([pair for hits in files for pair in agreements(hits)])
     judged = [(repeats(mode, hits, files), is_trusted(mode)) for hits in files for sensor in hits for mode in sensor]
     again, once = ([trusted for repeated, trusted in judged if repeated is wanted] for wanted in (True, False))
@@ -87,7 +87,7 @@ def newly(files: list[Hits], looked: list[Hits]) -> Iterator[tuple[int, Mode, bo
 
 
 def share_of(files: list[Hits], looked: list[Hits]) -> float:
-    """Of the modes that are not trusted by themselves, how many are then."""
+    """Return the share of modes that are trusted by matching only."""
     return float(np.mean([trusted for _, _, trusted in newly(files, looked)]))
 
 

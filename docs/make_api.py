@@ -14,9 +14,9 @@ import pdoc.doc_ast
 import pdoc.doc_types
 import pdoc.render
 
-ROOMS = ("decay", "history", "logbook", "machine", "measuring", "plant", "tool", "verdicts")
+ROOMS = ("fleet", "history", "logbook", "machine", "measurement", "monitoring", "tool", "verdicts")
 MODULES = ("acquisition", "modal", "dsm", "lobes", "lobewatch", *(f"lobewatch.{room}" for room in ROOMS))
-"""What has a page: the packages, and the rooms of lobewatch whose names are given by an `__init__.pyi`."""
+"""Modules with a page: the packages, and the folders of lobewatch whose names an `__init__.pyi` gives."""
 
 
 TEMPLATES = Path(__file__).with_name("templates")
@@ -36,13 +36,18 @@ def public_names() -> dict[str, str]:
 
 def pages() -> dict[str, str]:
     """HTML of each page by its path in docs/api."""
+    _annotate_as_written(public_names())  # first: pdoc reads types of the stub files as soon as it lists a module
     modules = {name: _with_constants(pdoc.doc.Module(_resolved(name))) for name in MODULES}
-    _annotate_as_written(public_names())
-    pdoc.render.configure(docformat="markdown", show_source=False, search=False, template_directory=TEMPLATES)
+    pdoc.render.configure(docformat="numpy", show_source=False, search=False, template_directory=TEMPLATES)
     made = {f"{name.replace('.', '/')}.html": pdoc.render.html_module(modules[name], modules) for name in modules}
     made["index.html"] = pdoc.render.html_index(modules)
     made["style.css"] = pdoc.render.env.get_template("style.css.jinja2").render()
-    return {path: _without_indentation(text) for path, text in made.items()}
+    return {path: _without_indentation(_without_heading_ids(text)) for path, text in made.items()}
+
+
+def _without_heading_ids(html: str) -> str:
+    """Remove the ids of numpydoc sections, as "parameters" would be the id of hundreds of headings."""
+    return re.sub(r'<h6 id="[^"]*">', "<h6>", html)
 
 
 def _without_indentation(html: str) -> str:
@@ -51,7 +56,7 @@ def _without_indentation(html: str) -> str:
 
 
 def _resolved(name: str) -> Any:
-    """A package whose lazy names are all there."""
+    """Import a package and load all its lazy names."""
     module = import_module(name)
     for public in module.__all__:
         setattr(module, public, getattr(module, public))
@@ -59,7 +64,7 @@ def _resolved(name: str) -> Any:
 
 
 def _with_constants(module: pdoc.doc.Module) -> pdoc.doc.Module:
-    """A package whose constants have the docstrings that stand where they are bound."""
+    """Copy to the constants of a package the docstrings from the modules that bind them."""
     rooms = [room for name, room in sorted(sys.modules.items()) if name.startswith(module.modulename)]
     for constant in module.variables:
         value = vars(module.obj)[constant.name]

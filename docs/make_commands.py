@@ -15,7 +15,7 @@ INTRODUCTION = """For whoever looks an option up: what `--help` says of each com
 
 
 def page() -> str:
-    """The page in Markdown, by typer's own description of an application."""
+    """Return the page as Markdown, made from typer's own description of an application."""
     command = ["typer", "lobewatch.cli", "utils", "docs", "--name", "lobewatch", "--title", "All commands"]
     text = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, check=True).stdout
     head, _, rest = text.partition("**Commands**:")

@@ -34,13 +34,13 @@ STATES = {
 
 
 def lobewatch(*words: object) -> list[str]:
-    """A command."""
+    """Return the command line of a lobewatch command."""
     return [sys.executable, "-u", "-m", "lobewatch.cli", *map(str, words)]
 
 
 @contextmanager
 def running(*words: object) -> Iterator[subprocess.Popen[str]]:
-    """A command that is ended afterwards; both of its outputs are one."""
+    """Run a command and end it afterwards; stderr goes to stdout."""
     with subprocess.Popen(
         lobewatch(*words), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True
     ) as process:
@@ -51,7 +51,7 @@ def running(*words: object) -> Iterator[subprocess.Popen[str]]:
 
 
 def first_match(process: subprocess.Popen[str], pattern: str) -> str:
-    """What a pattern finds in the output of a command."""
+    """Return the first group of a pattern in the output of a command."""
     assert process.stdout is not None
     for line in process.stdout:
         if match := re.search(pattern, line):
@@ -72,7 +72,7 @@ def browser() -> webdriver.Chrome:
 
 
 def screens(folder: Path, driver: webdriver.Chrome) -> None:
-    """A tap test in x and y, looked at in each state."""
+    """Run a tap test in x and y, and save a picture of each state."""
     machine = folder / "mill-3"
     subprocess.run(lobewatch("init", machine, "--example"), check=True, stdout=subprocess.DEVNULL)
     with running("emulate", "taps", machine, "--json") as device:
@@ -89,7 +89,7 @@ def screens(folder: Path, driver: webdriver.Chrome) -> None:
 
 
 def state_of(driver: webdriver.Chrome, left: dict[str, str]) -> str | None:
-    """The picture that the page shows now, of those left; GOOD at the seventh hit, DONE with the result of y."""
+    """Return the name of a missing picture that the page shows now: GOOD at hit 7, DONE with the result of y."""
     word = driver.find_element(By.ID, "text").text
     if word == "GOOD" and driver.find_element(By.ID, "good").text != "7":
         return None

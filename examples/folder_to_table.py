@@ -14,8 +14,8 @@ from modal import Mode, fit_modes
 
 
 def modes_of(path: Path, unit: str) -> list[Mode]:
-    """The modes of a file; DataError or ValueError where it has none."""
-    asked = inspect_file(path).complaint
+    """Return the modes of a file. Raise DataError or ValueError if it has none."""
+    asked = inspect_file(path).problems
     return fit_modes(read_frf(path, Description(unit=unit) if asked else Description()))
 
 

@@ -1,6 +1,7 @@
-"""When will the frequency be 2 % lower? The forecast of a series from a CSV file: `forecast_csv.py FILE`.
+"""Forecast when the frequency will be 2 % lower, from a series in a CSV file: `forecast_csv.py FILE`.
 
-Rows of days and hertz below a heading. Without a file it writes one first: twelve months of a spindle that wears.
+The file has rows of days and Hz below a heading. Without a file, the program writes one: twelve months of a wearing
+spindle.
 """
 
 import sys
@@ -20,11 +21,13 @@ if len(sys.argv) < 2:
 days, frequency = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
 ahead = forecast_series(days, frequency, horizon=2 * days[-1])
 level = 0.98 * frequency[-1]
-first, probable, last = ahead.reached(level)
-print(f"{level:.0f} Hz: between day {first:.0f} and {last:.0f} (80 %), probably day {probable:.0f}")
+dates = ahead.crossing_dates(level)
+print(
+    f"{level:.0f} Hz: between day {dates.earliest:.0f} and {dates.latest:.0f} (80 %), probably day {dates.probable:.0f}"
+)
 plt.plot(days, frequency, "o")
-plt.plot(ahead.dates, ahead.line)
-plt.fill_between(ahead.dates, ahead.fan(0.1), ahead.fan(0.9), alpha=0.3)
+plt.plot(ahead.dates, ahead.mean_line)
+plt.fill_between(ahead.dates, ahead.quantile_line(0.1), ahead.quantile_line(0.9), alpha=0.3)
 plt.axhline(level, color="black", linewidth=0.8)
 plt.gca().set(xlabel="day", ylabel="natural frequency (Hz)")
 plt.savefig("forecast_csv.png", dpi=100)

@@ -16,7 +16,7 @@ from lobewatch.show.report.sections import SECTIONS
 
 
 def hammer_forces(material: ReportData) -> Sequence[Section]:
-    """A table of the peak forces of the newest tap test."""
+    """Return a table of the peak forces of the newest tap test."""
     peaks = [f"{hit.force.max():.0f}" for hit in material.newest.accepted]
     rows = [[str(number), peak] for number, peak in enumerate(peaks, 1)]
     return [Section("Hammer", [DataTable(["hit", "peak force (N)"], rows)])]

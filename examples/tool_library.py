@@ -16,7 +16,7 @@ spindle = machine.model("reference")
 
 
 def end_mill(diameter: float, length: float) -> Spindle:
-    """A carbide end mill (m) in a holder of 36 mm, without the spindle; flutes bend like 0.85 of their diameter."""
+    """Return a carbide end mill (m) in a 36 mm holder, without the spindle; flutes bend like 0.85 of their diameter."""
     flutes = Segment(0.4 * length, 0.85 * diameter, mass_diameter=0.9 * diameter, material=MATERIALS["carbide"])
     shank = Segment(0.6 * length, diameter, material=MATERIALS["carbide"])
     return Spindle([flutes, shank, Segment(0.02, 0.030, end_outer_diameter=0.036)], [])

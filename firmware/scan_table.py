@@ -1,4 +1,4 @@
-"""A table of scans for the boards that have no converter: `python firmware/scan_table.py NAME_QUESTION POSTGRES_TABLE`."""
+"""Write a table of scans for boards without a converter: `python firmware/scan_table.py MACHINE TABLE`."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, build_structure
 
 EVENTS = 16
-"""What a table has room for."""
+"""Largest number of events in a table."""
 
 
 def write_table(
     path: Path, codes: NDArray[np.int32], *, by_clock: bool = False, events: Sequence[tuple[int, str]] = ()
 ) -> None:
-    """Scans (2, n) of force and acceleration, played over and over: by the clock, or as fast as the host reads.
+    """Write scans (2, n) of force and acceleration, played over and over: by the clock, or as fast as the host reads.
 
-    events: at so many scans since power came on a letter of firmware/boards/simulated.h happens; 16 at most.
+    `events` are pairs of scans since power-on and an event letter of firmware/boards/simulated.h; 16 at most.
     """
     happening = [*events, *[(0, "\0")] * (EVENTS - len(events))]
     header = struct.pack("<4sII", b"TAPS", codes.shape[1], by_clock)
@@ -33,7 +33,7 @@ def write_table(
 
 
 def main() -> None:
-    """The spindle of a machine, tapped twice a second."""
+    """Write the table of a machine's spindle that is tapped twice a second."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("machine", type=Path, help="folder with a spindle in its machine.toml")
     parser.add_argument("table", type=Path, help="file to write")

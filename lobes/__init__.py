@@ -1,4 +1,4 @@
-"""Milling stability: lobes from modes or FRFs, stable pockets, published cutting data, and a history of lobes."""
+"""Milling stability: lobes, stable pockets, published cutting data and SLD history."""
 
 import lazy_loader
 

@@ -90,12 +90,9 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces_by_group().get(name, ())]
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
     ratio = _force_ratios().get(vdi) or _force_ratios()[row["iso_group"]]
-    tangential = np.mean(
-        [force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + [test.tangential for test in tests]
-    )
-    edge = np.mean(
-        [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces] + [test.tangential_edge for test in tests]
-    )
+    tangential = np.mean([f.tangential(REFERENCE_CHIP_THICKNESS) for f in forces] + [t.tangential for t in tests])
+    edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
+    edge = np.mean(edges + [test.tangential_edge for test in tests])
     return CuttingCoefficients(
         material=row["material"],
         tangential=float(tangential),
@@ -116,9 +113,7 @@ def _coefficient_range(
     middle: float, forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients]
 ) -> tuple[float, float]:
     """Return the range over all publications and chip thicknesses."""
-    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + [
-        test.tangential for test in tests
-    ]
+    published = [f.tangential(c) for f in forces for c in CHIP_THICKNESS_RANGE] + [t.tangential for t in tests]
     return min(*published, (1 - MIN_COEFFICIENT_RANGE) * middle), max(*published, (1 + MIN_COEFFICIENT_RANGE) * middle)
 
 

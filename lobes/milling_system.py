@@ -175,9 +175,7 @@ def project_modes(modes: Sequence[Mode], vectors: ArrayLike) -> ProjectedModes:
     [26.7, 80.0, 46.2]
     """
     vector = check_directions(vectors, len(modes))
-    pairs = (
-        [(mode, float(u[a] * u[b])) for mode, u in zip(modes, vector, strict=True)] for a, b in ((0, 0), (1, 1), (0, 1))
-    )
+    pairs = ([(m, float(u[a] * u[b])) for m, u in zip(modes, vector, strict=True)] for a, b in ((0, 0), (1, 1), (0, 1)))
     return ProjectedModes(*([mode.scaled(1.0, 1 / share, "") for mode, share in shown if share] for shown in pairs))
 
 

@@ -168,7 +168,7 @@ class StabilityLobes:
         return np.where(np.isfinite(between), between, np.minimum(below, above))
 
     def is_stable(self, speed_rpm: ArrayLike, depth: ArrayLike) -> Flags:
-        """Return whether cuts lie below the limit; shapes broadcast.
+        """Return whether cuts are below the limit; shapes broadcast.
 
         Parameters
         ----------

@@ -120,18 +120,15 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
 def _from_frf(frf: Frf) -> TipResponse:
     lines = np.arange(frf.frequency.size)
     steps = np.arange(lines[-1] * GRID_STEPS_PER_LINE + 1) / GRID_STEPS_PER_LINE
-    return TipResponse(
-        np.interp(steps, lines, frf.frequency), scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
-    )
+    spline = scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
+    return TipResponse(np.interp(steps, lines, frf.frequency), spline)
 
 
 def _highest_frequency(tip: TipData) -> float:
     """Return the highest frequency (Hz) that the data of a direction covers."""
-    return (
-        float(tip.frequency[-1])
-        if isinstance(tip, Frf)
-        else MAX_MODE_FREQUENCY_RATIO * max(mode.frequency for mode in tip)
-    )
+    if isinstance(tip, Frf):
+        return float(tip.frequency[-1])
+    return MAX_MODE_FREQUENCY_RATIO * max(mode.frequency for mode in tip)
 
 
 def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:

@@ -1,4 +1,4 @@
-"""Force matrix H over the turning cutter, and its integrals. `Cut` holds H and the conventions."""
+"""Directional force matrix H of the rotating cutter, and its integrals; conventions in `Cut`."""
 
 from __future__ import annotations
 

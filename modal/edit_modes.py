@@ -28,7 +28,7 @@ EDITED_MODE_DISTANCE = 0.01
 SAME_MODE_HALF_WIDTHS = 0.25
 """Distance up to which a mode to be added exists already (half-power half-widths); chosen."""
 TRIAL_DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03)
-"""Damping ratios that the fit of an added mode starts from, beside those of LSCF poles near it."""
+"""Start values of the damping ratio of an added mode, in addition to LSCF poles near it."""
 MAX_ADDED_MODE_SHIFT = 0.05
 """Largest relative shift of an added mode from the given frequency, within its half-width; chosen."""
 LONE_MODE_DAMPING = 0.02
@@ -78,9 +78,8 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
         for frequency, zeta in edits.fix:
             edited = _fix_mode(edited, frequency, zeta)
         settled = iterate_bands(edited)
-        return replace(
-            settled, bands=tuple(b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
-        )
+        bands = (b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
+        return replace(settled, bands=tuple(bands))
 
 
 @dataclass(frozen=True, eq=False)

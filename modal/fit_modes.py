@@ -114,9 +114,8 @@ def _modes_with_scatter(
 ) -> list[Mode]:
     by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
     n_hits = min(map(len, without), default=0)
-    over_hits = (
-        np.sum([jackknife_covariance(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
-    )
+    jackknives = [jackknife_covariance(state, band, *pair) for pair in enumerate(without)] if n_hits else []
+    over_hits = np.sum(jackknives, axis=0) if n_hits else None
     assessed = modes_from_band(state, band, by_hammer, over_hits, n_hits)
     return add_linearity_remarks(state, band, assessed, hits[0], without[0]) if n_hits else assessed
 
@@ -128,22 +127,16 @@ def modes_from_band(
     fit, beyond = band.fit, systematic_error(band)
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
-    modes = [
-        _mode_from_fit(fit, i, covariance, beyond.degrees_of_freedom, scatter, n_hits)
-        for i in range(fit.frequency.size)
-    ]
-    return [
-        assess_mode(state, band, i, replace(mode, method=_method_text(state, band))) for i, mode in enumerate(modes)
-    ]
+    freedom = beyond.degrees_of_freedom
+    modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
+    return [assess_mode(state, band, i, replace(m, method=_method_text(state, band))) for i, m in enumerate(modes)]
 
 
-def _mode_from_fit(
-    fit: BandFit, i: int, covariance: Floats, freedom: float, scatter: Floats | None, n_hits: int
-) -> Mode:
+def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: Floats | None, n_hits: int) -> Mode:
     """Return mode i of a band as seen at the driving point."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
-    of_fit = _mode_covariance(covariance, fit, i)
+    of_fit = _mode_covariance(cov, fit, i)
     over_hits = None if scatter is None else _mode_covariance(scatter, fit, i)
     best = of_fit if over_hits is None else over_hits
     error = np.sqrt(np.diag(best))

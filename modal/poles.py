@@ -64,7 +64,7 @@ FLEXIBILITY_TOLERANCE = 0.35
 
 @dataclass(frozen=True, eq=False)
 class StabilisationChart:
-    """Poles of all model orders that decay and lie inside the band, lower orders first."""
+    """Poles of all model orders that decay and are inside the band, lower orders first."""
 
     order: Integers
     """Order of the model: its number of poles, shape (k,)."""
@@ -79,7 +79,7 @@ class StabilisationChart:
 
     @property
     def stable(self) -> Flags:
-        """Whether the order below has the same pole, shape (k,)."""
+        """True for each pole that the order below has, too, shape (k,)."""
         return self.previous >= 0
 
 
@@ -152,9 +152,7 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
         return
     below = orthogonal_basis(np.tile(model.x, p), (model.weight * model.receptance).ravel(), orders)
     above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
-    overlap = [
-        basis.values.conj().T @ part for basis, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)
-    ]
+    overlap = [b.values.conj().T @ part for b, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)]
     for order in range(1, orders + 1):
         left = np.eye(order + 1) - sum(
             part.conj().T @ part for part in (o[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for o in overlap)
@@ -165,7 +163,7 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
 
 
 def _is_inside_band(model: _LscfModel, poles: Complexes) -> Flags:
-    """Return which poles decay and lie in the band."""
+    """Return which poles decay and are in the band."""
     size = np.abs(poles)
     return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
 

@@ -1,4 +1,4 @@
-"""What several tests share."""
+"""Fixtures that several tests share."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ settings.load_profile("untimed")
 
 @pytest.fixture
 def beam() -> Path:
-    """A clean real hammer hit on a beam: force in N, acceleration in g."""
+    """Return the file of a clean real hammer hit on a beam: force in N, acceleration in g."""
     return DATA / "ladisk_beam" / "acceleration.lvm"
 
 
 @pytest.fixture
 def clipped_beam() -> Path:
-    """A real hit whose accelerometer was clipped."""
+    """Return the file of a real hit with a clipped accelerometer."""
     return DATA / "ladisk_beam" / "camera.lvm"
 
 
 @pytest.fixture
 def cnc_csv() -> Path:
-    """A real CNC tap test without a force channel."""
+    """Return the file of a real CNC tap test without a force channel."""
     return DATA / "rpi_cnc_tap" / "tap_20260622_163222.csv"
 
 
@@ -60,7 +60,7 @@ Tapper = Callable[..., HammeredStructure]
 
 @pytest.fixture
 def tapper(structure: Structure) -> Tapper:
-    """Makes somebody who taps `structure` at 25.6 kHz; without faults unless asked for."""
+    """Return a function that makes a hammered `structure` at 25.6 kHz, without faults unless requested."""
 
     def make(seed: int = 1, **hammering: object) -> HammeredStructure:
         faultless: dict[str, object] = {"double_hits": 0.0, "overloads": 0.0}
@@ -83,7 +83,7 @@ def true_receptance(structure: Structure) -> Callable[[NDArray[np.float64]], NDA
 
 
 class ScriptedSession:
-    """A live tap test without device and clock: the test says what it shows next."""
+    """Live tap test without device and clock, whose steps the test scripts."""
 
     def __init__(self) -> None:
         self.state = TapState(1, TapStep.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
@@ -94,14 +94,14 @@ class ScriptedSession:
         self.chosen: list[tuple[str, str]] = []
 
     def show(self, word: TapStep, **changes: object) -> TapState:
-        """The next state."""
+        """Switch to the next state."""
         self.state = replace(self.state, revision=self.state.revision + 1, word=word, **changes)  # type: ignore[arg-type]
         for wake in tuple(self.wakes):
             wake()
         return self.state
 
     def check(self) -> None:
-        """The self-check, one line of it failed."""
+        """Show the self-check with one failed line."""
         passed = [("device", "DI-2108, serial 5C0A"), ("hum", "0.02 N at 50 Hz"), ("disk", "112 GB free")]
         failed = Check("noise floor", False, "4.1 N rms is above 2 N: is the spindle stopped, the hammer at rest?")
         self.show(TapStep.CHECKING, checks=(*(Check(name, True, text) for name, text in passed), failed))
@@ -155,7 +155,7 @@ class ScriptedSession:
 
 
 def scripted_plots(good: int) -> LiveCurves:
-    """A pulse, a ring-down and the FRF of one mode at 1722 Hz."""
+    """Return a pulse, a ring-down and the FRF of one mode at 1722 Hz."""
     time = np.linspace(-0.02, 0.23, 2001)
     frequency = np.linspace(4.0, 12800.0, 1500)
     ringing = np.where(time > 0, np.exp(-300 * time) * np.sin(2 * np.pi * 1722 * time), 0.0)
@@ -176,5 +176,5 @@ def scripted_plots(good: int) -> LiveCurves:
 
 @pytest.fixture
 def session() -> ScriptedSession:
-    """A tap test that shows what a test tells it to."""
+    """Return a tap test that shows what a test scripts."""
     return ScriptedSession()

@@ -1,4 +1,4 @@
-"""DATAQ devices (DI-1120, 2108, 2108-P, 4108, 4208, 4718B): protocol, stream decoder, source and emulator."""
+"""Drivers of DATAQ devices: protocol, stream decoder, source and emulator."""
 
 from acquisition.dataq.emulator import DataqEmulator, DataqFaults, DataqTraits
 from acquisition.dataq.protocol import DataqCommandLink, check_inputs, probe_dataq

@@ -1,4 +1,4 @@
-"""Device drivers, and the scan for devices that answer."""
+"""Device drivers, driver registry and port scan."""
 
 from acquisition.devices.drivers import DeviceSettings, Driver, SensorDataLocation, skip_serial_probe
 from acquisition.devices.port_scan import DeviceAnswer, PortScan, ScannedPort, probe_port, scan_ports, search_devices

@@ -1,1 +1,1 @@
-"""Estimate averaged FRFs from hits and correct them."""
+"""Estimation of averaged FRFs from hits, and their correction."""

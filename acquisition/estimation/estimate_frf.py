@@ -172,7 +172,7 @@ class RunningMean:
     >>> mean, random = RunningMean(), np.random.default_rng(1)
     >>> for force in (180.0, 200.0, 220.0, 240.0, 260.0):
     ...     mean.add(Hit(force * pulse, force * response + random.normal(0.0, 2.0, time.size), 10240.0, 100))
-    >>> mean.settled, f"{100 * mean.peak_error:.1f} %"
+    >>> mean.has_converged, f"{100 * mean.peak_error:.1f} %"
     (True, '0.5 %')
     """
 
@@ -199,7 +199,7 @@ class RunningMean:
 
     @property
     def has_converged(self) -> bool:
-        """Whether more hits would hardly change the peak.
+        """True if more hits would hardly change the peak.
 
         There are at least MIN_CONVERGED_HITS hits, and the rms of the random error sqrt((1 - g2) / (2 n g2)) over the
         lines near the highest peak is below MAX_CONVERGED_ERROR.

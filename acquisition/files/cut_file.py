@@ -47,7 +47,7 @@ class CutSignal:
     lost_scans: int = 0
     """Number of missing scans."""
     overload: bool = False
-    """Whether the device reported an overload."""
+    """True if the device reported an overload."""
     sensor: str = "accelerometer"
     """Kind of sensor: accelerometer or microphone."""
     speed_rpm: Floats | None = None
@@ -60,7 +60,7 @@ class CutSignal:
 
     @property
     def clipped(self) -> Flags:
-        """Whether each sample is clipped, shape (n,).
+        """True for each clipped sample, shape (n,).
 
         A sample is clipped at a rail of its converter, or in three equal extreme values in a row where there are no
         codes. All are where the device reported an overload. With several responses, any of them counts.

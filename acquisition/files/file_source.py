@@ -35,9 +35,9 @@ class FileSource(ClosedOnExit):
     """
 
     follows_clock = False
-    """Whether its scans follow the clock; they come at no measurable rate."""
+    """False, as scans come at no measurable rate."""
     loss_detection = ""
-    """How lost scans are detected; none can be lost."""
+    """Method of detecting lost scans; empty as none can be lost."""
     fault = ""
     """Present fault; there is never one."""
 

@@ -95,9 +95,9 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     ...     np.savetxt(f"{folder}/frf.csv", new_table, delimiter=",", header="frequency [Hz],real,imag", comments="")
     ...     unclear = inspect_file(f"{folder}/frf.csv")
     ...     clear = inspect_file(f"{folder}/frf.csv", Description(unit="m/N"))
-    >>> print(unclear.complaint)
+    >>> print(unclear.problems)
     it does not say: the unit of real (Description.unit, such as m/N, um/N, g/N)
-    >>> clear.complaint, clear.frf.frequency.size
+    >>> clear.problems, clear.frf.frequency.size
     ('', 100)
     """
     path = Path(path)

@@ -1,1 +1,1 @@
-"""Evaluate whether a hit is good."""
+"""Evaluation of hits: double hits, overloads, mains hum."""

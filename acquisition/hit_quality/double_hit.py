@@ -12,9 +12,9 @@ from acquisition.arrays import Floats
 from acquisition.hits.pulse import Pulse
 
 DOUBLE_HIT_SHARE = 0.025
-"""Height over the first pulse from which a second pulse makes a double hit; 3 % is found whatever its shape ..."""
+"""Height over the first pulse from which a second pulse makes a double hit; 3 % is found for any shape."""
 HEIGHT_NOISE_MARGIN = 3.0
-"""... in noise: a pulse is accepted only where it is lower by this many times the noise of its height."""
+"""Reduction of that height in noise, in multiples of the noise of the pulse height."""
 PULSE_WIDTH_RATIOS = (0.7, 1.0, 1.4, 2.0)
 """Widths to search for, over that of the first pulse: a lighter touch lasts longer."""
 MIN_PULSE_PROMINENCE = 0.3
@@ -112,9 +112,9 @@ SECOND_INPUT_RISE_TIME = 1e-3
 MIN_ERROR_RISE = 2.0
 """Smallest ratio to the largest error before it: nonlinear structures err most while they move most."""
 DECAY_FALSE_ALARM_RATE = 1e-4
-"""Probability that noise passes for a second touch in one decay ..."""
+"""Largest probability that noise is reported as a second touch in one decay."""
 NOISE_LIMIT_MARGIN = 1.25
-"""... with this margin, as its errors are not quite independent."""
+"""Factor on the noise limit, as errors are not quite independent."""
 REWEIGHTING_ROUNDS = 4
 """Number of rounds in which outlying errors lose weight."""
 

@@ -13,9 +13,9 @@ from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline
 MIN_RAIL_SAMPLES = 3
 """Smallest number of samples at a rail, or in a row at the extreme value of a converter without codes."""
 FLAT_TOP_SHARE = 0.7
-"""Share of a band's samples in its uppermost third from which a top is flat; a round top has 1/sqrt(3) = 0.58 ..."""
+"""Share of a band's samples in its uppermost third, from which a top is flat; a round top has 1/sqrt(3) = 0.58."""
 FLAT_TOP_SAMPLES = 2.5
-"""... and a flat top this many samples more than that."""
+"""Number of samples by which a flat top exceeds that share."""
 FLAT_TOP_SCALES = (1.0, 0.25, 0.0625)
 """Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier clips the noise too.
 """
@@ -35,7 +35,7 @@ class Overload:
     samples: int
     """Number of samples at that level."""
     inferred: bool
-    """Whether the shape of the signal shows it instead of codes at the rail of the converter."""
+    """True if the shape of the signal shows it instead of codes at the rail of the converter."""
 
 
 def find_overload(hit: Hit, index: int) -> Overload | None:

@@ -1,1 +1,1 @@
-"""Capture single hits from a stream of scans and split them into rest, pulse and decay."""
+"""Capture of single hits from a stream of scans: trigger, force pulse and free decay."""

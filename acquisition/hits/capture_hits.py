@@ -21,9 +21,9 @@ from acquisition.hit import Hit, TapInputs
 from acquisition.source import Source
 
 MAX_REST_RMS_RATIO = 2.0
-"""Largest rms of a response at rest, over that of the baseline ..."""
+"""Largest rms of a response at rest over that of the baseline."""
 MAX_REST_CODES = 2.0
-"""... or in steps of the converter."""
+"""Largest rms of a response at rest in converter steps."""
 STEADY_RMS_SHARE = 0.8
 """Median rms of the second half of the observed stretches over that of the first half from which a response is steady.
 """
@@ -166,12 +166,12 @@ class HitSearch:
 
     @property
     def recording(self) -> bool:
-        """Whether a hit is being recorded."""
+        """True if a hit is being recorded."""
         return self._crossing is not None
 
     @property
     def armed(self) -> bool:
-        """Whether the next hit would be recorded."""
+        """True if the next hit would be recorded."""
         return self._crossing is None and self._rested and self._quiet_count >= self._trigger.pre_trigger
 
     def feed(self, block: Block) -> Iterator[Hit]:
@@ -298,15 +298,15 @@ class HitSearch:
 MIN_HIT_SPACING = 0.2
 """Time below which a pulse belongs to the hit before it (s): a hammer bounces within 0.1 s."""
 PULSE_LEVEL_SHARE = 0.1
-"""Level of a pulse as a share of the largest force ..."""
+"""Level of a pulse as a share of the largest force."""
 PULSE_NOISE_RATIO = 10.0
-"""... and over the noise of the force."""
+"""Level of a pulse over the noise of the force."""
 PRE_HIT_TIME = 0.02
 """Time at rest to keep before each pulse (s)."""
 REST_RESPONSE_SHARE = 0.02
-"""Largest rms of a response at rest, over the loudest stretch since the previous hit ..."""
+"""Largest rms of a response at rest over the loudest stretch since the previous hit."""
 REST_NOISE_RATIO = 2.0
-"""... or over the quietest tenth of the record."""
+"""Largest rms of a response at rest over the quietest tenth of the record."""
 MIN_LAST_HIT_SHARE = 0.5
 """Shortest last hit that is kept, as a share of the others' length."""
 

@@ -1,4 +1,4 @@
-"""Serial ports: list, find and open them, and explain why one cannot be opened."""
+"""Serial ports: list, opening, and diagnosis of failures."""
 
 from acquisition.ports.serial_ports import (
     PortInfo,

@@ -1,4 +1,4 @@
-"""Check hammer, accelerometer and DAQ: sample rate, channel skew, mass calibration, plausibility."""
+"""Checks of hammer, accelerometer and DAQ: sample rate, channel skew, mass calibration, plausibility."""
 
 from acquisition.sensors.daq_timing import (
     MeasuredRate,

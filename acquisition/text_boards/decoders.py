@@ -122,9 +122,9 @@ class FrameFormat:
     start: bytes
     """Bytes at the start of a frame."""
     counter: bool = False
-    """Whether a counter (u16) precedes the values."""
+    """True if a counter (u16) precedes the values."""
     checksum: bool = True
-    """Whether a checksum follows the values."""
+    """True if a checksum follows the values."""
 
 
 class SimpleFrameDecoder:

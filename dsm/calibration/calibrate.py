@@ -271,12 +271,10 @@ def _stiffness_interval(problem: BearingEigenproblem, mode: int, start: float) -
     )
 
 
-def _unreachable_error(
-    spindle: Spindle, frequency: float, mode: int, chosen: Sequence[int]
-) -> UnreachableFrequencyError:
+def _unreachable_error(spindle: Spindle, f: float, mode: int, chosen: Sequence[int]) -> UnreachableFrequencyError:
     low, high = (float(natural_frequencies(limit, mode)[-1]) for limit in _limit_spindles(spindle, chosen))
     return UnreachableFrequencyError(
-        f"no bearing stiffness puts mode {mode} at {frequency:g} Hz: it lies between {low:.1f} Hz (without these "
+        f"no bearing stiffness puts mode {mode} at {f:g} Hz: it lies between {low:.1f} Hz (without these "
         f"bearings) and {high:.1f} Hz (rigid bearings); check the geometry, and which mode was measured",
         (low, high),
     )

@@ -274,9 +274,7 @@ def _damper_step(low: _DampingPoint, target: float) -> float:
 
 def _find_maximum(dampers: _Dampers, low: _DampingPoint, high: _DampingPoint) -> _DampingPoint:
     """Find the largest damping ratio between a point with rising and one with falling slope."""
-    return dampers.follow(
-        low, _find_root(lambda value: dampers.follow(low, value).slope, low.amount, high.amount, rtol=1e-10)
-    )
+    return dampers.follow(low, _find_root(lambda v: dampers.follow(low, v).slope, low.amount, high.amount, rtol=1e-10))
 
 
 def _find_root(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:

@@ -155,7 +155,7 @@ class Calibration:
 
     @property
     def is_open(self) -> bool:
-        """Whether the frequency leaves the stiffness open: almost no effect, or no upper end."""
+        """True if the frequency leaves the stiffness open: almost no effect, or no upper end."""
         return self.energy_share < MIN_ENERGY_SHARE or self._is_unbounded
 
     @property

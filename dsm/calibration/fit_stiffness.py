@@ -180,9 +180,7 @@ def _improve(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, Profil
     return state, around
 
 
-def _build_result(
-    problem: StiffnessProblem, state: Iterate, around: ProfileScan | None, tolerance: float
-) -> StiffnessFit:
+def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan | None, tol: float) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
     unsure = identifiability_remarks(problem, state, covariance, around)
@@ -205,7 +203,7 @@ def _build_result(
         given=problem.spindles,
         spindles=state.spindles,
         chi_square=None if measured.std is None else state.cost,
-        tolerance=tolerance,
+        tolerance=tol,
     )
 
 

@@ -1,4 +1,4 @@
-"""Identifiability: whether the measured modes determine the stiffness of each group, by profile likelihood."""
+"""Check by profile likelihood whether the measured modes determine the stiffness of each group."""
 
 from __future__ import annotations
 
@@ -54,9 +54,8 @@ class AllowedExcess(NamedTuple):
     def of(cls, problem: StiffnessProblem, best: Iterate) -> AllowedExcess:
         """Return the excess for a fit with a covariance."""
         given = problem.measured.std is not None
-        variance, spare = (
-            (1.0, math.inf) if given else (best.cost / problem.degrees_of_freedom, problem.degrees_of_freedom)
-        )
+        dof = problem.degrees_of_freedom
+        variance, spare = (1.0, math.inf) if given else (best.cost / dof, dof)
         return cls(variance, float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2, spare)
 
     @property
@@ -67,11 +66,8 @@ class AllowedExcess(NamedTuple):
     def log_density(self, excess: float) -> float:
         """Return the logarithm of the likelihood of an excess, over that of none: normal, or Student's."""
         square = excess / self.variance
-        return (
-            -square / 2
-            if math.isinf(self.degrees_of_freedom)
-            else -(self.degrees_of_freedom + 1) / 2 * math.log1p(square / self.degrees_of_freedom)
-        )
+        dof = self.degrees_of_freedom
+        return -square / 2 if math.isinf(dof) else -(dof + 1) / 2 * math.log1p(square / dof)
 
 
 class Profile(NamedTuple):
@@ -111,9 +107,7 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floa
             ways.append(_likelihood_profile(problem, best, log_covariance, index, felt < LOW_ENERGY_SHARE))
         except ArithmeticError:
             ways.append(None)
-    falling = [
-        state.log_factor for way in ways if way is not None for side in way.sides() for state in _lower_points(side)
-    ]
+    falling = [state.log_factor for way in ways if way is not None for s in way.sides() for state in _lower_points(s)]
     rivals = []
     for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
@@ -151,13 +145,9 @@ def identifiability_remarks(
     are reported. Without a covariance the energy shares alone decide.
     """
     felt = np.max(best.share, axis=0)
+    text = "at most {:.2g} % of the strain energy of the measured modes is in it"
     remarks = [
-        FitRemark(
-            "group-not-felt",
-            name,
-            f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it",
-            IDENTIFIABILITY_REMEDY,
-        )
+        FitRemark("group-not-felt", name, text.format(100 * share), IDENTIFIABILITY_REMEDY)
         for name, share in zip(problem.names, felt.tolist(), strict=True)
         if share < MIN_ENERGY_SHARE
     ]
@@ -169,9 +159,8 @@ def identifiability_remarks(
         return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, IDENTIFIABILITY_REMEDY)]
     for index in np.flatnonzero(felt >= MIN_ENERGY_SHARE).tolist():
         text = _open_interval_text(problem, best, float(log_covariance[index, index]), index, around.profiles[index])
-        remarks += (
-            [FitRemark("stiffness-ambiguous", problem.names[index], text, IDENTIFIABILITY_REMEDY)] if text else []
-        )
+        if text:
+            remarks.append(FitRemark("stiffness-ambiguous", problem.names[index], text, IDENTIFIABILITY_REMEDY))
     return remarks
 
 
@@ -186,37 +175,29 @@ def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: Floats
     return " or ".join(", ".join(f"{math.exp(value):.3g}" for value in rival) for rival in apart[1:])
 
 
-def _likelihood_profile(
-    problem: StiffnessProblem, best: Iterate, log_covariance: Floats, index: int, far: bool
-) -> Profile | None:
+def _likelihood_profile(problem: StiffnessProblem, best: Iterate, cov: Floats, i: int, far: bool) -> Profile | None:
     allowed = AllowedExcess.of(problem, best)
-    half = math.sqrt(allowed.rise * float(log_covariance[index, index]))
+    half = math.sqrt(allowed.rise * float(cov[i, i]))
     if half < MIN_PROFILE_WIDTH:
         return None
-    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= MAX_LOG_INTERVAL**2).tolist()]
+    fixed = [i, *np.flatnonzero(np.diag(cov) >= MAX_LOG_INTERVAL**2).tolist()]
     ends = best, best
     if half < MAX_LOG_INTERVAL:
-        along = np.clip(
-            half * log_covariance[:, index] / log_covariance[index, index], -MAX_LOG_INTERVAL, MAX_LOG_INTERVAL
-        )
+        along = np.clip(half * cov[:, i] / cov[i, i], -MAX_LOG_INTERVAL, MAX_LOG_INTERVAL)
         ends = problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)
         if not all(MIN_INTERVAL_RISE < (end.cost - best.cost) / allowed.limit < 1 / MIN_INTERVAL_RISE for end in ends):
             low, high = (minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends)
             ends = low, high
     if not far:
         return Profile(ends, ((), ()))
-    below, above = (
-        tuple(_extend_profile(problem, best, end, fixed, side)) for side, end in zip((-1, 1), ends, strict=True)
-    )
+    below, above = (tuple(_extend_profile(problem, best, end, fixed, s)) for s, end in zip((-1, 1), ends, strict=True))
     return Profile(ends, (below, above))
 
 
-def _open_interval_text(
-    problem: StiffnessProblem, best: Iterate, variance: float, index: int, way: Profile | None
-) -> str:
+def _open_interval_text(problem: StiffnessProblem, best: Iterate, var: float, i: int, way: Profile | None) -> str:
     """Return the fault of the interval of one factor; empty if there is none."""
     allowed = AllowedExcess.of(problem, best)
-    half = math.sqrt(allowed.rise * variance)
+    half = math.sqrt(allowed.rise * var)
     if not half < MAX_LOG_INTERVAL:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
     if half < MIN_PROFILE_WIDTH:
@@ -224,8 +205,8 @@ def _open_interval_text(
     if way is None:
         return "its interval reaches where the model cannot be solved"
     near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end in way.ends])
-    beyond = [list(_likelihood_masses(best, side, index, allowed)) for side in way.sides()]
-    mass = math.sqrt(2 * math.pi * variance)
+    beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way.sides()]
+    mass = math.sqrt(2 * math.pi * var)
     total = mass + math.fsum(part for side in beyond for part, _ in side)
     held = near * mass / total
     if held >= MIN_INTERVAL_COVERAGE:

@@ -1,4 +1,4 @@
-"""Least squares of measured frequencies in the logarithms of stiffness factors, with errors of the drawing."""
+"""Least-squares fit of logarithmic stiffness factors to measured frequencies, with drawing errors."""
 
 from __future__ import annotations
 

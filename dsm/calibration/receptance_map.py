@@ -74,9 +74,7 @@ def receptance_map(
         require_support(spindle)
     chosen = calibrated_bearings(spindle, group)
     middle = float(np.sqrt(np.min(factors) * np.max(factors)))
-    bearings = [
-        replace(spindle.bearings[index], stiffness=middle * spindle.bearings[index].stiffness) for index in chosen
-    ]
+    bearings = [replace(spindle.bearings[i], stiffness=middle * spindle.bearings[i].stiffness) for i in chosen]
     kept = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
     w = np.asarray(2 * np.pi * f, dtype=np.complex128)
     places = [position, *(bearing.position for bearing in bearings)]

@@ -89,7 +89,7 @@ class StiffnessFit:
 
     @property
     def has_misfit(self) -> bool:
-        """Whether the frequencies contradict one another far beyond their errors."""
+        """True if the frequencies contradict one another far beyond their errors."""
         return any(remark.code == "frequencies-misfit" for remark in self.remarks)
 
     @property

@@ -34,11 +34,7 @@ def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
 
 def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]:
     """Return the indices (0 is the first) of the bearings of a group; None: of all bearings with a group."""
-    chosen = [
-        index
-        for index, bearing in enumerate(spindle.bearings)
-        if (bearing.group if group is None else bearing.group == group)
-    ]
+    chosen = [i for i, b in enumerate(spindle.bearings) if (b.group if group is None else b.group == group)]
     if not chosen:
         groups = ", ".join(sorted({repr(part.group) for part in _parts(spindle) if part.group})) or "none"
         wanted = "with a group" if group is None else f"of group {group!r}"
@@ -51,9 +47,7 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
     """Scale bearing stiffnesses, and both stiffnesses of joints, by a factor; see calibrated_parts."""
     factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
-    return _with_parts(
-        spindle, [_scale_part(part, one, one) for part, one in zip(_parts(spindle), factors, strict=True)]
-    )
+    return _with_parts(spindle, [_scale_part(p, one, one) for p, one in zip(_parts(spindle), factors, strict=True)])
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:

@@ -143,7 +143,7 @@ class Nodes(NamedTuple):
     segment: Indices
     """Index of the segment of each element, shape (n - 1,)."""
     short: Flags
-    """Whether an element is a link, because its stiffness would lose all else to rounding, shape (n - 1,)."""
+    """True for each element that is a link, as its stiffness would lose all else to rounding, shape (n - 1,)."""
 
 
 def place_nodes(

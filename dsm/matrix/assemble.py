@@ -60,22 +60,13 @@ def _assemble(
         return _reverse_spin(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
     wanted = (*_part_positions(spindle), *places, *(z for z, _ in held))
     fastest = None if spin is None else shared_spin_limit(spin, top_frequency)
-    bare = _assemble_shaft(
-        tuple(spindle.segments),
-        spindle.material,
-        spindle.theory,
-        tuple(spindle.joints),
-        wanted,
-        top_frequency,
-        fastest,
-        links,
-    )
+    segments, joints = tuple(spindle.segments), tuple(spindle.joints)
+    bare = _assemble_shaft(segments, spindle.material, spindle.theory, joints, wanted, top_frequency, fastest, links)
     diagonal, coupling = (
         part.copy() if spin is None else combine_rotary_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
-    model = replace(
-        bare, diagonal=diagonal, coupling=coupling, held=bare.held.copy(), scale=bare.scale.copy(), spin=spin
-    )
+    held_dofs, scale = bare.held.copy(), bare.scale.copy()
+    model = replace(bare, diagonal=diagonal, coupling=coupling, held=held_dofs, scale=scale, spin=spin)
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
     model.scale[:] = _dof_scale(model)

@@ -52,10 +52,8 @@ def condense_to_node(
     # From the far end down to the node, where the two sides of a coupling block change places.
     flipped = coupling[: node - diagonal.shape[0] : -1][:, [0, 2, 1, 3]]
     right, _, _ = _eliminate(diagonal[:node:-1], flipped, is_link[:node:-1], flipped.shape[0])
-    uu, ut, tt = diagonal[node]
-    return CondensedStiffness(
-        uu - left[0] - right[0], ut - left[1] - right[1], tt - left[2] - right[2], share_u, share_t
-    )
+    uu, ut, tt = (own - a - b for own, a, b in zip(diagonal[node], left, right, strict=True))
+    return CondensedStiffness(uu, ut, tt, share_u, share_t)
 
 
 def _eliminate(

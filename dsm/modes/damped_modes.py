@@ -82,9 +82,7 @@ class DampedShaft:
         self, trial: complex, stiffness: Complexes, by_w: Complexes, shape: Complexes
     ) -> tuple[complex, Complexes]:
         at = np.array([trial], dtype=np.complex128)
-        w, moved, energy = newton_step(
-            at, stiffness[np.newaxis], by_w[np.newaxis], shape[np.newaxis], self.model.solve_singular
-        )
+        w, moved, energy = newton_step(at, stiffness[None], by_w[None], shape[None], self.model.solve_singular)
         return complex(w[0]), moved[0] / np.sqrt(energy[0])
 
     def matrices(self, damping: Damping, w: complex) -> tuple[Complexes, Complexes]:
@@ -143,9 +141,8 @@ class DampedShaft:
                 foreseen = trial - complex((shape @ stiffness @ shape) / (shape @ by_w @ shape))
             last, (w, shape) = w, self._step(trial, stiffness, by_w, shape)
             if abs(w - last) <= DAMPED_MODE_TOLERANCE * abs(w):
-                close = abs(w - foreseen) <= MAX_PREDICTION_MISS * abs(foreseen - mode.w) + DAMPED_MODE_TOLERANCE * abs(
-                    w
-                )
+                limit = MAX_PREDICTION_MISS * abs(foreseen - mode.w) + DAMPED_MODE_TOLERANCE * abs(w)
+                close = abs(w - foreseen) <= limit
                 return DampedMode(w, shape) if close and w.real > MIN_OSCILLATION_SHARE * abs(w) else None
         return None
 
@@ -202,6 +199,5 @@ def damped_modes(spindle: Spindle, count: int, loss_factor: float = 0.0) -> Damp
     target = damping_of_bearings(spindle.bearings, loss_factor)
     shaft = DampedShaft.of(spindle, count)
     modes = [shaft.follow(number, shaft.start(number), shaft.no_damping, target) for number in range(1, count + 1)]
-    return DampedModes(
-        np.array([abs(mode.w) / (2 * np.pi) for mode in modes]), np.array([mode.damping_ratio for mode in modes])
-    )
+    frequency = np.array([abs(mode.w) / (2 * np.pi) for mode in modes])
+    return DampedModes(frequency, np.array([mode.damping_ratio for mode in modes]))

@@ -18,7 +18,7 @@ from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
 
 MODE_INTERVAL_WIDTH = 2e-10
-"""Relative half-width, in w^2 (w if spinning), of the interval in which each mode is proved to lie."""
+"""Relative half-width, in w^2 (w if spinning), of the interval that is proved to contain each mode."""
 MODE_ROUNDING = 1024 * np.finfo(np.float64).eps
 """Half-width from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
 MAX_MODE_INTERVAL = 0.1
@@ -83,9 +83,8 @@ class _ModeRequest(NamedTuple):
 def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
     try:
         model, eigenvalue, shape = _start_values(wanted, links)
-        width = MODE_INTERVAL_WIDTH * eigenvalue + MODE_ROUNDING * quadratic_form(
-            np.abs(model.dense(eigenvalue)), np.abs(shape)
-        )
+        size = quadratic_form(np.abs(model.dense(eigenvalue)), np.abs(shape))
+        width = MODE_INTERVAL_WIDTH * eigenvalue + MODE_ROUNDING * size
         eigenvalue, shape = _refine_modes(model, eigenvalue, shape, width)
         _require_small_rounding(wanted, eigenvalue, width, MAX_MODE_INTERVAL if links else MAX_DIRECT_INTERVAL)
         eigenvalue, shape = _verify_modes(model, eigenvalue, shape, width)
@@ -93,9 +92,8 @@ def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
         raise _RoundingError from exc
     node = np.flatnonzero(~model.is_link)
     deflection, slope = shape[:, 2 * node], shape[:, 2 * node + 1]
-    return Modes(
-        model.to_frequency(eigenvalue), model.position[node], deflection, slope, wanted.spindle, wanted.spin or 0.0
-    )
+    frequency, spin = model.to_frequency(eigenvalue), wanted.spin or 0.0
+    return Modes(frequency, model.position[node], deflection, slope, wanted.spindle, spin)
 
 
 def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, Floats, Floats]:
@@ -118,9 +116,8 @@ def _finite_element_start(
     spindle, count, places, held, spin = wanted
     if spin is None:
         return finite_element_modes(model, count)
-    w2, shape = _modes_at_rest(
-        spindle, count + EXTRA_WHIRL_MODES, top, places, held, shared_spin_limit(abs(spin), top), links
-    )
+    fastest = shared_spin_limit(abs(spin), top)
+    w2, shape = _modes_at_rest(spindle, count + EXTRA_WHIRL_MODES, top, places, held, fastest, links)
     return whirling_modes(model, w2, shape, count)
 
 

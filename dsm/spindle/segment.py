@@ -159,7 +159,7 @@ class Segment:
 
     @property
     def is_cone(self) -> bool:
-        """Whether a diameter changes along the segment."""
+        """True if a diameter changes along the segment."""
         return self.end_outer_diameter is not None or self.end_bore_diameter is not None
 
     @property

@@ -200,9 +200,7 @@ class SpinningChain:
             (-self._planar[1], mass * np.eye(2)),
             (-self._planar[1], mass * np.eye(2)[::-1]),
         )
-        stiffness, inertia, coupling = (
-            self._joined(np.einsum("ekl,eab->ekalb", *pair)[np.newaxis])[0] for pair in inner
-        )
+        stiffness, inertia, coupling = (self._joined(np.einsum("ekl,eab->ekalb", *p)[np.newaxis])[0] for p in inner)
         return stiffness + self._springs, inertia, coupling
 
     @cached_property

@@ -12,7 +12,7 @@ from dsm.spindle.segment import nearest_index
 from dsm.spinning.beam import SpinningBeam, SpinningChain, SpinningDof, angular_speed
 
 SPINNING_INTERVAL_WIDTH = 1e-10
-"""Relative half-width, in w, of the interval in which each mode is proved to lie."""
+"""Relative half-width, in w, of the interval that is proved to contain each mode."""
 SPINNING_ROUNDING = 16 * np.finfo(np.float64).eps
 """Half-width from rounding, relative to |phi|^T |K| |phi| of a mode with |phi^T (dK/dw) phi| = 1."""
 TRIAL_ELEMENT_X = (MAX_ELEMENT_X, 1.0, 0.5)

@@ -1,4 +1,4 @@
-"""The ACME-1: `?` is answered by model and serial number, `go` begins its packets, `halt` ends them."""
+"""Driver of the ACME-1: it answers `?` with model and serial number. `go` starts its packets, `halt` stops them."""
 
 import struct
 import time
@@ -18,8 +18,8 @@ CHANNELS = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
 
 
 def probe(link):
-    """Who answers on an open port; None where it is no ACME-1."""
-    link.write(b"\n?\n")  # the first line end closes what another driver has begun to ask
+    """Return the identity of an ACME-1 on an open port, or None."""
+    link.write(b"\n?\n")  # the first line end closes an unfinished command of another driver
     received = b""
     while b"\n" not in received and (data := link.read(0.5)):
         received += data
@@ -79,7 +79,7 @@ class Acme:
 
 
 class AcmeEmulator(EmulatorThread):
-    """An ACME-1 made of software."""
+    """Emulated ACME-1."""
 
     def __init__(self, bench):
         super().__init__(bench.tcp)
@@ -95,7 +95,7 @@ class AcmeEmulator(EmulatorThread):
             elif line == b"halt":
                 self._begun = None
         while self._begun is not None and self._scan + SCANS <= (time.monotonic() - self._begun) * RATE:
-            codes = quantise(self._signal(self._taken, SCANS), CHANNELS)  # force and acceleration of somebody who taps
+            codes = quantise(self._signal(self._taken, SCANS), CHANNELS)  # force and acceleration of hammer hits
             self.wire.pending += struct.pack("<I", self._scan) + codes.T.astype("<i2").tobytes()
             self._scan, self._taken = self._scan + SCANS, self._taken + SCANS
         return True
@@ -106,6 +106,6 @@ DRIVER = Driver(
     "an ACME-1",
     open=Acme,
     probe=probe,
-    sensors=SensorDataLocation("the settings of the ACME-1", "sensitivity", "skew"),
+    sensor_data=SensorDataLocation("the settings of the ACME-1", "sensitivity", "skew"),
     emulate=AcmeEmulator,
 )

@@ -1,4 +1,4 @@
-"""High-order semi-discretization: milling over one tooth period, its largest multiplier, and stability limits."""
+"""High-order semi-discretization of milling: Floquet multipliers and stability limits."""
 
 import lazy_loader
 

@@ -39,9 +39,8 @@ def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Float
     is negative at depth 0. k is at least 1.
     """
     rows = np.arange(n_rows)
-    depth = np.broadcast_to(
-        deepest * (np.arange(1, SCAN_DEPTHS + 1) / SCAN_DEPTHS) ** SCAN_EXPONENT, (n_rows, SCAN_DEPTHS)
-    )
+    depths = deepest * (np.arange(1, SCAN_DEPTHS + 1) / SCAN_DEPTHS) ** SCAN_EXPONENT
+    depth = np.broadcast_to(depths, (n_rows, SCAN_DEPTHS))
     value = growth(rows, depth, GROWTH_SIGN_ACCURACY)
     brackets = _bracket_crossings(growth, _scan_steps(depth, value))
     return _pad_rows(brackets.row, _refine_crossings(growth, brackets), n_rows)
@@ -79,7 +78,7 @@ class _DepthSteps:
 
     @property
     def may_hide(self) -> Flags:
-        """Whether growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
+        """True if growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 
@@ -94,9 +93,7 @@ class _DepthSteps:
 
 
 def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
-    return _DepthSteps(
-        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_DepthSteps))
-    )
+    return _DepthSteps(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(_DepthSteps)))
 
 
 def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:

@@ -106,9 +106,7 @@ def join_rows(first: MillingRows, second: MillingRows) -> MillingRows:
     MillingRows
         Rows of both.
     """
-    columns: dict[str, Any] = {
-        name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING_FIELDS
-    }
+    columns: dict[str, Any] = {n: np.concatenate((getattr(first, n), getattr(second, n))) for n in _VARYING_FIELDS}
     return replace(first, **columns)
 
 
@@ -210,16 +208,11 @@ def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER
     ndarray of int, shape (r,)
         Numbers of pieces.
     """
-    loop = (
-        deepest
-        * rows.force[:, np.newaxis]
-        / (2 * rows.stiffness * rows.damping_ratio)
-        * np.hypot(*rows.tip_participation)
-    )
+    dynamic_stiffness = 2 * rows.stiffness * rows.damping_ratio
+    loop = deepest * rows.force[:, np.newaxis] / dynamic_stiffness * np.hypot(*rows.tip_participation)
     loop = loop * np.sum(rows.vector**2, axis=-1)
-    fastest = np.maximum(
-        np.max(np.where(loop > MIN_LOOP_GAIN, rows.frequency, 0.0), axis=1), np.min(rows.frequency, axis=1)
-    )
+    significant = np.where(loop > MIN_LOOP_GAIN, rows.frequency, 0.0)
+    fastest = np.maximum(np.max(significant, axis=1), np.min(rows.frequency, axis=1))
     cycles = fastest / (2 * np.pi) * rows.period
     return np.asarray(np.ceil(np.maximum(cycles / most, 1.0)), dtype=np.int64)
 

@@ -176,10 +176,8 @@ class _KrylovSpace:
 
     def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
         """Select c of the cases, as (c, 1)."""
-        row, column = which
-        return _KrylovSpace(
-            self.over_period[row, column], self.basis[which][:, np.newaxis], self.matrix[which][:, np.newaxis]
-        )
+        basis, matrix = self.basis[which], self.matrix[which]
+        return _KrylovSpace(self.over_period[*which], basis[:, np.newaxis], matrix[:, np.newaxis])
 
     def grown(self, vectors: int) -> _KrylovSpace:
         """Return the spaces with so many vectors, at most the number of states."""
@@ -237,9 +235,8 @@ def _ritz_radius(matrices: Floats, squarings: int) -> tuple[Complexes, Floats]:
             share = np.sqrt(rows[..., -1] / np.maximum(np.sum(rows, axis=-1), np.finfo(np.float64).tiny))
         power = power @ power
     radius = np.exp(log)
-    return np.where(finite, radius, np.inf) + 0j, matrices[..., -1, -1] * share / np.maximum(
-        radius, _tiny_value(matrices)
-    )
+    last = matrices[..., -1, -1] * share / np.maximum(radius, _tiny_value(matrices))
+    return np.where(finite, radius, np.inf) + 0j, last
 
 
 def _zero_non_finite(matrices: Floats) -> tuple[Floats, Flags]:

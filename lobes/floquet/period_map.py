@@ -169,7 +169,7 @@ class PeriodMap:
     """Map over one tooth period, applied piece by piece: each piece maps z and its own w to the new ones."""
 
     pieces: tuple[tuple[bool, Floats], ...]
-    """Whether teeth cut, and the matrix, shape (r, d, m, m): m = 2n + nodes p in the cut, 2n else."""
+    """Pieces: True if teeth cut, and the matrix, shape (r, d, m, m); m = 2n + nodes p in the cut, else 2n."""
     modes: int
     """Number of modes n."""
     nodes: int
@@ -261,9 +261,7 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
     apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
     cutting = [segment for segment in segments if segment.forces is not None]
     starts = np.hstack([segment.starts[apart] for segment in cutting])
-    lengths = np.hstack(
-        [np.repeat(segment.angle[apart, np.newaxis], segment.starts.shape[1], 1) for segment in cutting]
-    )
+    lengths = np.hstack([np.repeat(s.angle[apart, np.newaxis], s.starts.shape[1], 1) for s in cutting])
     forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=4)
     met = regenerated_surfaces(rows.cut.delays, sum(rows.cut.pitch_pattern), starts, lengths, forces)
     pieces = list[UnevenPiece]()
@@ -285,10 +283,8 @@ def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Flo
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
     at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_nodes().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
-    frame, coefficients = (
-        feed_rotation(rows.feed_angle)[..., rows.axes],
-        np.stack((rows.tangential, rows.radial), axis=1),
-    )
+    frame = feed_rotation(rows.feed_angle)[..., rows.axes]
+    coefficients = np.stack((rows.tangential, rows.radial), axis=1)
     by_share = np.einsum("rc,rmi,rnj->rcmnij", coefficients, frame, frame).reshape(len(rows), 8, -1)
     matrix = shares.reshape(*shares.shape[:2], -1, 8) @ by_share
     matrix = matrix.reshape(*matrix.shape[:2], *at.shape[1:], *[rows.axes.size] * 2)

@@ -38,9 +38,8 @@ def interpolation_weights(place: Floats) -> Floats:
     node = gauss_nodes().node
     apart = place[..., np.newaxis, np.newaxis] - node
     own = np.eye(node.size, dtype=bool)
-    return np.asarray(
-        np.prod(np.where(own, 1.0, apart), axis=-1) / np.prod(np.where(own, 1.0, node[:, np.newaxis] - node), axis=-1)
-    )
+    above, below = (np.prod(np.where(own, 1.0, part), axis=-1) for part in (apart, node[:, np.newaxis] - node))
+    return np.asarray(above / below)
 
 
 @cache
@@ -204,9 +203,8 @@ class PieceResponse:
         for direction in range(p):
             pushes = np.repeat(np.moveaxis(self.end_state_per_force[:, :, direction], 0, -1), depths, axis=-1)
             push += pushes[:, np.newaxis, :, np.newaxis] * forces[direction]
-        return _cases_first(invert_matrices(loop), cases), _cases_first(
-            push.reshape(states, size, *forces.shape[3:]), cases
-        )
+        push = push.reshape(states, size, *forces.shape[3:])
+        return _cases_first(invert_matrices(loop), cases), _cases_first(push, cases)
 
     def _given(self) -> Floats:
         """Return the displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""

@@ -26,7 +26,7 @@ class ProgramLimit:
     """Stability of one program on one spindle, for its worst engagement and feed direction."""
 
     stable: bool
-    """Whether the depth is below the limit at its speed, and the multipliers at its depth below 1."""
+    """True if the depth is below the limit at its speed, and the multipliers at its depth below 1."""
     limit: float
     """Largest stable depth at its speed (m); inf if there is no limit up to 20 times its depth."""
     chatter_frequency: float

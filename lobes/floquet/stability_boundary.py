@@ -25,9 +25,7 @@ FORCE_HARMONIC_SAMPLES = 128
 """Intervals of a tooth period for the harmonics of the cutting force."""
 
 
-def loudest_chatter_frequency(
-    system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
-) -> Floats:
+def loudest_chatter_frequency(system: MillingSystem, cut: Cut, mu: Complexes, depth: Floats, base: Floats) -> Floats:
     """Return the dominant frequency (Hz) at limits with multipliers |mu| = 1 and depths (m), each of shape (n,).
 
     base (n,): frequency at which the cut repeats (Hz), the tooth frequency of even teeth. A multiplier leaves
@@ -35,7 +33,7 @@ def loudest_chatter_frequency(
     mean force. The result is the largest in the balance of harmonics around it, over the delays tau,
     d_k = -b G_k sum_l sum_tau H_(tau, k-l) (1 - exp(-i w_l tau)) d_l.
     """
-    waves = _nearest_to_mean_force_loop(system, cut, multiplier, depth, base)[:, np.newaxis]
+    waves = _nearest_to_mean_force_loop(system, cut, mu, depth, base)[:, np.newaxis]
     reach = BALANCE_HARMONICS * len(cut.pitch_pattern)
     harmonics = waves + np.arange(-reach, reach + 1)
     frequency = harmonics * base[:, np.newaxis]
@@ -51,11 +49,9 @@ def loudest_chatter_frequency(
     return np.asarray(np.abs(frequency[row, loudest]))
 
 
-def _nearest_to_mean_force_loop(
-    system: MillingSystem, cut: Cut, multiplier: Complexes, depth: Floats, base: Floats
-) -> Floats:
+def _nearest_to_mean_force_loop(system: MillingSystem, cut: Cut, mu: Complexes, depth: Floats, base: Floats) -> Floats:
     """Return the multiple of base with the least |det(I + b s H0 G(w))|, s the mean of 1 - exp(-i w tau), (n,)."""
-    part = np.abs(np.angle(multiplier))[:, np.newaxis] / (2 * np.pi)
+    part = np.abs(np.angle(mu))[:, np.newaxis] / (2 * np.pi)
     highest = MAX_CHATTER_FREQUENCY_RATIO * float(np.max(system.frequency)) / (2 * np.pi)
     whole = np.arange(int(highest / np.min(base)) + 3 * len(cut.pitch_pattern))
     waves = np.concatenate((whole + part, whole + 1 - part), axis=1)

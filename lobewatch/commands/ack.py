@@ -1,4 +1,4 @@
-"""lobewatch ack."""
+"""Command `lobewatch ack`: acknowledge alarms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch bridge."""
+"""Command `lobewatch bridge`: serve any device as a TAPS/1 device on TCP."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch calibrate."""
+"""Command `lobewatch calibrate`: fit bearing and joint stiffness to measured natural frequencies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch check."""
+"""Command `lobewatch check`: verdicts on cutting programs."""
 
 from __future__ import annotations
 

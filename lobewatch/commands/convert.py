@@ -1,4 +1,4 @@
-"""lobewatch convert."""
+"""Command `lobewatch convert`: convert a recorded file to another format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch demo."""
+"""Command `lobewatch demo`: tap tests of an aging simulated spindle."""
 
 from __future__ import annotations
 

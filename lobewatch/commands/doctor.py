@@ -1,4 +1,4 @@
-"""lobewatch doctor."""
+"""Command `lobewatch doctor`: check the computer for a tap test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch emulate: one command for each driver with an emulator."""
+"""Command `lobewatch emulate`: emulate a device, with a subcommand for each driver."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class EmulateOptions:
     ]
     """Machine folder."""
     tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
-    """Whether to use a TCP port instead of a pseudo-terminal."""
+    """True to use a TCP port instead of a pseudo-terminal."""
     fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False
-    """Whether to run faster than real time; not every driver can."""
+    """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
     story: Annotated[WearScenarioName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = (
@@ -73,7 +73,7 @@ class EmulateOptions:
     depth: Annotated[float | None, typer.Option("--depth", help="Of the cut (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
-    """Whether to print the result as JSON."""
+    """True to print the result as JSON."""
 
 
 class Emulation(NamedTuple):

@@ -1,4 +1,4 @@
-"""lobewatch event."""
+"""Command `lobewatch event`: record maintenance of a machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch exclude."""
+"""Command `lobewatch exclude`: exclude a tap test from its series."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch export."""
+"""Command `lobewatch export`: export the tap tests of all machines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Format help pages as plain text for any terminal. Examples are not wrapped, so that they can be copied."""
+"""Format help pages as plain text, with examples that can be copied."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch include."""
+"""Command `lobewatch include`: include an excluded tap test again."""
 
 from __future__ import annotations
 

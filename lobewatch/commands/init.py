@@ -1,4 +1,4 @@
-"""lobewatch init."""
+"""Command `lobewatch init`: create a machine folder."""
 
 from __future__ import annotations
 

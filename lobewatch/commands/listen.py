@@ -1,4 +1,4 @@
-"""lobewatch listen."""
+"""Command `lobewatch listen`: detect chatter in a recorded or live cut."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch materials."""
+"""Command `lobewatch materials`: list materials with their cutting coefficients."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch model."""
+"""Command `lobewatch model`: modes and stiffness of the spindle model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch modes."""
+"""Command `lobewatch modes`: modes of a recorded file."""
 
 from __future__ import annotations
 

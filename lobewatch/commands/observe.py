@@ -1,4 +1,4 @@
-"""lobewatch observe."""
+"""Command `lobewatch observe`: record the result of a test cut by ear."""
 
 from __future__ import annotations
 

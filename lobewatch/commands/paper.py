@@ -1,4 +1,4 @@
-"""lobewatch paper."""
+"""Command `lobewatch paper`: compare with the paper of Gaber & Hashemi."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch pitch."""
+"""Command `lobewatch pitch`: propose unequal pitches for a cutter."""
 
 from __future__ import annotations
 

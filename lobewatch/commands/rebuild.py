@@ -1,4 +1,4 @@
-"""lobewatch rebuild."""
+"""Command `lobewatch rebuild`: rebuild the history or a damaged journal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch recommend."""
+"""Command `lobewatch recommend`: recommend speed and depth for a tool and a material."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch replay."""
+"""Command `lobewatch replay`: store recorded files as tap tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch report."""
+"""Command `lobewatch report`: write an HTML report."""
 
 from __future__ import annotations
 

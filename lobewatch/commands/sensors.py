@@ -1,4 +1,4 @@
-"""lobewatch sensors."""
+"""Command `lobewatch sensors`: check hammer, accelerometer and DAQ."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch serve."""
+"""Command `lobewatch serve`: serve the dashboard of machines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch status."""
+"""Command `lobewatch status`: status of all machines, worst first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""lobewatch trend."""
+"""Command `lobewatch trend`: trend and forecast of a series."""
 
 from __future__ import annotations
 

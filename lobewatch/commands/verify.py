@@ -1,4 +1,4 @@
-"""lobewatch verify."""
+"""Command `lobewatch verify`: verify the files of a machine folder."""
 
 from __future__ import annotations
 

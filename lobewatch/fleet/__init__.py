@@ -1,4 +1,4 @@
-"""Many machines: status and summary of each, and the tap tests of all as one table."""
+"""Fleet of machines: status and summary of each, and the tap tests of all as one table."""
 
 import lazy_loader
 

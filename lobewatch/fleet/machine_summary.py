@@ -80,12 +80,12 @@ class DatedStatus(NamedTuple):
 
     @property
     def is_early(self) -> bool:
-        """Whether the alarm is a frequency drop below every limit."""
+        """True if the alarm is a frequency drop below every limit."""
         return is_early_alarm(self.remarks)
 
     @property
     def is_readable(self) -> bool:
-        """Whether the files of the machine can be read."""
+        """True if the files of the machine can be read."""
         return all(remark.code != "unreadable" for remark in self.remarks)
 
 
@@ -110,7 +110,7 @@ class MachineSummary(
     interval_days: float = 0.0
     """Interval between tap tests (days)."""
     has_port: bool = False
-    """Whether machine.toml names a port."""
+    """True if machine.toml names a port."""
     newest_tap_id: str = ""
     """Identity of the newest tap test, or empty."""
     last_tap: str = ""

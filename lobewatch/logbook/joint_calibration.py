@@ -27,8 +27,8 @@ from dsm import (
 )
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.tool_modes import (
-    ToolModeMatch,
     TappedTool,
+    ToolModeMatch,
     assign_mode_numbers,
     find_tapped_tools,
     select_neighbor_modes,

@@ -111,7 +111,7 @@ class Logbook:
 
     @property
     def is_current(self) -> bool:
-        """Whether journal and machine.toml are unchanged since they were read."""
+        """True if journal and machine.toml are unchanged since they were read."""
         return self.folder.change_mark == self._mark
 
     def query(

@@ -29,7 +29,7 @@ class RowFile:
     file_bytes: int
     """Size of the file (bytes)."""
     is_damaged: bool
-    """Whether there is more after the rows than a crash leaves."""
+    """True if the rows are followed by more than a crash leaves."""
 
 
 def read_rows(path: Path) -> RowFile:

@@ -22,7 +22,7 @@ class Estimate(NamedTuple):
 
     @property
     def is_known(self) -> bool:
-        """Whether there is a value."""
+        """True if there is a value."""
         return math.isfinite(self.value)
 
     def change_since(self, then: Estimate) -> Estimate:

@@ -17,22 +17,22 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement, format_alar
 
 
 class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "triggered_at": "raised"}):
-    """A reason with an active alarm. Its identity is the alarm, of what, and the tap test that first triggered it."""
+    """Open alarm. Its identity is its code, its series or program, and the tap test that first triggered it."""
 
     code: str
-    """Code of the reason."""
+    """Code of the remark."""
     about: str
     """Series or program."""
     triggered_by: str = msgspec.field(name="raised_by")
-    """Identity of the tap test that triggered it."""
+    """Id of the tap test that triggered it."""
     triggered_at: datetime = msgspec.field(name="raised")
     """Time of that tap test."""
     acknowledgement: Acknowledgement | None = None
-    """Newest acknowledgement; None where there is none."""
+    """Newest acknowledgement; None without one."""
 
     @property
     def id(self) -> str:
-        """Name of the alarm for people and other programs, without blanks."""
+        """Id of the alarm for people and other programs, without blanks."""
         return format_alarm_id(self.code, self.about, self.triggered_by)
 
     def is_about(self, remark: Remark) -> bool:
@@ -63,12 +63,12 @@ class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "t
 
 
 class TriggeredAlarm(NamedTuple):
-    """A reason with an active alarm, and the tap test that first triggered it."""
+    """Remark with an active alarm, and the tap test that first triggered it."""
 
     remark: Remark
-    """Reason."""
+    """Remark of the alarm."""
     tap_id: str
-    """Identity of the tap test."""
+    """Id of the tap test."""
     time: datetime
     """Time of the tap test."""
 

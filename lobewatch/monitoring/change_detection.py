@@ -27,76 +27,76 @@ from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
 MIN_MONITORED_POINTS = 9
-"""Number of points before which nothing is evaluated; chosen."""
+"""Smallest number of points for an evaluation; chosen."""
 MIN_POINTS_WITH_PRIOR = 5
-"""The same where something is known of the scatter beforehand; chosen."""
+"""Smallest number of points for an evaluation if a scatter prior is known; chosen."""
 SURE_CHANGE_SCORE = 3.3
-"""Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is checked."""
+"""Score from which a change is certain; chance of 1 in 2000 if only the last point is checked."""
 MIN_SHARED_CHANGE = 0.5
-"""Least share of what two series did on the mean that one of them did, where that counts for it; chosen."""
+"""Smallest share of the change of a mean of two series that one of them must show; chosen."""
 SCORE_BLOCK_ROWS = 64
-"""Number of points that are evaluated at once, to bound the memory."""
+"""Number of points evaluated at once, which limits memory."""
 
 ChangeKind = Literal["step", "slope"]
 CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
 MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
-"""Least number of points before a change of each kind, and from it on."""
+"""Smallest number of points before and after a change of each kind."""
 
 
 class SeriesChange(NamedTuple):
-    """A change of a series, as it is fitted to a number of its points."""
+    """Change of a series, as fitted to its points."""
 
     kind: ChangeKind
-    """Kind: dropped at once, or falling since."""
+    """Kind of the change: a step, or a slope since then."""
     point: int
     """Index of the first point after the step, or of the last one before the slope."""
     size: float
-    """Drop from there to the last point fitted, in the unit of the series."""
+    """Drop from there to the last fitted point, in the unit of the series."""
     half_width: float
     """Half the width of the 95 % interval of the size."""
 
 
 class LikeliestChange(NamedTuple):
-    """The likeliest change in the points up to each of some of them."""
+    """Likeliest change for several lengths of the series, shape (r,)."""
 
     score: Floats
-    """Score: how ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
+    """Score: misfit of a steady series as a normal quantile, shape (r,)."""
     is_step: Flags
-    """Whether the change is a step, shape (r,)."""
+    """True for each change that is a step, shape (r,)."""
     point: Indices
-    """Index of its point as in Drop, shape (r,)."""
+    """Index of the point of each change as in `SeriesChange`, shape (r,)."""
 
     @classmethod
     def of_none(cls, n: int) -> Self:
-        """Where no point is evaluated."""
+        """Return a result for points that are not evaluated."""
         return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
 
 
 @dataclass(frozen=True, eq=False)
 class ChangeMonitor:
-    """Judgement on the points of a series, one after the other."""
+    """Monitor that evaluates the points of a series in turn."""
 
     level_model: LevelModel
-    """Base of the fits."""
+    """Level model of the fits."""
     change: LikeliestChange
-    """Likeliest change up to each point; the score of the first ones, which are not evaluated, is NaN."""
+    """Likeliest change up to each point; the score is NaN for the first points, which are not evaluated."""
     sign: int
-    """1 where it detects drops, -1 where for rises."""
+    """1 to detect drops, -1 to detect rises."""
 
     @property
     def scores(self) -> Floats:
-        """Score of each point, a normal quantile, shape (n,); NaN before the first scored point."""
+        """Score of each point, a normal quantile, shape (n,); NaN before the first evaluated point."""
         return self.change.score
 
     @cached_property
     def is_sure(self) -> Flags:
-        """Whether each point is sure of a change, shape (n,)."""
+        """True for each point with a certain change, shape (n,)."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.scores >= SURE_CHANGE_SCORE)
 
     @property
     def first_alarm(self) -> int | None:
-        """Index of the first point that is sure of a change as the one before it was; None where there is none."""
+        """Index of the second of the first two consecutive points with a certain change; None without these."""
         return next(self.alarms_from(0), None)
 
     def alarms_from(self, first: int) -> Iterator[int]:
@@ -217,39 +217,39 @@ def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -
 
 
 N_CLOSING_POINTS = 4
-"""Points running, none of them sure of the drop, that close an alarm; chosen."""
+"""Number of consecutive points without a certain drop that close an alarm; chosen."""
 
 
 class DetectedDrop(NamedTuple):
-    """A drop that has triggered an alarm; points by their index in the series."""
+    """Drop that has triggered an alarm; points by their index in the series."""
 
     triggered_at: int
-    """Point that triggered it, the second one running that was sure."""
+    """Point that triggered it, the second consecutive certain one."""
     closed_at: int | None
     """Point that closed it; None while it is open."""
     change: SeriesChange
-    """Kind and beginning as they were when it was triggered, size as it is now."""
+    """Kind and beginning when it was triggered, and present size."""
 
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """What has been seen of a series."""
+    """Changes detected in a series."""
 
     scores: Floats
     """Score of each point in the monitor of its time, shape (n,); NaN for the first 8 points of a monitor."""
     drops: tuple[DetectedDrop, ...]
     """Drops that have triggered an alarm, oldest first."""
     rise: SeriesChange | None
-    """Newest sure rise, which restarted the monitor, its size positive; None where there is none."""
+    """Newest certain rise with a positive size, which restarted the monitor; None if there is none."""
 
     @property
     def open_drops(self) -> tuple[DetectedDrop, ...]:
-        """Falls whose alarm is open."""
+        """Drops with an open alarm."""
         return tuple(drop for drop in self.drops if drop.closed_at is None)
 
     @property
     def needs_repeat(self) -> bool:
-        """Whether the newest point alone is sure of a drop."""
+        """True if only the newest point shows a certain drop."""
         return not self.open_drops and self.scores.size > 0 and bool(self.scores[-1] >= SURE_CHANGE_SCORE)
 
 

@@ -1,4 +1,4 @@
-"""When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
+"""Forecast when a falling series reaches a level, by a weighted mixture of trend shapes.
 
 Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
 averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No
@@ -28,34 +28,34 @@ from lobewatch.monitoring.trend_shapes import (
 )
 
 MIN_FORECAST_POINTS = 8
-"""Number of points from which on anything is forecast; chosen."""
+"""Smallest number of points for a forecast; chosen."""
 CROSSING_QUANTILES = (0.1, 0.5, 0.9)
 """Probabilities at which a level counts as reached: earliest, probable and latest date; chosen."""
 N_FORECAST_DATES = 241
 """Number of dates checked up to the horizon; between them the probability is interpolated."""
 
 DROPPED_SHAPE_WEIGHT = 1e-3
-"""Weight that all shapes that are left out have together."""
+"""Largest total weight of all shapes that are left out."""
 MAX_FITTED_POINTS = 120
-"""Points that are fitted at most; of more the means of neighbours; chosen."""
+"""Largest number of fitted points; more points are averaged with their neighbors; chosen."""
 NEGLIGIBLE_PROBABILITY = 1e-12
-"""Probability that is as good as none."""
+"""Probability that counts as zero."""
 RATE_QUANTILES = (0.025, 0.975)
-"""Probabilities of the interval of a rate."""
+"""Quantiles of the 95 % interval of a rate."""
 QUANTILE_HALVINGS = 40
-"""Halvings of the range in which a quantile is searched."""
+"""Number of halvings in the search for a quantile."""
 FAN_STANDARD_ERRORS = 50
-"""Standard errors around the means within which any level of a fan lies."""
+"""Standard errors around the means within which all quantiles are searched."""
 
 FitFamily = ShapeFits | RandomWalkFits
-"""Shapes of one sort, fitted to a series."""
+"""Fits of one sort of shapes to a series."""
 
 
 class DateRange(NamedTuple):
-    """Dates of the series between which a level is reached."""
+    """Dates at which a level is reached, in units of the series."""
 
     earliest: float
-    """Date at a probability of 10 %; -inf where it is reached at the last point, inf where not before the horizon."""
+    """Date at a probability of 10 %; -inf if reached at the last point, inf if not before the horizon."""
     probable: float
     """Date at a probability of 50 %."""
     latest: float
@@ -63,10 +63,10 @@ class DateRange(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """Rate of change of a series at its last point, in its unit for one of its dates."""
+    """Rate of change of a series at its last point, in its unit per unit of its dates."""
 
     value: float
-    """Mean of the mixture; negative where it drops."""
+    """Mean of the mixture; negative for a drop."""
     low: float
     """2.5 % quantile."""
     high: float
@@ -75,16 +75,16 @@ class Rate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """The mixture of all trends that a series may take."""
+    """Mixture of all shapes of a trend."""
 
     shapes: tuple[TrendShape, ...]
-    """Shapes that were fitted, j of them."""
+    """Fitted shapes, j of them."""
     weight: Floats
-    """Weight of each shape, shape (j,), their sum 1."""
+    """Weight of each shape, sum 1, shape (j,)."""
     spread: float
     """Standard deviation of the points around the shapes, in the unit of the series."""
     fitted: Floats
-    """Mean of the mixture at the points themselves, shape (n,)."""
+    """Mean of the mixture at the points, shape (n,)."""
     dates: Floats
     """Dates from the last point to the horizon, shape (d,)."""
     mean: Floats
@@ -101,7 +101,7 @@ class Forecast:
 
     @property
     def likeliest(self) -> TrendShape:
-        """The heaviest shape of the heaviest kind."""
+        """Shape with the largest weight, of the kind with the largest weight."""
         kinds = np.array([shape.kind for shape in self.shapes])
         heaviest = max(SHAPE_KINDS, key=lambda kind: self.weight[kinds == kind].sum())
         return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
@@ -147,12 +147,12 @@ def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Float
 
 @dataclass(frozen=True, eq=False)
 class PastFit:
-    """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
+    """Fits of all shapes to a series, the part of a forecast that does not depend on today."""
 
     families: tuple[FitFamily, ...]
-    """Shapes that were fitted, their dates counted from the first point on."""
+    """Fitted shapes, with dates from the first point on."""
     weight: Floats
-    """Weight of each shape, shape (j,), their sum 1."""
+    """Weight of each shape, sum 1, shape (j,)."""
     fitted: Floats
     """Mean of the mixture at the points, shape (n,)."""
     dates: Floats
@@ -160,7 +160,7 @@ class PastFit:
     first_value: float
     """Value of the first point."""
     spread: float
-    """Standard deviation of the points around the shapes that do not wander, in the unit of the series."""
+    """Standard deviation of the points around the shapes without random walk, in the unit of the series."""
 
     def forecast(self, horizon: float) -> Forecast:
         """Forecast until a date."""

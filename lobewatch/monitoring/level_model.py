@@ -12,36 +12,36 @@ from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, winsorize
 
 MIN_TEMPERATURE_POINTS = 12
-"""Number of points with a temperature from which on its influence is fitted; chosen."""
+"""Smallest number of points with a temperature to fit its effect; chosen."""
 MIN_TEMPERATURE_SPAN = 5.0
-"""Least span of these temperatures (K); chosen."""
+"""Smallest range of these temperatures (K); chosen."""
 STEEL_FREQUENCY_PER_KELVIN = -0.015
-"""Change of the natural frequency that Young's modulus of steel leads to (%/K), and how far it may be from that."""
+"""Change of the natural frequency with Young's modulus of steel (%/K), and its standard deviation."""
 
 MIN_POINT_VARIANCE = 1e-12
-"""Least variance of a point (%^2): below it is rounding."""
+"""Smallest variance of a point (%^2), above rounding."""
 OPERATOR_SPREAD = 1.0
-"""How far apart the clampings of operators may lie, in scatters from one point to the next; chosen."""
+"""Standard deviation between operators over that from point to point; chosen."""
 MIN_SINGULAR_SHARE = 1e-12
-"""Share of the largest below which a direction of some columns is none: they are alike."""
+"""Singular value over the largest, below which columns are dependent."""
 MIN_RESIDUAL_SHARE = 1e-20
-"""Least share of the sum of squares that is taken as left: less is rounding."""
+"""Smallest residual sum of squares over the total, above rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class LevelModel:
-    """A series and the columns that are in every fit of it."""
+    """Series with the columns that every fit contains."""
 
     y: Floats
-    """Values without the expected influence of the temperature, from the first point on, shape (n,)."""
+    """Values without the expected temperature effect, relative to the first point, shape (n,)."""
     newest: Floats
-    """What each of them is while it is the last, shape (n,)."""
+    """Each value as the newest one of the series, shape (n,)."""
     columns: Floats
-    """Columns: 1, the temperature where it counts, and one for each operator, shape (n, p)."""
+    """Columns: 1, the temperature if it counts, and one for each operator, shape (n, p)."""
     n_temperature_columns: int = 0
-    """Number of columns of the temperature."""
+    """Number of temperature columns."""
     scatter_prior: ScatterPrior = NO_SCATTER_PRIOR
-    """What is known of the scatter from point to point beforehand."""
+    """Prior scatter from point to point."""
 
     def precision(self, n: Indices) -> Floats:
         """Return the prior precision of the coefficients times the variance of n (r,) points, shape (r, p, p)."""
@@ -85,7 +85,7 @@ class LevelModel:
 
     @property
     def _prior_squares(self) -> float:
-        """Sum of squares that is known beforehand."""
+        """Sum of squares of the prior."""
         return self.scatter_prior.freedom * self.scatter_prior.percent**2
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
@@ -137,12 +137,12 @@ class LevelModel:
 
     @cached_property
     def _newest_excess(self) -> Floats:
-        """What the last point is above what it will be, by the number of the first points, shape (n + 1,)."""
+        """Difference of the newest value from its final one, by number of points, shape (n + 1,)."""
         return np.concatenate([[0.0], self.newest - self.y])
 
     @cached_property
     def _levels(self) -> tuple[Floats, Floats]:
-        """Inverse normal matrix (n + 1, p, p) and coefficients (n + 1, p) by the number of the first points."""
+        """Inverse normal matrix (n + 1, p, p) and coefficients (n + 1, p) by number of points."""
         n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
         inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
         normal = self._outer[n, 1:, 1:] + self.precision(n)
@@ -152,7 +152,7 @@ class LevelModel:
 
     @cached_property
     def _residual_squares_up_to(self) -> Floats:
-        """Sum of squares that the base leaves, by the number of the first points, shape (n + 1,)."""
+        """Residual sum of squares of the level model by number of points, shape (n + 1,)."""
         return np.asarray(self._outer[:, 0, 0] - (self._outer[:, 0, 1:] * self._levels[1]).sum(axis=1))
 
     @cached_property
@@ -177,12 +177,12 @@ class LevelModel:
 
     @cached_property
     def inverse_normal_matrix(self) -> Floats:
-        """Inverse of the normal matrix of the base, shape (p, p), the variance of a point being 1."""
+        """Inverse normal matrix of the level model for unit variance, shape (p, p)."""
         return np.asarray(np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0]))
 
     @property
     def residual_squares(self) -> float:
-        """Sum of squares that the base leaves of all points."""
+        """Residual sum of squares of the level model for all points."""
         return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
 
     def fit_columns(self, columns: Floats) -> ColumnFits:
@@ -203,22 +203,22 @@ class LevelModel:
 
 
 class ColumnFits(NamedTuple):
-    """Sets of k columns fitted, one set at a time."""
+    """Fits of sets of k columns, one set at a time."""
 
     rss: Floats
-    """Sum of squares that each leaves, shape (j,)."""
+    """Residual sum of squares of each fit, shape (j,)."""
     size: Floats
-    """Sizes of the columns, shape (j, k)."""
+    """Coefficients of the columns, shape (j, k)."""
     inverse: Floats
-    """Inverse of the products of the columns, what the base leaves of them, shape (j, k, k)."""
+    """Inverse of the products of the columns without the level model, shape (j, k, k)."""
     level_leaning: Floats
-    """Leanings of the columns on the level of the base, shape (j, k)."""
+    """Projections of the columns on the level, shape (j, k)."""
     level: float
-    """Level of the base, at the mean temperature."""
+    """Level at the mean temperature."""
     level_variance: float
-    """Variance of the level, that of a point being 1."""
+    """Variance of the level for unit variance of a point."""
     freedom: int
-    """Degrees of freedom; the temperature costs none, its influence is known beforehand."""
+    """Degrees of freedom; the temperature costs none, since its effect has a prior."""
 
     def select(self, numbers: Indices) -> ColumnFits:
         """Select some of the fits."""

@@ -28,11 +28,11 @@ from lobewatch.monitoring.trend import Trend
 from lobewatch.verdicts.verdict import Stability
 
 OTHER_VALUES = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
-"""Values that are watched beside the frequency, and what they are called; that of the bearings follows from it."""
+"""Labels of the values monitored besides the frequency; bearing stiffness follows from the frequency."""
 MIN_REPORTED_CHANGE = 0.1
-"""Change of these (%) that is told; no verdict feels a smaller one, and computed data have such."""
+"""Smallest reported change of these values (%), above that of computed data and too small for any verdict."""
 RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (run-in)?"
-"""What is said of a drop as that of bearings that run in; it triggers an alarm like any other."""
+"""Text for a drop as by bearings that run in; it triggers an alarm like any other."""
 
 
 def _lost_mode_remarks(name: str, newest: HistoryRow) -> Iterator[Remark]:
@@ -103,7 +103,7 @@ class SeriesStatus:
     time: datetime
     """Time of its newest test."""
     first_time: datetime
-    """Time of the test that it is compared with."""
+    """Time of the test it is compared with."""
     drop: Estimate
     """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
@@ -122,7 +122,7 @@ class SeriesStatus:
 
     @property
     def is_baseline(self) -> bool:
-        """Whether there is nothing to compare with yet."""
+        """True if there is no earlier test to compare with."""
         return self.time == self.first_time
 
 
@@ -143,9 +143,9 @@ class MachineStatus:
     series: tuple[SeriesStatus, ...] = ()
     """Series, the largest drop first."""
     last_tap: datetime | None = None
-    """Time of the newest tap test; None where there is none."""
+    """Time of the newest tap test; None if there is none."""
     days_left: float | None = None
-    """Days until the next test is due; negative where it is overdue; None before the first."""
+    """Days until the next test is due; negative if overdue; None before the first."""
 
     @property
     def status(self) -> StatusLevel:
@@ -154,7 +154,7 @@ class MachineStatus:
 
     @property
     def is_early(self) -> bool:
-        """Whether the only alarm is a detected drop short of every limit."""
+        """True if the only alarm is a detected drop within every limit."""
         return rules.is_early_alarm(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStatus | None:
@@ -294,7 +294,7 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:
-    """Build the alarm of a program that is not stable, triggered by the first of the tap tests that all say so."""
+    """Build the alarm of a program that is not stable, triggered by the first of the consecutive tests that show it."""
     first = rows[-1]
     for row in reversed(rows):
         ruling = (row.verdicts or {}).get(remark.about)

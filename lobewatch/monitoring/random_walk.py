@@ -1,4 +1,4 @@
-"""Fits of a line whose level or rate is a random walk.
+"""Fit lines whose level or rate is a random walk.
 
 Generalised least squares with restricted likelihood (Patterson & Thompson 1971); how much wanders is not fitted but
 averaged over. The second is the smoothing spline of Wahba (1978).
@@ -16,23 +16,23 @@ from lobewatch.monitoring.level_model import MIN_RESIDUAL_SHARE, LevelModel
 from lobewatch.monitoring.trend_shapes import PRIOR_ODDS, ShapeKind, TrendShape
 
 LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-"""Variances that the level gathers over the span, in that of a point; chosen."""
+"""Variances of a level random walk over the span, relative to that of a point; chosen."""
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
-"""Variances that the rate, in levels a span, gathers over the span, too; chosen."""
+"""Variances of a rate random walk (levels per span) over the span, relative to that of a point; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class RandomWalkFits:
-    """Lines of one kind that wander by different amounts, fitted to one series."""
+    """Fits of lines of one kind with random walks of different size to one series."""
 
     shapes: tuple[TrendShape, ...]
-    """The lines, j of them; the rate of each is the amount that wanders."""
+    """Lines, j of them; the rate of each is the size of its random walk."""
     evidence: Floats
-    """Logarithm of the evidence for each, a steady series having 0, shape (j,)."""
+    """Logarithm of the evidence for each line, relative to a steady series, shape (j,)."""
     variance: Floats
-    """Variance of a point around each, shape (j,)."""
+    """Variance of a point around each line, shape (j,)."""
     points: _RotatedPoints
-    """The series."""
+    """Points of the series."""
 
     @property
     def freedom(self) -> Floats:
@@ -81,24 +81,24 @@ class RandomWalkFits:
 
 @dataclass(frozen=True, eq=False)
 class _RotatedPoints:
-    """A series turned into the directions in which what wanders is independent."""
+    """Series rotated into the directions in which the random walk is independent."""
 
     kind: ShapeKind
-    """"wander" or "bend"."""
+    """Kind: "wander" or "bend"."""
     share: Floats
-    """Shares of the span that have passed at the points, shape (n,)."""
+    """Elapsed share of the span at each point, shape (n,)."""
     span: float
-    """Length of the series."""
+    """Span of the series."""
     values: Floats
-    """Variance of what wanders in each direction, its amount being 1, shape (n,)."""
+    """Variance of a unit random walk in each direction, shape (n,)."""
     vectors: Floats
-    """The directions, shape (n, n)."""
+    """Directions, shape (n, n)."""
     columns: Floats
-    """Columns of the base and the line, turned, shape (n, p)."""
+    """Rotated columns of level model and line, shape (n, p)."""
     y: Floats
-    """Values, turned, shape (n,)."""
+    """Rotated values, shape (n,)."""
     precision: Floats
-    """Precision of the coefficients as known beforehand, shape (p, p)."""
+    """Prior precision of the coefficients, shape (p, p)."""
 
     @property
     def freedom(self) -> float:

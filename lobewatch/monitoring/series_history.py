@@ -1,4 +1,4 @@
-"""One series of tap tests and what follows from its rows: where each value started, and how it has changed since.
+"""History of one series of tap tests: start, trend and change of each monitored value.
 
 Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """
@@ -26,41 +26,41 @@ from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_p
 
 @dataclass(frozen=True, eq=False)
 class ValueHistory:
-    """One value of a series: the tap tests that know it, its trend, its start and its change."""
+    """One value of a series: its tap tests, trend, start and change."""
 
     name: str
-    """Field of a row, one of `WATCHED`."""
+    """Field of a row, one of `WATCHED_VALUES`."""
     rows: tuple[HistoryRow, ...]
-    """Rows of the series, oldest first, n of them."""
+    """Rows of the series, oldest first, shape (n,)."""
     values: Floats
     """Value of each row and its standard error, shape (n, 2)."""
     has_questions: Flags
-    """Whether anything is asked about a row that nobody has answered, shape (n,)."""
+    """True for each row with unanswered questions, shape (n,)."""
     other_direction: ValueHistory | None = None
-    """The same value in the other direction; None where nothing is known of it, or where it does not count."""
+    """Same value in the other direction; None if unknown or irrelevant."""
     scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
-    """What is known of its scatter beforehand."""
+    """Prior scatter of the series."""
 
     @cached_property
     def known_rows(self) -> tuple[HistoryRow, ...]:
-        """Rows that know the value."""
+        """Rows with the value."""
         return self._select(np.isfinite(self.values[:, 0]))
 
     @cached_property
     def reference_rows(self) -> tuple[HistoryRow, ...]:
-        """Rows that know the value and that nothing is asked about: those that others are compared with."""
+        """Rows with the value and without questions, to which others are compared."""
         return self._select(np.isfinite(self.values[:, 0]) & ~self.has_questions)
 
     @cached_property
     def trend(self) -> Trend | None:
-        """Trend of the sure rows as on the day of the newest; None where none has a positive value."""
+        """Trend of the reference rows on the day of the newest; None without a positive value."""
         taps = self.tap_values
         other_rows = [] if self.other_direction is None else self.other_direction.tap_values
         return fit_trend(taps, taps[-1].time, other_rows, self.scatter_prior) if taps else None
 
     @property
     def tap_values(self) -> list[TapValue]:
-        """The sure rows as points of a trend.
+        """Reference rows as points of a trend.
 
         Temperature and operator count for the frequency alone: of the others nothing is known beforehand.
         """
@@ -77,7 +77,7 @@ class ValueHistory:
 
     @cached_property
     def start(self) -> Estimate:
-        """Value that the series is compared with, not one tap test but where its first ones lie; UNKNOWN without any.
+        """Value at the start of the series, from its first tests together; UNKNOWN if there is none.
 
         From 8 points on its error is the scatter from tap test to tap test.
         """
@@ -92,7 +92,7 @@ class ValueHistory:
 
     @property
     def change(self) -> Estimate:
-        """Change (%) from the start to the last row; unknown where that does not know the value."""
+        """Change (%) from the start to the last row; unknown if that has no value."""
         return self.change_at(self.rows[-1])
 
     def change_at(self, row: HistoryRow) -> Estimate:
@@ -112,13 +112,13 @@ class ValueHistory:
 
     @property
     def _positive(self) -> tuple[tuple[HistoryRow, ...], Floats]:
-        """The sure rows whose value is one to take a logarithm of, with their numbers, shape (n, 2)."""
+        """Reference rows with a positive value, with their numbers, shape (n, 2)."""
         counts = np.isfinite(self.values[:, 0]) & ~self.has_questions & (self.values[:, 0] > 0)
         return self._select(counts), self.values[counts]
 
     @property
     def trend_rows(self) -> tuple[HistoryRow, ...]:
-        """The rows that the trend is of, oldest first."""
+        """Rows of the trend, oldest first."""
         return self._positive[0]
 
     def _select(self, counts: Flags) -> tuple[HistoryRow, ...]:
@@ -127,21 +127,21 @@ class ValueHistory:
 
 @dataclass(frozen=True, eq=False)
 class SeriesHistory:
-    """The rows of one tool and direction, and the history of each value that is watched."""
+    """Rows of one tool and direction, with the history of each monitored value."""
 
     rows: tuple[HistoryRow, ...]
-    """Rows of the series, oldest first; one at least."""
+    """Rows of the series, oldest first, at least one."""
     values: Mapping[str, ValueHistory]
-    """History of each value, by its name in `WATCHED`."""
+    """History of each value by its name."""
 
     @property
     def frequency(self) -> ValueHistory:
-        """The natural frequency of the mode followed (Hz)."""
+        """Natural frequency of the followed mode (Hz)."""
         return self.values["frequency"]
 
     @property
     def drop(self) -> Estimate:
-        """Frequency drop (%) to the newest test, or where that is in question, to another that dropped farther."""
+        """Frequency drop (%) to the newest test, or to an earlier larger one if the newest has questions."""
         newest = [rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows]
         change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN_ESTIMATE)
         return Estimate(-change.value + 0.0, change.std)
@@ -157,7 +157,7 @@ class SeriesHistory:
 
     @property
     def first_falling(self) -> HistoryRow | None:
-        """The tap test that triggered the alarm of the monitor over the frequency; None where none is open."""
+        """Tap test that triggered the frequency alarm; None if no alarm is open."""
         trend = self.frequency.trend
         if trend is None or trend.open_drop is None:
             return None

@@ -17,45 +17,45 @@ from lobewatch.arrays import Floats, Indices
 
 
 class ScatterPrior(NamedTuple):
-    """What is known of the scatter from point to point before any is measured."""
+    """Prior of the scatter from point to point, before any is measured."""
 
     percent: float = 0.0
     """Standard deviation (%)."""
     freedom: float = 0.0
-    """Degrees of freedom that it is worth; 0: nothing is known."""
+    """Equivalent degrees of freedom; 0 without a prior."""
 
 
 NO_SCATTER_PRIOR = ScatterPrior()
-"""Nothing is known of it."""
+"""Unknown scatter."""
 
 
 class SeriesScatterPrior(NamedTuple):
-    """What is known of the scatter of a series beforehand."""
+    """Prior of the scatter of a series."""
 
     single: ScatterPrior = NO_SCATTER_PRIOR
-    """That of one direction."""
+    """Prior for one direction."""
     common: ScatterPrior = NO_SCATTER_PRIOR
-    """That of the mean of both."""
+    """Prior for the mean of both directions."""
 
 
 NO_SERIES_PRIOR = SeriesScatterPrior()
-"""Nothing is known of it."""
+"""Unknown scatter of a series."""
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """A series, point by point."""
+    """Series, point by point."""
 
     y: Floats
     """Values, shape (n,)."""
     temperature: Floats | None = None
-    """Temperature of the spindle (K or degC), NaN where it was not recorded, shape (n,)."""
+    """Temperature of the spindle (K or degC), NaN if not recorded, shape (n,)."""
     operators: tuple[str, ...] = ()
-    """Who held the hammer, empty where nobody said so, n of them; none where that does not count."""
+    """Operator of each point, empty if unknown, n of them; none if operators do not count."""
     other_direction: Floats | None = None
-    """Values of the other direction in the same clampings, NaN where there are none, shape (n,)."""
+    """Values of the other direction from the same clampings, NaN if there are none, shape (n,)."""
     scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
-    """What is known of its scatter beforehand."""
+    """Prior of the scatter."""
 
     def since(self, begin: int) -> Self:
         """Return the points from one on."""
@@ -67,14 +67,14 @@ class Readings:
 
     @property
     def shared_points(self) -> Indices:
-        """Points that the other direction has too."""
+        """Points that both directions have."""
         return (
             np.empty(0, np.intp) if self.other_direction is None else np.flatnonzero(np.isfinite(self.other_direction))
         )
 
     @property
     def mean_of_directions(self) -> Readings:
-        """The means of both directions, at the points that both have."""
+        """Mean of both directions, at the points that both have."""
         at, other = self.shared_points, self.y if self.other_direction is None else self.other_direction
         temperature = None if self.temperature is None else self.temperature[at]
         operators = tuple(self.operators[i] for i in at) if self.operators else ()
@@ -83,22 +83,22 @@ class Readings:
 
 
 SAME_CLAMPING_TIME = timedelta(hours=24)
-"""Time within which tap tests are one clamping where nobody says otherwise; chosen."""
+"""Time within which tap tests share a clamping unless recorded otherwise; chosen."""
 TapRange = tuple[int, int]
-"""First tap test of a point, and the one behind its last."""
+"""Indices of the first tap test of a point, and after its last."""
 
 
 class PercentSeries(NamedTuple):
-    """Tap tests with one of their values, oldest first."""
+    """One value of the tap tests of a series, oldest first."""
 
     times: tuple[datetime, ...]
     """Times of the tests."""
     percents: tuple[float, ...]
     """Changes of the value since the first test (%)."""
     temperatures: tuple[float, ...]
-    """Temperatures of the spindle (degC); NaN where not recorded."""
+    """Temperatures of the spindle (degC); NaN if not recorded."""
     reclamped: tuple[bool, ...]
-    """Whether the tool was reclamped for each of them."""
+    """True for each test whose tool was reclamped."""
 
     def percent(self, span: TapRange) -> float:
         """Return the change of a point (%): mean of two, median from three on."""
@@ -124,10 +124,10 @@ def divide_into_points(series: PercentSeries) -> Iterator[TapRange]:
 
 
 RECENT_USE_DAYS = 180.0
-"""Days before the last point over which use goes on as it is now, two points at least; chosen."""
+"""Days before the last point that define present use, at least two points; chosen."""
 
 STANDSTILL_DAYS = 1e-6
-"""Days between two points that the spindle stood still between."""
+"""Days between two points without use."""
 
 
 def days_of_use(days: Floats, hours: Floats) -> Floats:
@@ -145,13 +145,13 @@ def days_of_use(days: Floats, hours: Floats) -> Floats:
 
 
 N_REFERENCE_POINTS = 7
-"""Points before it that one is held against; chosen."""
+"""Number of earlier points that a point is compared with; chosen."""
 MIN_REFERENCE_POINTS = 3
-"""Points before it below which none is said to stand alone; chosen."""
+"""Number of earlier points below which no point is an outlier; chosen."""
 MAX_OUTLIER_DISTANCE = 3.0
-"""Scatters that a point may be away from those before it; one that stands alone is drawn in to there; chosen."""
+"""Distance (standard deviations) of an outlier from earlier points, to which it is winsorized; chosen."""
 CONFIRMED_DISTANCE_SHARE = 0.7
-"""Share of its distance that the next point is away, too, where it does not stand alone; chosen."""
+"""Share of its distance at which the next point confirms a point; chosen."""
 MAD_TO_STD = 1.4826
 """Standard deviation of normal scatter over its median absolute deviation."""
 
@@ -175,14 +175,15 @@ def winsorize(y: Floats) -> Floats:
 
 
 MIN_SCATTER_POINTS = 8
-"""Points of a series from which on its scatter tells anything; chosen."""
+"""Number of points from which the scatter of a series is informative; chosen."""
 DOF_PER_DIFFERENCE = 0.25
-"""Degrees of freedom that a difference is worth: a median has 37 % of the efficiency of a sum of squares,
-differences of neighbours two thirds of that of residuals."""
+"""Equivalent degrees of freedom of one difference.
+
+A median has 37 % of the efficiency of a sum of squares, and differences two thirds of that of residuals."""
 MIN_OTHER_SERIES = 4
-"""Series that anything is said of others from; chosen."""
+"""Smallest number of other series for a scatter prior; chosen."""
 MAX_PRIOR_DOF = 30.0
-"""Degrees of freedom that others are worth at most; chosen."""
+"""Largest equivalent degrees of freedom of a prior from other series; chosen."""
 
 
 def estimate_scatter(y: Floats) -> ScatterPrior:

@@ -18,20 +18,20 @@ from lobewatch.measurement.clock_questions import CLOCK_QUESTIONS, future_tap_re
 from lobewatch.monitoring.alarm import Alarm
 
 CodedT = TypeVar("CodedT", Remark, Alarm)
-"""Remark or alarm: both have a code."""
+"""Remark or alarm with a code."""
 
 
 class StatusLevel(StrEnum):
     """Status of a machine (ISO 13374), worst first."""
 
     ALARM = "alarm"
-    """Beyond a limit: a drop, a decay, or a program that is not stable any more."""
+    """Beyond a limit: a drop, a faster decay, or a program that is no longer stable."""
     UNKNOWN = "unknown"
     """Unknown: damaged, unreadable or never tapped."""
     WARN = "warn"
     """Attention needed: a smaller drop, a doubtful program, damage, a test that is due."""
     GOOD = "good"
-    """Nothing is known to be wrong."""
+    """No known problem."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class StatusRule:
     remedy: str = ""
     """Next step."""
     is_limit: bool = False
-    """Whether a limit of machine.toml or a program is exceeded: then an alarm is not early."""
+    """True if a limit of machine.toml or a program is exceeded: then an alarm is not early."""
 
     def remark(self, about: str, remedy: str = "", **values: object) -> Remark:
         """Build the remark on a series, a program or a file, with another remedy where one is given."""
@@ -161,7 +161,7 @@ STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
 LIMIT_CODES = {rule.code for rule in STATUS_RULES if rule.is_limit}
 """Codes with which an alarm is not early."""
 UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
-"""Next step of a machine that cannot be read."""
+"""Next step for a machine that cannot be read."""
 
 
 def unreadable_remark(reason: str) -> Remark:

@@ -16,22 +16,22 @@ INF = math.inf
 
 
 class ThresholdDates(msgspec.Struct, frozen=True, rename={"forecast_end": "foretold_to"}):
-    """When a level is reached, in days since 1970; it may be past where nobody has tapped since."""
+    """Dates at which a threshold is reached, in days since 1970; may be past if no test was made since."""
 
     is_measured: bool = False
-    """Whether tap tests show it: it is reached already."""
+    """True if tap tests show that it is reached already."""
     earliest: float | None = None
-    """At a probability of 10 %; None where not before `forecast_end`."""
+    """Date at a probability of 10 %; None if not before `forecast_end`."""
     probable: float | None = None
-    """At 50 %; None as for `earliest`."""
+    """Date at a probability of 50 %; None if not before `forecast_end`."""
     latest: float | None = None
-    """At 90 %; None as for `earliest`."""
+    """Date at a probability of 90 %; None if not before `forecast_end`."""
     forecast_end: float | None = msgspec.field(default=None, name="foretold_to")
-    """Last day that was checked; None where nothing can be forecast."""
+    """Last checked day; None if no forecast is possible."""
 
     @property
     def is_known(self) -> bool:
-        """Whether anything can be said of it."""
+        """True if a date or a forecast exists."""
         return self.is_measured or self.forecast_end is not None
 
     def to_row(self) -> dict[str, str | None]:
@@ -41,18 +41,18 @@ class ThresholdDates(msgspec.Struct, frozen=True, rename={"forecast_end": "foret
 
 
 class ProgramForecast(msgspec.Struct, frozen=True):
-    """What becomes of one program."""
+    """Forecast of one program."""
 
     doubtful: ThresholdDates
-    """When it becomes doubtful."""
+    """Dates at which it becomes doubtful."""
     not_stable: ThresholdDates
-    """When it becomes not stable."""
+    """Dates at which it becomes not stable."""
 
 
 NO_FORECAST = ThresholdDates()
 ALREADY_REACHED = ThresholdDates(is_measured=True)
 LimitForecasts = tuple[tuple[float, ThresholdDates], ...]
-"""Fixed limits (%) of machine.toml, each with when the worst series has dropped by it."""
+"""Fixed limits (%) of machine.toml, each with the dates at which the worst series reaches it."""
 
 
 def find_earliest(reaches: Sequence[ThresholdDates]) -> ThresholdDates:

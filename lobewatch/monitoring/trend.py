@@ -1,4 +1,4 @@
-"""The trend of one value of a series: its points, alarm, where they started and where they go."""
+"""Trend of one value of a series: points, start, alarm and forecast."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
 
 MAX_TREND_POINTS = 1000
-"""Number of newest points that alone are evaluated; chosen, as the work grows with its square."""
+"""Number of newest points that are evaluated, as the work grows with its square; chosen."""
 DAYS_PER_MONTH = 30.44
 """Mean length of a month (days)."""
 FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
-"""Time after the last point (days) beyond which nothing is forecast; chosen."""
+"""Longest forecast after the last point (days); chosen."""
 MAX_RUN_IN_RATE = 0.4
-"""Rate of a drop over its mean rate so far below which it has slowed down; chosen."""
+"""Present rate of a drop over its mean rate, below which it has slowed down; chosen."""
 N_START_POINTS = 3
-"""Points that the start of a series is searched in while it has no fitted line; chosen."""
+"""Number of first points that define the start of a series without a fitted line; chosen."""
 
 
 class TapValue(NamedTuple):
@@ -54,45 +54,44 @@ class TapValue(NamedTuple):
     hours: float = math.nan
     """Running hours of the spindle (h)."""
     operator: str = ""
-    """Who held the hammer."""
+    """Operator with the hammer."""
     reclamped: bool = False
-    """Whether the tool was reclamped for it."""
+    """True if the tool was reclamped for the test."""
 
 
 class TrendPoint(NamedTuple):
-    """The tap tests of one clamping together."""
+    """Tap tests of one clamping together."""
 
     time: datetime
-    """Time of the first of them."""
+    """Time of the first test."""
     percent: float
-    """Change, 100 ln of the value over that of the first tap test of the series: mean, median from three on."""
+    """Change as 100 ln of the value over that of the first tap test of the series: mean, or median of three or more."""
     error: float
-    """Standard error by the tap tests alone (%)."""
+    """Standard error from the tap tests only (%)."""
     temperature: float
-    """Mean of the temperatures recorded (degC)."""
+    """Mean of the recorded temperatures (degC)."""
     hours: float
-    """Running hours of the spindle at the first of them (h)."""
+    """Running hours of the spindle at the first test (h)."""
     operator: str
-    """Who held the hammer for the first of them."""
+    """Operator of the first test."""
     taps: tuple[int, ...]
-    """Numbers of the tap tests in the series."""
+    """Indices of the tap tests in the series."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """One series, evaluated."""
+    """Evaluated series."""
 
     points: tuple[TrendPoint, ...]
-    """Points, oldest first; one at least."""
+    """Points, oldest first, at least one."""
     first_value: float
-    """Value that the percents are of: that of the first tap test."""
+    """Reference of the percentages, the value of the first tap test."""
     readings: Readings
-    """Percents of the points, and what is known of them."""
+    """Percentages of the points, with temperatures, operators and prior."""
     past_fit: PastFit | None
-    """Shapes that it allows, over days of use, those behind the last point being days since 1970; None below 8
-    points."""
+    """Fitted shapes over days of use, those after the last point being days since 1970; None below 8 points."""
     today: int
-    """Day since 1970 that it is evaluated on."""
+    """Day of the evaluation (days since 1970)."""
 
     def at_day(self, now: datetime) -> Trend:
         """Return this trend as of another day."""
@@ -100,7 +99,7 @@ class Trend:
 
     @cached_property
     def detection(self) -> Detection:
-        """What the monitor over its points has seen."""
+        """Changes detected by the monitor."""
         return detect_changes(self.readings)
 
     @cached_property
@@ -114,7 +113,7 @@ class Trend:
 
     @cached_property
     def likeliest_shape(self) -> TrendShape | None:
-        """The shape that fits it best, its start in days since 1970; None below 8 points."""
+        """Likeliest shape, its start in days since 1970; None below 8 points."""
         if self.past_fit is None or self.forecast is None:
             return None
         shape = self.forecast.likeliest
@@ -122,7 +121,7 @@ class Trend:
 
     @property
     def start(self) -> float:
-        """Its start (%): the highest of the fitted line at the first 8 points, else of the first three points.
+        """Start (%): the highest of the fitted line at the first 8 points, else of the first three points.
 
         A first test clamped badly must not hide a drop for ever, and a mean of the first ones would hide that of a
         spindle that drops from the beginning.
@@ -133,12 +132,12 @@ class Trend:
 
     @property
     def is_stale(self) -> bool:
-        """Whether today is farther from its last point than anything is forecast."""
+        """True if today is beyond any forecast after the last point."""
         return self.forecast is not None and self.today > self.forecast.dates[-1]
 
     @property
     def has_forecast(self) -> bool:
-        """Whether it is long enough, and young enough."""
+        """True if the series is long and recent enough."""
         return self.past_fit is not None and not self.is_stale
 
     def forecast_level(self, percent: float, error: float = 0.0) -> ThresholdDates:
@@ -152,22 +151,22 @@ class Trend:
 
     @property
     def spread(self) -> float:
-        """Standard deviation from point to point around the fitted line (%); 0 while it is not known."""
+        """Standard deviation from point to point around the fitted line (%); 0 if unknown."""
         return 0.0 if self.past_fit is None else self.past_fit.spread
 
     @property
     def rate(self) -> Rate | None:
-        """Change in % a month now, with its 95 % interval; None below 8 points."""
+        """Present change (% per month) with its 95 % interval; None below 8 points."""
         return None if self.past_fit is None else Rate(*(DAYS_PER_MONTH * rate for rate in self.past_fit.rate))
 
     @property
     def open_drop(self) -> DetectedDrop | None:
-        """The newest drop whose alarm is open; None without alarm."""
+        """Newest drop with an open alarm; None without alarm."""
         return next(reversed(self.detection.open_drops), None)
 
     @property
     def is_run_in(self) -> bool:
-        """Whether the open drop began among the first points and has slowed down since, as new bearings run in."""
+        """True if the open drop began among the first points and has slowed down, as of bearings that run in."""
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
         fallen = self.start - float(self.past_fit.fitted[-1])
@@ -176,7 +175,7 @@ class Trend:
 
     @property
     def drop_since(self) -> datetime | None:
-        """Time at which the drop began or happened that the alarm is about; None without alarm."""
+        """Time at which the drop of the alarm began or happened; None without alarm."""
         return None if self.open_drop is None else self.points[self.open_drop.change.point].time
 
 

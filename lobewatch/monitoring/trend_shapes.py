@@ -14,13 +14,13 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.monitoring.level_model import ColumnFits, LevelModel
 
 EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
-"""Rates of the exponential curves, over the span of the series; chosen."""
+"""Rates of the exponential curves, per span of the series; chosen."""
 POWER_EXPONENTS = (1.5, 2.0, 3.0)
 """Exponents of the power curves; chosen."""
 RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.1, 1.2, 1.35, 1.6, 2.0, 2.7))
-"""Exponents of the curves that run away, and where they end, in spans of the series from its first point; chosen."""
+"""Exponents of the runaway curves, and their ends in spans of the series from its first point; chosen."""
 MIN_RUNAWAY_DISTANCE = 1e-6
-"""Least share of the way to that end at which such a curve is drawn."""
+"""Smallest remaining share of the time to that end at which such a curve is evaluated."""
 
 ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
 SHAPE_KINDS: tuple[ShapeKind, ...] = (
@@ -47,26 +47,26 @@ PRIOR_ODDS: dict[ShapeKind, float] = {
     "wander": 0.5,
     "bend": 0.5,
 }
-"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many trends hold their dates."""
+"""Prior odds of the kinds, all others 1, chosen so that forecast ranges of many trends hold their dates."""
 
 
 class TrendShape(NamedTuple):
-    """One shape that the trend of a series may have."""
+    """Shape that the trend of a series may have."""
 
     kind: ShapeKind
     """Kind: "none", steady; "slope", a line from a point on; "step", dropped once; "curve", accelerating or slowing;
     "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
     "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
     start: float
-    """Date from which on it drops, or on which it dropped; the later one of two slopes; the step of a crash."""
+    """Date of the beginning of the drop, or of the step; the later date of two slopes; the step of a crash."""
     accelerates: bool = False
-    """Whether a curve accelerates; else it slows down."""
+    """True if a curve accelerates; False if it slows down."""
     rate: float = 0.0
-    """Rate of an exponential curve, over the span of the series; how much wanders; 0 of others."""
+    """Rate of an exponential curve per span, or size of a random walk; else 0."""
     power: float = 0.0
-    """Exponent of a power curve, or one that runs away; 0 of others."""
+    """Exponent of a power or runaway curve; else 0."""
     end: float = 0.0
-    """Where a curve that runs away ends, in spans; the earlier date of two slopes, that of the line of a crash."""
+    """End of a runaway curve in spans; the earlier date of two slopes; the start of the line of a crash."""
 
 
 def list_single_shapes(at: Floats) -> list[TrendShape]:
@@ -135,26 +135,26 @@ def build_triple_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
 
 
 RATE_STEP = 1e-6
-"""Part of the span over which a rate is taken."""
+"""Share of the span over which a rate is computed."""
 
 ColumnBuilder = Callable[[Sequence[TrendShape], Floats], Floats]
-"""Columns (j, k, d) of shapes at dates that count from the first point on."""
+"""Function that returns the columns (j, k, d) of shapes at dates from the first point on."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeFits:
-    """Shapes of the same number of columns, fitted to one series whose dates count from its first point on."""
+    """Fits of shapes with equal numbers of columns to one series, with dates from its first point on."""
 
     shapes: tuple[TrendShape, ...]
-    """The shapes, j of them."""
+    """Fitted shapes, j of them."""
     evidence: Floats
-    """Logarithm of the evidence for each, a steady series having 0, by Schwarz's approximation, shape (j,)."""
+    """Logarithm of the evidence for each, relative to a steady series, by Schwarz's approximation, shape (j,)."""
     fits: ColumnFits
-    """Their fits."""
+    """Fits of their columns."""
     build_columns: ColumnBuilder
-    """Their columns."""
+    """Builder of their columns."""
     span: float
-    """Length of the series."""
+    """Span of the series."""
 
     @property
     def freedom(self) -> Floats:

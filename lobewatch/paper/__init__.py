@@ -1,4 +1,4 @@
-"""Comparison with the paper of Gaber & Hashemi: its numbers, ours from one run, and the reason of each difference."""
+"""Comparison with the paper of Gaber & Hashemi: printed and computed numbers, and their differences."""
 
 from lobewatch.paper.comparison import Claim, Comparison
 from lobewatch.paper.study import PaperStudy, study_paper

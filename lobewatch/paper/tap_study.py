@@ -1,4 +1,4 @@
-"""Tap test of Figs. 5 and 6: one mode as the paper measured it, picked by (28) and (29), and emulated hits."""
+"""Tap test of Figs. 5 and 6: the mode of the paper, peak picking by (28) and (29), emulated hits."""
 
 from __future__ import annotations
 

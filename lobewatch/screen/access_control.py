@@ -46,7 +46,7 @@ PUBLIC_ROUTE_PREFIX = "open-"
 WATCH_ROUTE_PREFIX = "watch-"
 """Prefix of the names of routes that change nothing, although their method is not GET."""
 HAS_FULL_ACCESS = web.RequestKey("HAS_FULL_ACCESS", bool)
-"""Whether a request has the full token."""
+"""Key of a request: True if it has the full token."""
 RESPONSE_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -70,13 +70,13 @@ class ClientConnection:
     transport: asyncio.Transport
     """Transport of the connection."""
     has_token: bool = False
-    """Whether the client has shown a valid token."""
+    """True if the client has shown a valid token."""
     timer: asyncio.TimerHandle | None = None
     """Timer that closes the connection. None while a request is answered."""
 
     @property
     def is_open(self) -> bool:
-        """Whether the connection still has a descriptor."""
+        """True if the connection still has a descriptor."""
         return self.socket.fileno() >= 0
 
     def start_timer(self) -> None:

@@ -81,7 +81,7 @@ class LiveTest(TapVisit):
 
     @property
     def is_running(self) -> bool:
-        """Whether the test uses the device. A failed test does not."""
+        """True if the test uses the device. A failed test does not."""
         return self._thread.is_alive() and not self.is_waiting and self.state.word is not TapStep.FAILED
 
     def end(self) -> None:
@@ -107,7 +107,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     direction: TapDirection
     resume: bool = True
-    """Whether to resume an interrupted test of the same tool and direction."""
+    """True to resume an interrupted test of the same tool and direction."""
 
 
 class DashboardServer(WebServerThread):

@@ -1,1 +1,1 @@
-"""Show results to people and programs: texts, tables, figures, reports, and JSON."""
+"""Presentation of results: texts, tables, figures, reports and JSON."""

@@ -1,1 +1,1 @@
-"""Live tap test: device connection, hits, self-check, state and outcome, and the emulated devices for it."""
+"""Live tap test: device connection, hits, self-check, state, result and emulated devices."""

@@ -19,7 +19,7 @@ class TapStep(enum.StrEnum):
     TAP = "TAP"
     """Armed: the next hit is awaited."""
     WAIT = "WAIT"
-    """The structure still rings, or a record is being taken."""
+    """The structure still vibrates, or a record is being taken."""
     GOOD = "GOOD"
     """The last hit was accepted."""
     REFUSED = "REFUSED"
@@ -41,11 +41,11 @@ class Check:
     name: str
     """Name of the check, e.g. "force noise"."""
     passed: bool
-    """Whether all is well. A failed check warns and does not stop the test."""
+    """True if all is well. A failed check warns and does not stop the test."""
     text: str
     """Finding with its unit, and the remedy if the check failed."""
     is_notable: bool = False
-    """Whether the finding deserves a line even if all is well."""
+    """True if the finding deserves a line even if all is well."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class ListedHit:
     peak: str
     """Largest force, or largest acceleration without a force sensor, with its unit."""
     undone: bool = False
-    """Whether the operator took it back."""
+    """True if the operator took it back."""
     reason: str = ""
     """Sentence with numbers on what is wrong with it, empty if it is averaged."""
     earlier: bool = False
-    """Whether it was taken before the test was interrupted."""
+    """True if it was taken before the test was interrupted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +121,11 @@ class Outcome:
     next_step: str
     """Sentence on what to do now."""
     is_early: bool = False
-    """Whether the alarm is for a frequency drop short of every limit."""
+    """True if the alarm is for a frequency drop within every limit."""
     programs: Sequence[ProgramVerdict] = ()
     """Programs with their verdicts."""
     needs_cross_tap: bool = False
-    """Whether a cross tap, hit in x and measured in y, would settle what x and y leave open."""
+    """True if a cross tap, hit in x and measured in y, would resolve what x and y leave open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ class TapState:
     verdict: str = ""
     """Verdict on the last hit, e.g. "good" or "double hit, too soft"."""
     trial: bool = False
-    """Whether the last hit was a trial hit, which does not count."""
+    """True if the last hit was a trial hit, which does not count."""
     reason: str = ""
     """Sentence with numbers on what was wrong with the last hit, or why the test waits."""
     good: int = 0
@@ -159,7 +159,7 @@ class TapState:
     mean_change: float | None = None
     """Relative change of the mean by the last good hit (-). None for fewer than 2."""
     settled: bool = False
-    """Whether the mean has settled (a hint: the wanted number stays the rule)."""
+    """True if the mean has converged. The required number of hits still applies."""
     levels: tuple[float | None, float] | None = None
     """RMS of force (N, None if not measured) and acceleration (m/s^2) over the last 50 ms."""
     checks: tuple[Check, ...] = ()
@@ -171,7 +171,7 @@ class TapState:
     choices: tuple[Choice, ...] = ()
     """Choices available now, empty while a test runs."""
     sensor_stays: bool = False
-    """Whether only the hammer must be moved: the sensors measure x and y."""
+    """True if only the hammer must be moved: the sensors measure x and y."""
 
     @property
     def shown_word(self) -> str:
@@ -204,15 +204,11 @@ class StatePublisher(Generic[State]):
 
     def __init__(self, first: State, clock: Callable[[], float]) -> None:
         """Publish the first state. clock: monotonic time (s)."""
-        self._state: State = first
+        self.state: State = first
+        """Newest state."""
         self._clock, self._shown_at = clock, clock()
         self.wakes: set[Callable[[], None]] = set()
         """Functions called after every change by the thread of the test. None may take time."""
-
-    @property
-    def state(self) -> State:
-        """Newest state."""
-        return self._state
 
     @property
     def age(self) -> float:
@@ -221,7 +217,7 @@ class StatePublisher(Generic[State]):
 
     def show(self, **changes: Any) -> None:
         """Replace the state by one with these changed fields."""
-        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
+        self.state = replace(self.state, revision=self.state.revision + 1, **changes)
         self._shown_at = self._clock()
         for wake in tuple(self.wakes):
             wake()

@@ -1,4 +1,4 @@
-"""How far the natural frequency can drop before a program chatters."""
+"""Largest drop of the natural frequency before a program chatters."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
 
 CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
-"""Frequency drop for which the model is recalibrated; between them its stiffness is interpolated."""
+"""Relative frequency drops for which the model is recalibrated; between them its stiffness is interpolated."""
 N_DROP_STEPS = 101
-"""Number of looks between no fall and the largest of them ..."""
+"""Number of checked frequency drops from zero to the largest."""
 N_DROP_PARTS = 8
-"""... in this many parts, up to the one with the first chatter."""
+"""Number of parts in which these drops are checked, up to the part with the first chatter."""
 MAX_CACHED_CALIBRATIONS = 8
-"""Number of calibrated models whose answers are kept, those asked for last."""
+"""Number of cached calibrated models, the most recently used."""
 
 StiffnessAt = Callable[[float], float]
 
@@ -87,13 +87,13 @@ def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: Sti
 
 
 DROP_SEARCH_STEP = 0.0125
-"""Step of the fall at which all samples are checked."""
+"""Step of the relative frequency drop at which all samples are checked."""
 DROP_SLOPE_STEP = 1e-3
-"""Step of the fall over which the growth is taken to be straight."""
+"""Step of the relative frequency drop over which growth is assumed linear."""
 DROP_HALVINGS = 4
-"""Halvings between the two looks at which the first of them chatters."""
+"""Halvings of the step at which the first sample chatters."""
 N_DROP_ERROR_SAMPLES = 12
-"""Number of samples of damping and stiffness that the error of the fall comes from."""
+"""Number of samples of damping and stiffness for the error of the frequency drop."""
 
 
 def find_critical_drop(verdict: Verdict) -> CriticalDrop:

@@ -13,7 +13,6 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.lobe_chart import find_cut_table
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_samples, find_worst_limit
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
@@ -21,24 +20,24 @@ from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
-"""Shares of the median limit, as its own cutting coefficient moves it, at which each sample is checked ..."""
+"""Shares of the median limit, scaled by the cutting coefficient of each sample, at which the sample is checked."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
-"""... and shares at which those are checked that are stable at all of these."""
+"""Further shares, for samples that are stable at all of these."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
-"""Shares of the deepest of interest where there is no median limit."""
+"""Shares of the largest depth of interest, if there is no median limit."""
 N_REFINED_EXTREMES = 9
-"""Number of the lowest and of the highest limits that are then refined, in all directions of feed that count."""
+"""Number of the lowest and of the highest limits that are refined, in all relevant feed directions."""
 LIMIT_REFINEMENT_STEPS = 3
-"""Steps of that refinement."""
+"""Number of refinement steps of these limits."""
 SIMILAR_FEED_LIMIT = 1.15
-"""Directions of feed whose limit is at most this many times the lowest one count ..."""
+"""Limit of a relevant feed direction over the lowest limit, at most."""
 MAX_SIMILAR_FEEDS = 3
-"""... the lowest of them."""
+"""Largest number of relevant feed directions, those with the lowest limits."""
 
 RECHECKED_LIMIT_SHARES = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
-"""Shares of the limit of each sample at which it is checked once more ..."""
+"""Shares of the limit of each sample at which the sample is checked again."""
 WIDER_FEED_LIMIT, MAX_WIDER_FEEDS = 1.3, 6
-"""... in the directions of feed whose limit is at most this many times the lowest one, the lowest of them."""
+"""Limit over the lowest limit in the feed directions of that check, and number of directions, at most."""
 
 
 def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
@@ -107,50 +106,53 @@ def _interpolate_limits(low: Floats, high: Floats, at_low: Floats, at_high: Floa
 
 
 LIMIT_QUANTILES = (0.01, 0.99)
-"""Quantiles of the limit over the uncertainty that a band reaches between."""
+"""Quantiles of the limit at the ends of a band."""
 SKIPPED_CUT_MARGIN = 1.15
-"""Factor that the limit of a cut on its path, were it as doubtful as the lowest, has of margin where it is passed
-over, unless the median chatters in it at a depth this much larger somewhere within the uncertainty of the speed ..."""
+"""Factor of margin with which a cut on the path is skipped, if it were as uncertain as the lowest.
+
+A cut is not skipped if the median chatters at a depth larger by this factor, anywhere within the speed uncertainty."""
 SKIPPED_SAMPLE_MARGIN = 1.6
-"""... and that of one sample in such a cut. Both matter only for the share of samples that chatter: before `stable` is
-said, every sample is checked in every cut. In 408 random cuts, each fed in up to 24 ways, it missed 6 samples."""
+"""Factor of margin with which one sample is skipped in such a cut.
+
+Both factors affect only the share of samples that chatter: before a program is called stable, every sample is
+checked in every cut. In 408 random cuts, each fed in up to 24 directions, 6 samples were missed."""
 
 
 class MonteCarloResult(NamedTuple):
-    """What the verdict on a program rests on."""
+    """Monte Carlo result that the verdict on a program rests on."""
 
     median: ProgramLimit
-    """Limit in the median estimate."""
+    """Limit of the median estimate."""
     lowest: float
-    """Lowest limit of any of the spindles (m)."""
+    """Lowest limit of all samples (m)."""
     low: float
-    """1 % quantile of the limit over the uncertainty (m)."""
+    """1 % quantile of the limit (m)."""
     high: float
-    """99 % quantile of the limit over the uncertainty (m)."""
+    """99 % quantile of the limit (m)."""
     samples: ProgramSamples
-    """Spindles that it was evaluated on."""
+    """Evaluated samples."""
     chatters: Flags
-    """Whether each sample chatters, without the middle, shape (samples,)."""
+    """True for each sample that chatters, without the median, shape (samples,)."""
     axes_ratio: float
-    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest over lowest median limit for all open principal directions; 1 if none are open."""
 
     @property
     def is_stable_throughout(self) -> bool:
-        """Whether it is stable in the median and on every sample."""
+        """True if the median and every sample are stable."""
         return self.median.stable and not np.any(self.chatters)
 
 
 class SampledProgram(NamedTuple):
-    """A program on all the spindles that it may be run on, before these are checked."""
+    """Program with its samples before they are checked."""
 
     depth: float
-    """Its depth (m)."""
+    """Axial depth of cut (m)."""
     median: ProgramLimit
-    """Limit in the median estimate."""
+    """Limit of the median estimate."""
     samples: ProgramSamples
-    """Spindles from all of the uncertainty."""
+    """Samples of the whole uncertainty."""
     axes_ratio: float
-    """Highest median limit over the lowest, whatever the open axes are; 1 where none are."""
+    """Highest over lowest median limit for all open principal directions; 1 if none are open."""
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
@@ -198,23 +200,23 @@ def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits
 
 
 N_BAND_SAMPLES = 64
-"""Number of samples from the uncertainty."""
+"""Number of samples for a band."""
 N_BAND_SPEEDS = 81
 """Number of speeds of their diagrams."""
 UNLIMITED_DEPTH = 1e3
-"""Depth that stands for no limit (m)."""
+"""Depth that represents no limit (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitBand:
-    """Band between 1 and 99 % of the limits over the uncertainty, at the speeds of a diagram."""
+    """Band between the 1 % and 99 % quantiles of the limits, at the speeds of a diagram."""
 
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (n,)."""
     low: Floats
-    """1 % quantile of the limit, the line itself where that is lower (m), shape (n,)."""
+    """1 % quantile of the limit, or the median line if lower (m), shape (n,)."""
     high: Floats
-    """99 % quantile, or the line (m), shape (n,); inf where there is no limit."""
+    """99 % quantile of the limit, or the median line if higher (m), shape (n,); inf without a limit."""
 
 
 def compute_limit_band(
@@ -229,7 +231,7 @@ def compute_limit_band(
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))
-    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
+    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, machine.cut_tables[cut], machine)
     samples = uncertainty.sample(rows, N_BAND_SAMPLES)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
     moved = (samples.speed_rpm / (samples.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]

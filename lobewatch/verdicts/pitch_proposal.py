@@ -1,4 +1,4 @@
-"""Unequal pitches for one cut at one speed: what they gain over equal ones, over all that is not known.
+"""Unequal pitches for one cut at one speed, and their gain over equal pitch with its uncertainty.
 
 The closed form of the best difference between neighbours says which patterns are checked; zero-order approximation
 after Altintas, Engin & Budak, over few samples, says how deep they may go; the multipliers of the same samples say
@@ -28,62 +28,61 @@ from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, e
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 N_LOWEST_PITCH_SAMPLES, PITCH_SAMPLE_STEP = 8, 40
-"""Number of samples, those that equal pitch has the lowest limits in, and step between others, in which patterns are
-compared before the best are evaluated ..."""
+"""Number of samples with the lowest limits, and step between further ones, for a first comparison of patterns."""
 N_PITCH_FEEDS = 2
-"""... in this many ways of the cut, the worst ..."""
+"""Number of feed directions in that comparison, the worst."""
 PITCH_DEPTH_FACTOR = 2.0
-"""... down to this many times their lowest limit by the zero-order approximation."""
+"""Largest depth in that comparison over the lowest limit by the zero-order approximation."""
 MAX_PITCH_TRIES, MIN_CONFIRMED_SHARE = 3, 0.9
-"""Number of patterns of a kind that are evaluated, and share of the depth that few samples allow, as much of which
-is good enough: below it the samples that chatter first join the few."""
+"""Number of evaluated patterns of each kind, and share of the depth allowed by few samples that is sufficient.
+
+Below that share the samples that chatter first join the few samples."""
 N_ADDED_SAMPLES = 8
-"""Number of samples that do."""
+"""Number of samples that join them."""
 MIN_PITCH_GAIN = 1.05
-"""Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
+"""Smallest gain at the low end of the limit for which unequal pitches are proposed; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class PitchEvaluation:
-    """Pitches of a cutter with what the evaluation says of the cut."""
+    """Cutter pitches with the evaluation of the cut."""
 
     pattern: PitchPattern
-    """Pitches."""
+    """Pitch pattern."""
     stability: Stability
     """Stability of the cut at its depth."""
     limit: float
-    """Deepest stable depth in the median estimate (m); inf where there is none as deep as the tool cuts."""
+    """Median estimate of the deepest stable depth (m); inf without a limit down to the flute length."""
     low: float
-    """1 % quantile of the limit over the uncertainty (m)."""
+    """1 % quantile of the limit (m)."""
     high: float
-    """99 % quantile of the limit over the uncertainty (m)."""
+    """99 % quantile of the limit (m)."""
     gain: float
-    """Limit over that of equal pitch, less 1, in the median estimate."""
+    """Median gain: limit over that of equal pitch, less 1."""
     gain_low: float
-    """1 % quantile of the gain over the uncertainty: both cutters on the same spindle and material, sample by
-    sample."""
+    """1 % quantile of the gain; both cutters on the same spindle and material, sample by sample."""
     gain_high: float
-    """99 % quantile of the gain over the uncertainty."""
+    """99 % quantile of the gain."""
     share_worse: float
-    """Share of the uncertainty in which equal pitch has the higher limit."""
+    """Share of the samples in which equal pitch has the higher limit."""
 
 
 @dataclass(frozen=True, eq=False)
 class PitchProposal:
-    """What unequal pitches are worth for one cut at one speed."""
+    """Value of unequal pitches for one cut at one speed."""
 
     verdict: Verdict
     """Verdict on the cut with equal pitch."""
     equal: PitchEvaluation
-    """Equal pitch."""
+    """Evaluation of equal pitch."""
     unequal: tuple[PitchEvaluation, ...]
-    """The best pattern of each kind, and the pitches that the cutter has, the highest low end of the limit first."""
+    """Best pattern of each kind, and the present pitches of the cutter, highest low end of the limit first."""
     half_wave_deg: float
-    """Difference of neighbouring pitches that the closed form has as the best (deg); NaN where nothing chatters."""
+    """Best difference of neighboring pitches by the closed form (deg); NaN without chatter."""
 
     @property
     def proposed(self) -> PitchEvaluation | None:
-        """The pitches to choose; None where equal ones are as good."""
+        """Proposed pitches; None if equal pitches are as good."""
         best = next(iter(self.unequal), None)
         return best if best is not None and best.low >= MIN_PITCH_GAIN * self.equal.low else None
 
@@ -120,14 +119,14 @@ def propose_pitch(
 
 @dataclass(frozen=True, eq=False)
 class PitchSearch:
-    """Search for pitches of one cut."""
+    """Search for the pitches of one cut."""
 
     case: ProgramCase
-    """Cut and tool; the pitch of the cut does not count."""
+    """Cut and tool; the pitch of the cut is ignored."""
     samples: ProgramSamples
     """Samples of the cut with equal pitch."""
     equal_limits: Floats
-    """Their limits (m), the middle first."""
+    """Limits with equal pitch (m), the median first."""
 
     def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
         """Find the pattern of each kind with the highest 1 % limit."""

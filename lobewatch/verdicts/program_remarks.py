@@ -21,9 +21,9 @@ MISSING_TOOL_FACTS = {
     MissingToolData.TOOL_MATERIAL: "tool_material in its [[tool]]",
     MissingToolData.MATERIAL: "material in the program (Kt and Kr alone are of no group of ISO 513)",
 }
-"""What is asked for beside the cutting speed, where that is not known."""
+"""Missing tool data to ask for besides the cutting speed."""
 TOOL_MAKER_KEYS = (MissingToolData.CUTTING_SPEED, MissingToolData.FEED_PER_TOOTH)
-"""Keys of [[tool]] that stand for what its maker says."""
+"""Keys of [[tool]] for data from the tool maker."""
 
 
 def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
@@ -69,7 +69,7 @@ def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
 
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
-    """Who allows that, in verdicts."""
+    """Return the source of the tool limits for a remark."""
     tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
     where = "in a slot" if limits.cut == "slot" else "at the side"
     return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}" + (
@@ -86,15 +86,15 @@ def _number_text(value: float) -> str:
 
 
 NARROW_CUT_IMMERSION = 0.5
-"""Radial depth over diameter below which a corner engages the tool far more than the straight before it ..."""
+"""Immersion below which a corner engages the tool far more than a straight path (-)."""
 ASSUMED_CORNER_FACTOR = 1.5
-"""... as one with this many times the radius of the tool does, which stands for corners."""
+"""Assumed corner radius over tool radius."""
 MAX_HELIX_IMMERSION = 0.2
-"""Radial depth over diameter below which a helix moves the limit."""
+"""Immersion below which a helix changes the limit (-)."""
 CROSS_NOT_TAPPED_CODE = "cross-not-tapped"
 """Code of the remark that asks for a cross tap."""
 MIN_CROSS_LIMIT_RATIO = 1.04
-"""Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
+"""Highest over lowest limit for all open principal directions, from which a cross tap is requested."""
 
 
 def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[Remark]:
@@ -149,7 +149,7 @@ def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSam
 
 
 N_CAUSE_SAMPLES = 60
-"""Number of samples that chatter, of which it is seen what each lacks to be stable."""
+"""Number of chattering samples that are analyzed for the cause."""
 
 
 def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:

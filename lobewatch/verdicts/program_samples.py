@@ -28,37 +28,38 @@ from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.uncertainty import Uncertainty
 
 N_PROGRAM_SAMPLES = 300
-"""Number of samples: as many stable ones say, with 95 % confidence, that no more than 1 % of the uncertainty
-chatters."""
+"""Number of samples: if all are stable, at most 1 % of the uncertainty chatters at 95 % confidence."""
 ROTATING_SEED = 1
-"""Seed of the samples for the rotating spindle."""
+"""Random seed of the samples for the rotating spindle."""
 ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
-"""Middle and standard deviation of f_n, zeta and K in the cut over those at rest; chosen: plausible, not measured."""
+"""Mean and standard deviation of f_n, zeta and K in the cut over the values not rotating; plausible, not measured."""
 ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD = 1.0, 0.30
-"""Middle and standard deviation of Kt in the cut over that of the table; chosen, as those. The prior of the learning
-begins 10 % higher (`ROTATING_FORCE_PRIOR`), since cuts then correct it; nothing corrects the chance made here."""
+"""Mean and standard deviation of Kt in the cut over that of the table; chosen, as plausible.
+
+The prior of the learning starts 10 % higher (`ROTATING_FORCE_PRIOR`), since cuts correct it. Nothing corrects the
+chatter risk computed here."""
 FREQUENCY_MARGIN, N_MARGIN_SPEEDS = 0.003, 7
-"""Relative distance of the frequency that is checked beside the uncertainty of the speed, and number of looks."""
+"""Relative frequency margin checked in addition to the speed uncertainty, and number of speeds checked."""
 N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
-"""Number of samples, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
+"""Number of samples that estimate growth differences between cuts, half of them critical, and safety factor."""
 MIN_ROTATING_FACTOR = 0.1
-"""Least share of its middle that a factor has."""
+"""Smallest factor over its mean."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramSamples:
-    """Samples of one program; row 0 is the middle, without any uncertainty."""
+    """Samples of one program; row 0 is the median without uncertainty."""
 
     rows: MillingRows
     """All samples, the feed along x."""
     cuts: tuple[Cut, ...]
-    """Cuts that the program makes on its path, the worst first."""
+    """Cuts of the program on its path, the worst first."""
     limits: Floats
-    """Deepest stable depth of each in the median (m)."""
+    """Median limit of each cut (m)."""
     piece_factor: int
-    """Number of pieces of a turn over those that modes alone ask for."""
+    """Number of pieces of a turn over that required by the modes only."""
     uncertainty: Uncertainty
-    """Uncertainty that they were drawn from."""
+    """Uncertainty that the samples were drawn from."""
 
     def growth(self, depth: float | Floats) -> Floats:
         """Return the growth rate in the worst cut; negative where stable.
@@ -160,14 +161,14 @@ def build_median_row(program: Program, assembly: Assembly, axes: Floats | None =
 
 
 class WorstLimit(NamedTuple):
-    """Limit of a program in the median of its uncertainty, with the axes that are worst of those that may be."""
+    """Median limit of a program, with the worst of its possible principal directions."""
 
     limit: ProgramLimit
-    """The lowest limit."""
+    """Lowest limit."""
     axes: Floats | None
-    """Vectors of the modes that have it, shape (n, 2); None along x and y."""
+    """Principal directions with that limit, shape (n, 2); None along x and y."""
     axes_ratio: float
-    """The highest limit over the lowest: over the open signs, and with modes along x and y; 1 where nothing is open."""
+    """Highest over lowest limit: over the open signs, and with modes along x and y; 1 if nothing is open."""
 
 
 def find_worst_limit(case: ProgramCase) -> WorstLimit:
@@ -214,7 +215,7 @@ def draw_samples(case: ProgramCase, limit: ProgramLimit, axes: Floats | None = N
 
 
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
-    """Vary the samples by plausible differences between a spindle at rest and one that cuts."""
+    """Vary the samples by plausible differences between a spindle at rest and a cutting one."""
     rows, random = samples.rows, np.random.default_rng(seed)
     frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
 

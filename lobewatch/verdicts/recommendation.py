@@ -110,60 +110,60 @@ def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTa
 
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
-"""What an alternative is good for."""
+"""Labels of alternative settings by their advantage."""
 CUT_REMEDIES = (
     "a shorter stick-out: tap it again with it",
     "another tool: a thicker one, or with fewer teeth",
     "a smaller radial depth",
 )
-"""What makes a cut safe that is not, in verdicts."""
+"""Measures that make an unsafe cut safe, for verdicts."""
 TOOL_SPEED_REMEDIES = (
     "a smaller diameter",
     "tool_material and cutting_speed_m_min in its [[tool]], where it bears more",
 )
-"""What makes a tool one that the spindle is slow enough for ..."""
+"""Measures if the spindle is too fast for the tool."""
 MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
-"""... where max_speed_rpm holds it down."""
+"""Measures if max_speed_rpm limits the speed."""
 FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_SPEED_REMEDIES[1])
-"""... or where a program is set to run at a speed outside the tool limits."""
+"""Measures if a program runs at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
-"""Radial depth over diameter up to which less of it is no advice."""
+"""Immersion up to which a smaller radial depth is not recommended (-)."""
 REQUESTED_KEYS = ("speed_rpm", "depth_mm")
-"""Keys of a program that do not count where a setting is asked for."""
+"""Keys of a program that are ignored if a setting is requested."""
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """A setting beside the recommended one."""
+    """Alternative to the recommended setting."""
 
     label: str
-    """Name of what it is good for."""
+    """Label of its advantage."""
     setting: Setting
     """Speed and depth."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """An answer to somebody who asks for a speed and a depth."""
+    """Answer to a request for speed and depth."""
 
     program: ProgramTable
-    """Cut that is asked about, as it would stand in machine.toml; at the recommended setting where there is one."""
+    """Requested cut as in machine.toml; at the recommended setting if there is one."""
     any_direction: bool = False
-    """Direction left open: it holds for up and down milling, and the program is milled in the worse."""
+    """True if the milling direction is open: valid for up and down milling, evaluated for the worse."""
     setting: Setting | None = None
-    """Recommended setting; None where there is none."""
+    """Recommended setting; None if there is none."""
     verdict: Verdict | None = None
-    """Verdict on the program at that setting; None where there is none."""
+    """Verdict on the program at that setting; None without a setting."""
     reason: str = ""
-    """Reason why there is none."""
+    """Reason why there is no setting."""
     remedies: tuple[str, ...] = ()
-    """Measures that would change that."""
+    """Measures that would allow one."""
     alternatives: tuple[Alternative, ...] = ()
-    """Settings beside it, two at most."""
+    """Alternative settings, at most two."""
     feed_mm: tuple[float, float] | None = None
-    """Least and greatest feed per tooth (mm): its own, else the tool limits; None where neither is known."""
+    """Smallest and largest feed per tooth (mm): that of the program, else the tool limits; None if unknown."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what it rests on, and on the uncertainty of the tool."""
+    """Remarks on assumptions and on the uncertainty of the tool."""
 
 
 def recommend(

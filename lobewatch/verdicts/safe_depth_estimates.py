@@ -32,38 +32,37 @@ from lobewatch.verdicts.setting_robustness import (
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
-"""Number of samples that grow most at the depth that is likely ..."""
+"""Number of samples with the largest growth at the likely depth."""
 N_FLEXIBLE_SAMPLES = 8
-"""... and of those with the largest force on the most flexible mode, whatever grows there."""
+"""Number of samples with the largest force on the most flexible mode."""
 N_CRITICAL_FEEDS = 2
-"""Number of directions of feed, the worst around the speed, in which they are checked."""
+"""Number of worst feed directions around the speed in which these samples are checked."""
 CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
-"""Shares of a depth at which they are."""
+"""Shares of a depth at which these samples are checked."""
 DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
-"""Shares of the step between two of these, one stable and one not, at which they are once more."""
+"""Shares of the step between a stable and an unstable depth at which they are checked again."""
 DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
-"""Factor of the depth up to which is looked, where all of it is stable, and where hardly any of it is ..."""
+"""Depth factor of the search if all depths are stable, and if hardly any is."""
 MIN_SEARCHED_DEPTH = 1e-5
-"""... down to this (m)."""
+"""Smallest searched depth (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CriticalSamples:
-    """A cut at one speed."""
+    """Critical samples of a cut at one speed."""
 
     likely_depth: float
-    """Depth that is likely (m): the scale of what is checked."""
+    """Likely safe depth (m), the scale of the checked depths."""
     samples: ProgramSamples
-    """All samples at both ends of what must be safe (`sweep_extremes`), last the middle, pushed for its depth of
-    margin."""
+    """Samples at both ends of the required range (`sweep_extremes`), then the median with its depth margin."""
     likely_first: Indices
-    """Places of the few that are likely the first to chatter."""
+    """Indices of the few samples that probably chatter first."""
     chattered: frozenset[int] = frozenset()
-    """Samples that count too since they have chattered elsewhere."""
+    """Indices of further samples that have chattered elsewhere."""
 
     @property
     def selected(self) -> ProgramSamples:
-        """Those that count."""
+        """Samples that are evaluated."""
         more = np.add.outer([0, len(self.samples.rows) // 2], sorted(self.chattered)).ravel().astype(np.intp)
         return self.samples[np.union1d(self.likely_first, more)]
 
@@ -132,34 +131,33 @@ def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
 LIKELY_SPEED_STEP = 0.002
 """Relative step of the speeds."""
 COARSE_SPEED_STEPS = 6
-"""Steps between two speeds at which the multipliers are checked ..."""
+"""Number of speed steps between two checks of the multipliers."""
 TRIED_ZERO_ORDER_SHARES = np.array([0.3, 0.6, 1.0, 1.6, 2.5])
-"""... and shares of the limit by the zero-order approximation at which they are ..."""
+"""Shares of the zero-order limit at which multipliers are checked."""
 FURTHER_DEPTH_SHARES = np.array([0.2, 0.5, 1.0])
-"""... and of the way from the last of these to the deepest that matters, where none of them chatters."""
+"""Further shares between the last of these and the largest relevant depth, if none chatters."""
 N_LIKELY_FEEDS = 2
-"""Number of directions of feed, those that zero-order approximation has as the worst at a speed, in which they are."""
+"""Number of feed directions checked at a speed, the worst by the zero-order approximation."""
 MIN_REMOVAL_SHARE = 0.75
-"""Share of the largest removal rate that zero-order approximation has, as many of which must be thinkable at a speed
-for a look."""
+"""Possible removal rate at a speed, as a share of the largest zero-order rate, below which it is not checked."""
 MAX_DEPTH_FACTOR = 1.3
-"""Limits beyond this many times the deepest that may be cut, with all of margin, are not told apart."""
+"""Largest distinguished limit over the largest allowed depth including its margin."""
 LIKELY_FREQUENCY_MARGIN = 0.003
-"""Relative distance of the frequency that is counted on beside speed and fall."""
+"""Relative frequency margin in addition to speed uncertainty and frequency drop."""
 MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
-"""Relative distance of two tops that are worth looking at both, and of speeds that are none."""
+"""Smallest relative distance of two checked maxima, and of other checked speeds."""
 POCKET_VALLEY_SHARE = 0.8
-"""Share of the shallower of two pockets, less than which is likely between them."""
+"""Likely depth between two separate pockets, as a share of the shallower pocket, at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class LikelyDepths:
-    """Depths that are likely to be safe."""
+    """Likely safe depths over speed."""
 
     speeds: Floats
-    """Speeds (rpm), rising, shape (n,)."""
+    """Speeds (rpm), ascending, shape (n,)."""
     depths: Floats
-    """Depth (mm) likely to be safe there, no deeper than tool and drive allow, shape (n,)."""
+    """Likely safe depth (mm), limited by tool and drive, shape (n,)."""
 
     def window_centers(self, depth_mm: float) -> list[float]:
         """Return the center (rpm) of each speed window in which a depth (mm) is likely safe."""

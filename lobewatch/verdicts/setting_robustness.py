@@ -22,32 +22,32 @@ from lobewatch.verdicts.program_samples import ProgramSamples
 
 @dataclass(frozen=True)
 class Setting:
-    """A speed and a depth that would be called stable."""
+    """Speed and depth that would be called stable."""
 
     speed_rpm: float
     """Spindle speed (rpm), in steps of 10 unless it is the program's own."""
     depth_mm: float
     """Axial depth (mm), in steps of 0.05 unless it is the program's own."""
     window_rpm: tuple[float, float]
-    """Slowest and fastest speed around it at which the depth would be called stable too."""
+    """Slowest and fastest neighboring speed at which the depth would also be called stable (rpm)."""
     depth_margin: float
     """Depth margin: median limit over depth, less 1."""
     drop_margin: float
-    """Relative frequency drop up to which it is still called stable; 0.1 means 0.1 or more."""
+    """Relative frequency drop up to which it stays stable; 0.1 means 0.1 or more."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
-"""Relative step of a window of speeds, most steps on each side, and parts in which they are checked."""
+"""Relative step of a speed window, largest number of steps on each side, and parts in which they are checked."""
 ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
-"""Factor of the speed, slower and faster, up to which a setting must be safe; chosen, as the two below."""
+"""Speed factor in both directions within which a setting must be safe; chosen."""
 ROBUST_DEPTH_FACTOR = 1.05
-"""Factor of the depth up to which it must be ..."""
+"""Depth factor up to which a setting must be safe; chosen."""
 MIN_DEPTH_MARGIN = 0.20
-"""Depth that a recommended setting has of margin in the median estimate."""
+"""Smallest depth margin of a recommended setting in the median estimate; chosen."""
 MIN_ROBUST_DROP = 0.01
-"""... and frequency drop that it must stand at least."""
+"""Smallest frequency drop at which a recommended setting must stay stable."""
 CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
-"""Frequency drop that a setting is checked with; more than the last is not told apart."""
+"""Relative frequency drops at which a setting is checked."""
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
@@ -111,9 +111,9 @@ def _last_stable_row(grown: Floats) -> int:
 
 
 N_TAP_INTERVALS = 2
-"""Number of tap intervals that it must last ..."""
+"""Number of tap intervals for which a setting must stay stable."""
 DEFAULT_NEEDED_DROP = 0.02
-"""... or frequency drop that it must stand where no rate is known; chosen."""
+"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
 
 
 def find_needed_drop(assembly: Assembly, machine: Machine) -> float:

@@ -1,4 +1,4 @@
-"""The one search for settings that would be called stable, with something of margin: advice, pockets, recommendations.
+"""Search for stable settings with margin: advice, pockets, recommendations.
 
 Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few samples how deep
 (`CriticalSamples`). What is recommended has been evaluated like any program: `run_monte_carlo` finds it stable
@@ -41,49 +41,50 @@ from lobewatch.verdicts.setting_robustness import (
 )
 
 MAX_DEPTH_MARGIN = 20.0
-"""Depth margin that stands for more too, and for no limit: no deeper is looked."""
+"""Largest searched depth margin, which also represents no limit."""
 MAX_SEARCHED_SPEEDS = 12
-"""Number of speeds that few samples are checked at before it is said that there is none."""
+"""Number of speeds checked with few samples before the search gives up."""
 PROMISING_FACTOR = 1.1
-"""A speed is checked where the depth that is likely times this, and times the largest share of such a depth that few
-samples have left elsewhere, would be a larger removal rate than are known of."""
+"""Factor on the likely removal rate of a speed, above which it is checked against the best rate so far.
+
+The likely rate includes the largest share of such a depth that few samples have left elsewhere."""
 NEIGHBOR_SPEED_STEPS = np.concatenate(
     [sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)]
 )
-"""Relative distances of speeds that are checked beside that of largest removal rate ..."""
+"""Relative distances of neighbors checked around the speed of the largest removal rate."""
 N_CLIMBS = 2
-"""... and number of times that they are."""
+"""Number of times that neighbors are checked."""
 MIN_FAILED_SPEEDS = 3
-"""Number of speeds evaluated in vain that say what is left at others of their pocket."""
+"""Number of failed speeds that predict the other speeds of their pocket."""
 TRIES_PER_SPEED, MAX_SETTING_TRIES = 4, 12
-"""Number of depths that are evaluated at one speed, and at all of them."""
+"""Number of depths evaluated at one speed, and at all speeds."""
 NEARLY_SAFE_SHARE = 0.85
-"""Share of a depth that is wanted, where this much is likely it may be safe too."""
+"""Likely safe share of a requested depth, from which it is evaluated."""
 MAX_REMEMBERED_SAMPLES = 8
-"""Samples of each result that are remembered where they chatter."""
+"""Number of chattering samples of each result that are remembered."""
 NEXT_DEPTH_SHARE = 0.98
-"""Share of a depth, at least as much less of which is checked where samples chatter."""
+"""Largest next depth over one at which samples chatter."""
 N_WINDOW_SAMPLES = 24
-"""Number of samples, the hardest, that bound a window before all of them decide."""
+"""Number of critical samples that bound a window before all samples decide."""
 
 DepthsBySpeed = dict[float, float]
-"""Depths (mm) that may be safe, by speeds (rpm)."""
+"""Possibly safe depths (mm) by speed (rpm)."""
 SharesBySpeed = dict[float, float]
-"""Shares that all samples left of the depths that few allowed, by speeds (rpm) that were evaluated in vain."""
+"""Share of the depth by few samples that all samples left, by failed speed (rpm)."""
 
 
 @dataclass(frozen=True, eq=False)
 class SettingSearch:
-    """Search for settings of one cut with a tool that is surely known."""
+    """Search for settings of one cut with a known tool."""
 
     case: ProgramCase
-    """Program and tool; the speed and depth of the program do not count."""
+    """Program and tool; speed and depth of the program are ignored."""
     critical: dict[float, CriticalSamples] = field(default_factory=dict)
-    """Few samples by speed (rpm), with those that were known to chatter when they were asked last."""
+    """Critical samples by speed (rpm), with those known to chatter at the last query."""
     chattered: set[int] = field(default_factory=set)
-    """Samples that have chattered where few others made it seem safe."""
+    """Indices of samples that chattered where few samples seemed safe."""
     results: dict[tuple[float, float], MonteCarloResult] = field(default_factory=dict)
-    """Results of the settings that were found, by speed (rpm) and depth (mm)."""
+    """Results of the settings found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def cut_range(self) -> CutRange:
@@ -92,22 +93,22 @@ class SettingSearch:
 
     @cached_property
     def needed_drop(self) -> float:
-        """Frequency drop that a setting must stand, relative."""
+        """Relative frequency drop at which a setting must stay stable."""
         return find_needed_drop(self.case.assembly, self.case.machine)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
-        """Stiffness over that of now by the frequency drop."""
+        """Stiffness over the present one as a function of the frequency drop."""
         return model_softening(self.case.assembly)[0]
 
     @cached_property
     def likely_depths(self) -> LikelyDepths:
-        """Where to look."""
+        """Likely safe depths over speed."""
         return estimate_likely_depths(self.case, self.cut_range, self.needed_drop)
 
     @cached_property
     def best(self) -> Setting | None:
-        """The setting of largest removal rate at the same feed per tooth; None where nothing is safe."""
+        """Setting with the largest removal rate at the same feed per tooth; None if no setting is safe."""
         return next(self._search_settings(), None)
 
     def pockets(self, count: int) -> list[Setting]:
@@ -189,7 +190,7 @@ class SettingSearch:
                 depths[speed] = self.cut_range.round_down_depth(setting)
 
     def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
-        """Return whether a speed (rpm) lies in none of the pockets taken."""
+        """Return whether a speed (rpm) is in none of the pockets taken."""
         return not any(self.likely_depths.is_same_pocket(speed, setting.speed_rpm) for setting in taken)
 
     def _climb(self, speed: float, depths: DepthsBySpeed, confirmed: SharesBySpeed, visited: set[float]) -> float:

@@ -1,4 +1,4 @@
-"""Where the pockets between the lobes are when only natural frequency and damping are known: speeds without depths.
+"""Speeds of stable pockets without depths, if only natural frequency and damping are known.
 
 A stiffness stretches all limits alike and moves none of them along the speeds, as long as one mode decides.
 """
@@ -22,31 +22,30 @@ from lobewatch.verdicts.uncertainty import DEFAULT_TAP_SCATTER
 from modal import Mode
 
 ARBITRARY_STIFFNESS = 1e7
-"""Stiffness that stands for all (N/m): no result depends on it."""
+"""Arbitrary modal stiffness (N/m); no result depends on it."""
 MAX_POCKET_GAIN = 20.0
-"""Limit in a pocket over the lowest one that stands for more, too."""
+"""Largest limit in a pocket over the lowest limit."""
 POCKET_SPEED_STEP = 1e-3
 """Relative step of the speeds."""
 N_SPEED_POCKETS = 3
-"""Number of pockets that are told."""
+"""Number of reported pockets."""
 SPEEDS_ONLY_CODE = "speeds-alone"
-"""Code of the remark on them."""
+"""Code of the remark on speed pockets."""
 
 
 @dataclass(frozen=True)
 class SpeedPocket:
-    """A pocket whose depth is not known."""
+    """Stable pocket of unknown depth."""
 
     speed_rpm: float
     """Speed of its deepest point (rpm)."""
     window_rpm: tuple[float, float]
-    """Slowest and fastest speed at which the limit is 0.8 of its deepest or more, wherever f_n is within its
-    uncertainty."""
+    """Slowest and fastest speed with at least 0.8 of the largest depth, for any f_n within its uncertainty (rpm)."""
     gain: float
-    """Limit there over the lowest one in the range of speeds (-); MOST_GAIN stands for more, too."""
+    """Limit there over the lowest limit in the speed range (-), at most `MAX_POCKET_GAIN`."""
 
     def contains(self, speed_rpm: float) -> bool:
-        """Whether a speed (rpm) lies in its window."""
+        """Return whether a speed (rpm) is in its window."""
         return self.window_rpm[0] <= speed_rpm <= self.window_rpm[1]
 
 

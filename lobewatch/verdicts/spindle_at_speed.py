@@ -1,4 +1,4 @@
-"""What test cuts have shown of the spindle as it turns, beside the tool as tapped: verdicts rest on both."""
+"""Spindle at speed as learned from test cuts, used in verdicts with the tool as tapped."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class SpindleAtSpeed:
     radial: float = math.nan
     """Cutting coefficient Kr in the learned median (N/mm2)."""
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
-    """Intervals of 95 % before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...)."""
+    """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential", ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
-    """Intervals of 95 % with the cuts, by the same names."""
+    """95 % intervals with the cuts, by the same names."""
 
     def scale_modes(self, assembly: Assembly) -> Assembly:
         """Scale the modes of a tool to the learned median; unchanged where nothing was learned.

@@ -21,13 +21,13 @@ from lobewatch.verdicts import uncertainty_causes as causes
 from modal import Mode
 
 DEFAULT_TAP_SCATTER = Scatter(0.003, 0.10, 0.03)
-"""Scatter from tap test to tap test, until a series tells its own; chosen."""
+"""Default scatter between tap tests, until a series has its own; chosen."""
 MIN_SAMPLE_FACTOR = 0.02
-"""Smallest factor on a median value of a sample ..."""
+"""Smallest factor of a sample on a median value."""
 MAX_MODE_PHASE = np.radians(89)
-"""... and largest phase (rad)."""
+"""Largest phase of a sample (rad)."""
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
-"""Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
+"""Largest factor on the cutting coefficients by tool wear; chosen."""
 
 
 class FactorRange(NamedTuple):
@@ -50,7 +50,7 @@ class LearnedSamples:
     stiffness: Floats
     """Modal stiffnesses over their mean, shape (r, n)."""
     phase_change: Floats
-    """Phases less those of the middle (rad), shape (r, n)."""
+    """Phases relative to the mean phases (rad), shape (r, n)."""
     tangential: Floats
     """Kt over its mean, shape (r,)."""
     ratio: Floats

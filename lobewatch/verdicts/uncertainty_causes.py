@@ -1,4 +1,4 @@
-"""Causes of uncertainty: for each its name, the label of its size, and what to do where it decides a verdict."""
+"""Causes of uncertainty with their names, labels and remedies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verdict on a cutting program: the one place that says whether it is stable, how surely, and how far."""
+"""Verdict on a cutting program: stability, limits, chatter risk and frequency margins."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class StoredVerdict(NamedTuple):
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether the program is stable in the median estimate; None if unknown."""
+        """True if the program is stable in the median estimate; None if unknown."""
         return None if self.stability is Stability.UNKNOWN else self.stability is not Stability.NOT_STABLE
 
 
@@ -114,12 +114,12 @@ class Verdict:
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether the program is stable in the median estimate; None if unknown."""
+        """True if the program is stable in the median estimate; None if unknown."""
         return self.stored.is_stable
 
     @property
     def is_measured(self) -> bool:
-        """Whether the tool was tapped; else the verdict is predicted by the model, or unknown."""
+        """True if the tool was tapped; else the verdict is predicted by the model, or unknown."""
         return self.assembly is not None and not self.assembly.predicted
 
     @property
@@ -134,7 +134,7 @@ class Verdict:
 
     @property
     def is_beyond_drive(self) -> bool:
-        """Whether it needs more power or torque than the drive has."""
+        """True if it needs more power or torque than the drive has."""
         return self.program.depth_mm / 1e3 > self.drive_limit
 
     @property

@@ -22,7 +22,7 @@ from lobes.tooth_force import interval_forces, mean_force, mean_regeneration, ro
 from lobewatch.arrays import Complexes, Floats
 
 FREQUENCIES_PER_WAVE = 16
-"""Frequencies in which the regeneration of the longest delay turns once, at least."""
+"""Smallest number of frequencies per turn of the regeneration phase of the longest delay."""
 
 
 def refine_frequency_grid(grid: Floats, cut: Cut, teeth: Floats) -> Floats:
@@ -55,19 +55,19 @@ def find_uneven_limits(grid: Floats, loop: Complexes, cut: Cut, teeth: Floats) -
 
 
 FREQUENCY_GRID_REACH = 0.7
-"""Distance from each natural frequency up to which frequencies are checked, relative ..."""
+"""Relative distance from each natural frequency within which frequencies are checked."""
 FREQUENCY_GRID_POINTS = 49
-"""... and number of them, dense near it."""
+"""Number of frequencies near each natural frequency, densest close to it."""
 MAX_BATCH_NUMBERS = 300_000
-"""Numbers that are worked on at once."""
+"""Largest number of values computed at once."""
 NEWTON_STEPS = 14
-"""Steps of the search for a root."""
+"""Number of Newton steps for a root."""
 CONSTANT_FORCE_TOLERANCE = 1e-6
-"""Change of the force over the turn, relative to its mean, that is none."""
+"""Change of the force over a turn, relative to its mean, below which it is constant."""
 
 
 class ModeColumns(NamedTuple):
-    """One mode of each spindle, shape (r, 1) each."""
+    """Columns of one mode of each spindle, shape (r, 1) each."""
 
     frequency: Floats
     """Natural frequency (rad/s)."""
@@ -76,21 +76,21 @@ class ModeColumns(NamedTuple):
     stiffness: Floats
     """Modal stiffness (N/m)."""
     displacement: Floats
-    """Share of its coordinate that the tip shows (-)."""
+    """Displacement of the tip per modal coordinate (-)."""
     velocity: Floats
-    """Share of its velocity over the natural frequency that the tip shows (-)."""
+    """Displacement of the tip per modal velocity over the natural frequency (-)."""
     coupling: Floats
-    """Product of its parts in the direction of the force and that of the displacement (-)."""
+    """Product of the mode shape in the direction of the force and of the displacement (-)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ZeroOrderBatch:
-    """r spindles with a cut, by its mean force."""
+    """Many spindles with a cut, represented by its mean force."""
 
     rows: MillingRows
     """Spindles, each with its cut and feed."""
     force: Floats
-    """Mean force matrix of each (Pa), in the directions x and y of the machine, shape (r, 2, 2)."""
+    """Mean force matrix of each (Pa) in machine x and y, shape (r, 2, 2)."""
 
     @classmethod
     def of(cls, rows: MillingRows) -> ZeroOrderBatch:
@@ -169,7 +169,7 @@ class ZeroOrderBatch:
 
     @property
     def _is_rotated(self) -> bool:
-        """Whether a force in x moves the tip in y."""
+        """True if a force in x moves the tip in y."""
         return bool(np.any(np.prod(self.rows.vector, axis=-1)))
 
     def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:

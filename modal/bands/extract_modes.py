@@ -189,7 +189,7 @@ def _merge_resonances(found: Sequence[list[Resonance]]) -> list[Resonance]:
 
 
 def _fit_bands(before: Extraction, resonances: list[Resonance]) -> Extraction:
-    """Fit every band around these resonances for the first time, the highest first, without the tails of those before.
+    """Fit every band around these resonances for the first time, the highest first, without tails of earlier ones.
 
     An earlier band with the same resonances and lines keeps its fit.
     """
@@ -209,14 +209,14 @@ def _is_band_of(band: FittedBand, local: LocalBand) -> bool:
 
 
 def _with_residual_resonances(state: Extraction, known: list[Resonance]) -> list[Resonance]:
-    """Add the resonances that stand out of the residual of any FRF."""
+    """Add the resonances that exceed the residual of any FRF."""
     for frf, fitted in zip(state.frfs, state.receptance, strict=True):
         known = add_residual_resonances(known, replace(frf, receptance=frf.receptance - fitted))
     return known
 
 
 def _stray_lines(state: Extraction) -> Flags:
-    """Return which lines stand far out of the residual on both sides of them (hum, a carrier), shape (p, n)."""
+    """Return which lines far exceed the residual on both sides of them (hum, a carrier), shape (p, n)."""
     stray = np.zeros(state.weight.shape, bool)
     for band in state.bands:
         size = np.abs(band.data.target) * band.data.weight

@@ -90,7 +90,7 @@ def find_resonances(frf: Frf) -> list[Resonance]:
 
 
 def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[Resonance]:
-    """Add resonances that stand out of the residual of a fit to the known ones, by rising frequency.
+    """Add resonances that exceed the residual of a fit to the known ones, by rising frequency.
 
     residual: the measured FRF less all that was fitted. Residual peaks at known resonances and single lines (hum)
     are ignored.
@@ -252,8 +252,7 @@ def mobility_noise(frf: Frf) -> Floats:
     """
     factor = measured_over_receptance(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
-    scatter = np.pad(
-        scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2)), (1, 2), mode="edge"
-    )
+    scatter = scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2))
+    scatter = np.pad(scatter, (1, 2), mode="edge")
     noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent_noise(frf), size=NOISE_MEDIAN_LINES))
     return np.asarray(noise * 2 * np.pi * frf.frequency / factor)

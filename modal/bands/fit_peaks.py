@@ -131,7 +131,7 @@ def refit_with_real_constants(band: FittedBand) -> FittedBand:
 
 
 def are_modes(fit: BandFit, frequency: Floats, height: Floats, largest_error: float = MAX_PEAK_FIT_ERROR) -> Flags:
-    """Return which fits lie in the band, are high enough, and are certain enough in one of the FRFs at least."""
+    """Return which fits are in the band, are high enough, and are certain enough in at least one of the FRFs."""
     return np.asarray(
         (fit.frequency > frequency[0])
         & (fit.frequency < frequency[-1])
@@ -166,7 +166,7 @@ def _better_fit(a: tuple[BandFit, Floats] | None, b: tuple[BandFit, Floats] | No
 
 
 def _fit_valid_modes(data: BandData, starts: Floats, height: Floats, terms: int) -> tuple[BandFit, Floats] | None:
-    """Fit modes, removing the weakest one that is no valid mode until all are."""
+    """Fit modes, removing the weakest invalid one until all are valid."""
     while height.size:
         fit = fit_band(data.frequency, data.target, data.weight, starts, terms)
         sure = np.zeros(height.size, bool) if fit is None else are_modes(fit, data.frequency, height)

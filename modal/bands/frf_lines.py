@@ -62,9 +62,8 @@ def incoherent_noise(frf: Frf) -> Floats:
 def _smooth_variance(variance: Floats) -> Floats:
     """Smooth the variance over lines, leaving out disturbed lines (hum), which keep their own."""
     most = DISTURBED_LINE_RATIO * scipy.ndimage.median_filter(variance, VARIANCE_SMOOTHING_LINES)
-    return np.where(
-        variance > most, variance, scipy.ndimage.uniform_filter1d(np.minimum(variance, most), VARIANCE_SMOOTHING_LINES)
-    )
+    smooth = scipy.ndimage.uniform_filter1d(np.minimum(variance, most), VARIANCE_SMOOTHING_LINES)
+    return np.where(variance > most, variance, smooth)
 
 
 def measured_over_receptance(frf: Frf) -> Floats:

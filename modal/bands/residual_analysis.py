@@ -113,9 +113,8 @@ def systematic_error(band: FittedBand) -> SystematicError:
     fit = band.fit
     hidden = _hidden_error(band)
     independent = _count_independent_values(fit)
-    is_white = independent > fit.degrees_of_freedom * (
-        1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(fit.residual.size / 2)
-    )
+    share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(fit.residual.size / 2)
+    is_white = independent > fit.degrees_of_freedom * share
     if is_white or has_rounding_residual(band):
         return SystematicError(1.0, fit.degrees_of_freedom, np.diag(hidden**2))
     moved = np.array(list(_trial_changes(band))).reshape(-1, hidden.size)

@@ -25,7 +25,7 @@ class FixedPoleFit:
     poles: Floats
     """Frequencies (Hz) and damping ratios, (2, m)."""
     free: Flags
-    """Whether each of them may move, (2 m,)."""
+    """True for each of them that is free, (2 m,)."""
     q: Floats
     """Orthonormal bases of the modes without their part in the residual terms, (p, 2 n, c)."""
     inverse: Floats

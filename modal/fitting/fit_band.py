@@ -34,7 +34,7 @@ class ProjectedBand:
 
     @cached_property
     def _free(self) -> Flags:
-        """Whether each frequency and damping ratio may move, (2 m,)."""
+        """True for each frequency and damping ratio that is free, (2 m,)."""
         return np.tile(~self.held, 2)
 
     @cached_property
@@ -66,9 +66,8 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
     frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,).
     """
     bases = _term_bases(frequency, weight, terms)
-    return ProjectedBand(
-        frequency, weight, bases, _project_out(bases, split_complex(weight * receptance)[:, np.newaxis]), held
-    )
+    values = _project_out(bases, split_complex(weight * receptance)[:, np.newaxis])
+    return ProjectedBand(frequency, weight, bases, values, held)
 
 
 def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
@@ -131,9 +130,8 @@ def _model_rows(root: Complexes, poles: Floats) -> Floats:
     pole, size = fn * (1j * turning - zeta), fn / (2 * turning)
     here, there = size / (root - pole), size / (root - pole.conj())
     square, of_there = here * here, there * there
-    return split_complex(
-        np.concatenate([1j * (there - here), here + there, square + of_there, 1j * (square - of_there)])
-    )
+    rows = [1j * (there - here), here + there, square + of_there, 1j * (square - of_there)]
+    return split_complex(np.concatenate(rows))
 
 
 def _project_out(bases: Floats, values: Floats) -> Floats:
@@ -242,16 +240,9 @@ def _poles_for_real_constants(fit: BandFit) -> Floats:
 
 
 def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
-    return BandFit(
-        state.poles[0],
-        state.poles[1],
-        state.constant,
-        state.degrees_of_freedom,
-        with_phases,
-        state.residual,
-        np.zeros(state.constant.shape),
-        np.array(~state.free[: state.poles.shape[1]]),
-    )
+    freedom, size_error = state.degrees_of_freedom, np.zeros(state.constant.shape)
+    held = np.array(~state.free[: state.poles.shape[1]])
+    return BandFit(*state.poles, state.constant, freedom, with_phases, state.residual, size_error, held)
 
 
 def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:
@@ -273,10 +264,8 @@ def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int)
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             kept = (state.cost - trial.cost) / promise
-            state, damping = (
-                trial,
-                damping * (0.1 if kept > GOOD_GAIN_RATIO else 1.0 if kept > POOR_GAIN_RATIO else 4.0),
-            )
+            state = trial
+            damping *= 0.1 if kept > GOOD_GAIN_RATIO else 1.0 if kept > POOR_GAIN_RATIO else 4.0
         elif damping > 1e8 or size < 1e-6:
             return state, True
         else:

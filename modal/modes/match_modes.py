@@ -59,7 +59,7 @@ MAX_MATCH_DISTANCE = 4.0
 DOUBTFUL_MATCH_DISTANCE = 2.5
 """Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
-"""Largest relative change of frequency of a mode that is alike otherwise."""
+"""Largest relative change of frequency of an otherwise unchanged mode."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
 """Distance of the second nearest mode over that of the nearest below which it is a rival."""
 
@@ -167,10 +167,7 @@ def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list
     >>> [mode.match_count for mode in match_modes([once, twice], others)]
     [(0, 2), (2, 2)]
     """
-    return [
-        replace(mode, match_count=(sum(_has_mode_near(other, mode.frequency) for other in others), len(others)))
-        for mode in modes
-    ]
+    return [replace(m, match_count=(sum(_has_mode_near(o, m.frequency) for o in others), len(others))) for m in modes]
 
 
 def _has_mode_near(modes: Sequence[Mode], frequency: float) -> bool:

@@ -92,7 +92,7 @@ class Mode:
     match_count: tuple[int, int] | None = None
     """Number of other FRFs with this mode, and number compared (`match_modes`); None without comparison."""
     relative_peak: float | None = None
-    """Peak of receptance over the highest of the same free decays, all excited alike; None if K is known."""
+    """Peak of receptance over the highest of the same free decays from one excitation; None if K is known."""
     remarks: tuple[Remark, ...] = ()
     """Reasons why the mode may not be trusted. docs/remarks.md lists their codes."""
 
@@ -128,7 +128,7 @@ class Mode:
 
     @property
     def has_stiffness(self) -> bool:
-        """Whether K is known: whether the force was measured."""
+        """True if K is known, that is, if the force was measured."""
         return not np.isnan(self.stiffness)
 
     @property

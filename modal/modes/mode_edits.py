@@ -116,9 +116,7 @@ def parse_mode_edits(
     >>> parse_mode_edits(add=["298"], fix=["1500:0.03"])
     ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
     """
-    pairs = [
-        _numbers("fix", text, "the frequency in Hz and the damping ratio, as in 1500:0.03", 2) for text in fix or ()
-    ]
+    pairs = [_numbers("fix", t, "the frequency in Hz and the damping ratio, as in 1500:0.03", 2) for t in fix or ()]
     return ModeEdits(
         tuple(_numbers("add", text, "the frequency in Hz, as in 298.5", 1)[0] for text in add or ()),
         tuple(_numbers("drop", text, "the frequency in Hz, as in 412", 1)[0] for text in drop or ()),

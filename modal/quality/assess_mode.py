@@ -38,9 +38,8 @@ def with_truncation_error(mode: Mode) -> Mode:
         return mode
     share = mode.remaining_decay / np.sqrt(2)
     off = share * np.array([mode.damping_ratio * mode.frequency, mode.damping_ratio, mode.stiffness])
-    widened = replace(
-        mode, covariance=_widen_covariance(mode.covariance, off), jackknife=_widen_covariance(mode.jackknife, off)
-    )
+    covariance, jackknife = (_widen_covariance(own, off) for own in (mode.covariance, mode.jackknife))
+    widened = replace(mode, covariance=covariance, jackknife=jackknife)
     of_phase = min(float(np.hypot(mode.phase_deg_std, np.degrees(share))), UNKNOWN_PHASE_STD_DEG)
     if mode.phase_correlation is None or mode.best_covariance is None:
         return replace(widened, phase_deg_std=of_phase)
@@ -184,10 +183,8 @@ def _value_remarks(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
         yield Remark("uncertain", at, text, "average more hits")
     if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
         yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
-    is_wide = (
-        np.sum(np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency)
-        >= MIN_HALF_POWER_LINES
-    )
+    is_near = np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+    is_wide = np.sum(is_near) >= MIN_HALF_POWER_LINES
     differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
     if width is not None and differs and is_wide and band.height.size == 1:
         yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")

@@ -39,7 +39,7 @@ MIN_MISFIT_SHARE = 0.01
 DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
 """Codes of remarks that make a mode doubtful."""
 COMMON_REMARK_CODES = ("smoothed-lines",)
-"""Those remarks that apply to all FRFs of a structure alike, so that a match proves nothing."""
+"""Codes of remarks on all FRFs of a structure, for which a match in another FRF proves nothing."""
 
 
 class Trust(enum.StrEnum):

@@ -1,4 +1,4 @@
-"""What an error of a device says."""
+"""Messages of device errors."""
 
 from __future__ import annotations
 

@@ -33,24 +33,25 @@ class Call:
     """create, append, read, write, truncate, fsync, rename, unlink, mkdir, rmdir; failed for one that
     could not be done; or what was announced."""
     path: str
-    """What it was about."""
+    """File or folder of the call."""
     data: bytes = b""
-    """What was written."""
+    """Data written."""
     to: str = ""
     """The new name."""
     size: int = 0
-    """What was left of it (bytes)."""
+    """Remaining size (bytes)."""
 
 
 class FaultyFiles:
-    """Counts the file calls below a folder from `begin` on, and lets one fail."""
+    """Recorder of the file calls below a folder from `begin` on, which makes one of them fail."""
 
     def __init__(self, root: Path, at: int = -1, fault: str = "") -> None:
-        """at: number of the call that the fault befalls, from 0; a full disk stays full until room that was
-        held on it is given up.
+        """Set the number of the failing call, from 0, and its fault.
+
+        A full disk stays full until reserved space on it is freed.
         """
         self.calls: list[Call] = []
-        """All that were made, oldest first."""
+        """Recorded calls, oldest first."""
         self._root, self._at, self._fault, self._count = f"{root}/", at, fault, 0
         self._full = False
         self._opened: dict[int, str] = {}

@@ -1,4 +1,4 @@
-"""What a disk holds after its power was cut: contents of files that were synced, names in folders that were synced.
+"""Disk contents after a power cut: data of synced files, names in synced folders.
 
 A disk may keep more than it was made to, in any order. Three ways bound it: nothing more; every name, but of no content
 more; nothing more, but what was deleted is gone.
@@ -16,10 +16,10 @@ WAYS = ("nothing more", "names too", "deletions too")
 
 
 class Disk:
-    """A folder as it stands, and what of it would survive."""
+    """Model of a folder on disk and of the files that survive a power cut."""
 
     def __init__(self, folder: Path) -> None:
-        """All that is in the folder survives."""
+        """Start with a folder whose contents survive."""
         self._root = str(folder)
         self._now: dict[str, int | None] = {}
         self._written: list[bytes] = []

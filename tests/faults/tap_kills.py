@@ -30,7 +30,7 @@ from lobewatch.machine.verify_files import verify
 LINES = 10
 """About as many as the command prints."""
 HITS = 5
-"""Of a test."""
+"""Number of hits of a test."""
 DELAY = 0.03
 """After a line it is killed within this time (s)."""
 Started = tuple[int, int]
@@ -38,7 +38,7 @@ Started = tuple[int, int]
 
 
 def forked(arguments: list[str]) -> Started:
-    """The command in a copy of this program."""
+    """Run the command in a fork of this process."""
     read, write = os.pipe()
     process = os.fork()
     if not process:
@@ -67,7 +67,7 @@ def _become(arguments: list[str], pipe: int) -> NoReturn:
 
 
 def started(arguments: list[str]) -> Started:
-    """The command in a program of its own."""
+    """Run the command in a new process."""
     read, write = os.pipe()
     line = [sys.executable, "-m", "lobewatch.cli", *arguments]
     process = subprocess.Popen(line, stdout=write, stderr=write)
@@ -108,7 +108,7 @@ class Kills:
         return said.decode(), os.waitstatus_to_exitcode(status)
 
     def _wrong(self, said: str, peaks: list[int]) -> list[str]:
-        """What is lost, and what the command should not have said."""
+        """Return lost hits and wrong output of the command."""
         wrong = [f"verify: {remark}" for remark in verify(self._path).damage]
         wrong += [line for line in said.splitlines() if "Traceback" in line or line.startswith("error")]
         found = self._hits()

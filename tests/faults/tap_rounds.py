@@ -52,7 +52,7 @@ SET_UP = {"record_s": 0.08, "trigger_n": 20.0}
 
 @dataclass
 class Told:
-    """What a program has said before it ended."""
+    """Output of a test process before it ended."""
 
     hits: int = 0
     """Announced."""
@@ -61,11 +61,11 @@ class Told:
     error: str = ""
     """Its last words."""
     calls: list[Call] = field(default_factory=list)
-    """File calls, where it lived to tell them; what was announced stands between."""
+    """Recorded file calls, with announcements between them."""
 
 
 def machine(path: Path, hits: int = HITS) -> None:
-    """A machine that takes so many short hits, tapped once."""
+    """Create a machine with short hits, tapped once."""
     toml = make_machine_folder(path, "new_machine.toml")
     settings = "".join(f"{name} = {value}\n" for name, value in SET_UP.items())
     text = re.sub(r"^hits = 10", f"hits = {hits}\n{settings}", toml.read_text("utf-8"), flags=re.MULTILINE)
@@ -74,7 +74,7 @@ def machine(path: Path, hits: int = HITS) -> None:
 
 
 def session(path: Path, seed: int, announce: Any = lambda _: None) -> TapSession:
-    """A tap test by somebody who taps as the seed says; announce: is told the number of hits."""
+    """Return a tap test with hits by seed. `announce` is called with the number of hits."""
     how = Hammering(double_hits=0, overloads=0, interval_range=(0.15, 0.2))
     source = SimulatedSource(HammeredStructure(BEAM, RATE, np.random.default_rng(seed), how), CHANNELS, RATE, 10**6)
     folder = MachineFolder(path)
@@ -91,14 +91,14 @@ def session(path: Path, seed: int, announce: Any = lambda _: None) -> TapSession
 
 
 def digest(tap: TapTest) -> str:
-    """Of all that was measured."""
+    """Return the digest of all measured data."""
     codes = (hit.codes for hit in tap.hits)
     parts = [*(code.tobytes() for code in codes if code is not None), tap.required_frf.receptance.tobytes()]
     return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def apart(path: Path, seed: int, at: int = -1, fault: str = "") -> Told:
-    """A tap test in a program of its own, with a fault at this file call."""
+    """Run a tap test in a process of its own, with a fault at this file call."""
     read, write = os.pipe()
     child = os.fork()
     if not child:
@@ -170,11 +170,11 @@ class Rounds:
 
     @property
     def file_calls(self) -> list[Call]:
-        """Those that a fault can befall."""
+        """Calls that can fail."""
         return [call for call in self.calls if call.name not in ("hits", "saved", "error")]
 
     def fault(self, at: int, fault: str) -> dict[str, Any]:
-        """A tap test with this fault, and what became of it."""
+        """Run a tap test with this fault and return its outcome."""
         self._clear()
         shutil.copytree(self._pristine, self._work)
         told = apart(self._work, 2, at, fault)
@@ -184,7 +184,7 @@ class Rounds:
         return about | {"told": told.error, "wrong": wrong}
 
     def power_cut(self, at: int, way: str) -> dict[str, Any]:
-        """The power cut after so many calls, and what became of the tap test."""
+        """Cut the power after so many calls and return the outcome of the tap test."""
         self._clear()
         disk = Disk(self._pristine)
         moved = [replace(one, path=self._moved(one.path), to=self._moved(one.to)) for one in self.calls[:at]]
@@ -206,14 +206,14 @@ class Rounds:
         shutil.rmtree(self._work, ignore_errors=True)
 
     def _not_told(self, told: Told, fault: str) -> Iterator[str]:
-        """A failing call ends the test in one clear sentence, or does not matter."""
+        """Return an error unless a failing call ended the test in one clear sentence or did not matter."""
         if fault in ERRORS and not told.saved:
             text = told.error
             if "\n" in text or "Errno" in text or str(self._work) not in text or ";" not in text:
                 yield f"no clear error: {text!r}"
 
     def _lost(self, told: Told) -> list[str]:
-        """What is wrong with what the program has left, and after another has gone on with it."""
+        """Return errors in the files left by a test, and in those after a second test has resumed it."""
         wrong = [f"verify: {remark}" for remark in verify(self._work).damage]
         try:
             session(self._work, 3).run()

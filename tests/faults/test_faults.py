@@ -1,4 +1,4 @@
-"""Nothing that was announced is lost, whatever befalls a file call, the program, or the power: docs/reliability.md."""
+"""No loss of announced data after a failed file call, a killed program or a power cut: docs/reliability.md."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def wrong(rounds: list[Round]) -> list[Round]:
 
 
 def killed(path: Path, how: str, rounds: int, seed: int) -> list[Round]:
-    """Rounds of the real command on an emulated device that streams."""
+    """Return rounds of the real command on an emulated streaming device."""
     signal = HammeredStructure(BEAM, RATE, np.random.default_rng(seed), Hammering())
     with TapsEmulator(signal, CHANNELS, RATE, realtime=False) as device:
         return rounds_of("tap_kills.py", path, device.port, how, rounds, seed)

@@ -34,7 +34,7 @@ WRITING = (["event", "MACHINE", "bearings"], ["exclude", "MACHINE", "TAP", "--re
 
 @pytest.fixture
 def tapped(tmp_path: Path) -> Shop:
-    """A machine with one program and two tap tests, in a plant."""
+    """Return a machine with one program and two tap tests, in a fleet."""
     shop = Shop(tmp_path / "m")
     shop.run(("A", 12900, 1.5))
     shop.tap_both()

@@ -1,4 +1,4 @@
-"""An STM32F103 as far as the firmware of the Blue Pill needs it, and a USB host beside it.
+"""Emulated STM32F103 as needed by the firmware of the Blue Pill, with a USB host.
 
 The Cortex-M3 is unicorn's. Its registers are modelled after RM0008 (STMicroelectronics): clocks (7.3), converters
 (11.12), the tick (PM0056, 4.5), and the USB device (23.4, 23.5), whose flags are cleared by 0, its states toggled by 1.
@@ -52,11 +52,11 @@ class BluePill:
 
     @property
     def is_sampling(self) -> bool:
-        """Whether the timer triggers conversions whose end is told."""
+        """True if the timer triggers conversions whose end causes an interrupt."""
         return bool(self.registers.get(TIMER3_CR1, 0) & 1 and self.registers.get(NVIC_ENABLE, 0) >> ADC_IRQ & 1)
 
     def convert(self, first: int, second: int, is_missed: bool = False) -> None:
-        """A period of the timer later both are done (12 bits each); is_missed: nobody comes for it in time."""
+        """Convert both inputs (12 bits each) one timer period later. `is_missed`: the interrupt comes too late."""
         self.ticks += self.registers[TIMER3_ARR] + 1
         if not is_missed:
             self.converted = first | second << 16
@@ -124,7 +124,7 @@ class UsbHost:
         return read
 
     def ask(self, request: str) -> bytes:
-        """A control request of eight bytes (hexadecimal) with what comes back; b"stall" where it is refused."""
+        """Send a control request of eight bytes (hexadecimal) and return the answer; b"stall" if it is rejected."""
         packet = bytes.fromhex(request)
         self._put(0, packet)
         self._receive(0, RECEIVED | WAS_SETUP | 0x4040, NOT_YET << 12 | NOT_YET << 4)
@@ -149,7 +149,7 @@ class UsbHost:
             self.chip.endpoints[endpoint] ^= 0x4000
 
     def take(self, endpoint: int) -> bytes | None:
-        """The packet that an endpoint has ready; None where it has none, b"" with it stalled."""
+        """Return the packet that an endpoint has ready; None without one, b"" if it is stalled."""
         if not self._wait(endpoint, 4):
             return b"" if self.chip.endpoints[endpoint] >> 4 & 3 == STALLED else None
         place, size = self.chip.memory[4 * endpoint] // 2, self.chip.memory[4 * endpoint + 1] & 0x3FF
@@ -160,7 +160,7 @@ class UsbHost:
         return struct.pack(f"<{len(words)}H", *words)[:size]
 
     def packets(self) -> Iterator[bytes]:
-        """All that the serial port has now."""
+        """Return all packets that the serial port has now."""
         while (part := self.take(1)) is not None:
             yield part
 
@@ -178,7 +178,7 @@ class UsbHost:
         self.chip.memory[4 * endpoint + 3] = self.chip.memory[4 * endpoint + 3] & 0xFC00 | len(data)
 
     def _receive(self, endpoint: int, flags: int, states: int) -> None:
-        """What the chip does when a packet has come; a SETUP makes both directions wait."""
+        """Receive a packet as the chip does; a SETUP makes both directions wait."""
         open_states = 0x3030 if flags & WAS_SETUP else 0x3000
         self.chip.endpoints[endpoint] = self.chip.endpoints[endpoint] & ~open_states | flags | states
         self.chip.run(3000)

@@ -40,7 +40,7 @@ def need() -> Callable[..., None]:
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Makes a target of firmware/Makefile, once; returns its folder."""
+    """Return a function that builds a target of firmware/Makefile once and returns its folder."""
     folder = tmp_path_factory.mktemp("firmware")
 
     @cache
@@ -68,7 +68,7 @@ class Board:
         self.unplug()
 
     def unplug(self) -> None:
-        """It loses its power, whatever it was doing."""
+        """Cut the power at any moment."""
         self._process.kill()
         self._process.communicate(timeout=20)
         os.close(self._held)
@@ -123,13 +123,13 @@ def harmful_cable() -> type[HarmfulCable]:
 
 @pytest.fixture
 def codes(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Channel]) -> NDArray[np.int32]:
-    """What a converter gives while somebody taps without faults."""
+    """Return converter codes of hits without faults."""
     return quantise(tapper()(0, round(SECONDS * 25600)), channels)
 
 
 @pytest.fixture
 def switched_on(built: Callable[..., Path], tmp_path: Path) -> Callable[..., Board]:
-    """Makes a board ("host", "qemu") that plays scans (2, n)."""
+    """Return a function that starts a board ("host", "qemu") that plays scans (2, n)."""
 
     def make(kind: str, codes: NDArray[np.int32], **how: Any) -> Board:
         _need(*TOOLS[kind])
@@ -147,7 +147,7 @@ def switched_on(built: Callable[..., Path], tmp_path: Path) -> Callable[..., Boa
 
 @pytest.fixture
 def events() -> list[tuple[int, str]]:
-    """What happens at the board of a test, by the scans since power came on: see firmware/boards/simulated.h."""
+    """Return the events of a test board by scans since power-on: see firmware/boards/simulated.h."""
     return []
 
 

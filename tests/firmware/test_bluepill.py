@@ -26,7 +26,7 @@ def host(image: bytes) -> UsbHost:
 
 
 def frames(received: bytes) -> Iterator[Frame | None]:
-    """Those that have come to their end; None for a damaged one."""
+    """Yield complete frames; None for a damaged one."""
     *whole, _ = received.split(b"\x00")
     yield from (decode_frame(frame) for frame in whole)
 

@@ -173,6 +173,6 @@ def assert_sound(session: TapSession, tap: TapTest, codes: Codes) -> None:
 
 
 def codes_of(hit: Hit) -> bytes:
-    """What the converter gave."""
+    """Return the bytes of the converter codes."""
     assert hit.codes is not None
     return hit.codes.T.astype("<i4").tobytes()

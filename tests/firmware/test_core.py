@@ -28,7 +28,7 @@ from acquisition.taps.protocol import (
 
 FRAME, RING = 256, 1024
 CODE_BYTES, RAM_BYTES = 2048, 10_240
-"""What the core may take at two channels of 24 bits."""
+"""Memory limits of the core at two channels of 24 bits."""
 OUTSIDE = {"memcpy", "board_send", "board_receive", "board_start", "board_stop", "board_button"}
 CONFIG = {"fs": 25600.0, "channels": [0, 1], "format": 0, "samples_per_frame": 512}
 BITS = (12, 16, 24, 32)
@@ -55,7 +55,7 @@ class Core:
         return frames
 
     def ask(self, kind: int, body: bytes = b"", seq: int = 7) -> Frame:
-        """The answer to a command."""
+        """Return the answer to a command."""
         return self.exchange(encode_frame(Frame(kind, seq, body)))[0]
 
     def start(self, n_scans: int = 0) -> None:
@@ -75,7 +75,7 @@ class Core:
 
     @property
     def rate(self) -> int:
-        """Of the sampling that goes on; 0 for none."""
+        """Sample rate of the running stream; 0 if stopped."""
         return int(self._library.library_rate())
 
 
@@ -92,7 +92,7 @@ def core(request: pytest.FixtureRequest, built: Callable[..., Path], need: Calla
 
 @pytest.fixture(scope="module")
 def plain(built: Callable[..., Path], need: Callable[..., None]) -> Core:
-    """Of 16 bits."""
+    """Return a core with 16 bits."""
     need("make", "cc")
     return Core(built("library") / "taps.so", 16)
 

@@ -1,4 +1,4 @@
-"""A month of the demo, tapped in x and y, on the Cortex-M3 of QEMU: what is found beside what was emulated."""
+"""One month of the demo, tapped in x and y on the Cortex-M3 of QEMU: results against the emulated truth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lobewatch.tap.session import plan_session
 
 SECONDS = 30.0
 MONTH = 18
-"""Of 24."""
+"""Month of the demo, of 24."""
 
 
 def test_a_month_of_the_demo_is_found_as_it_was_emulated(switched_on: Callable[..., Any], tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from acquisition import TapsSource
 RATE = 25_600.0
 MINUTES = 60.0
 PERIOD = 1 << 15
-"""Of the scans, each of which is its own number (16 bits with sign)."""
+"""Period of the scans, each of which is its own number (16 bits with sign)."""
 RING = 1024
 
 

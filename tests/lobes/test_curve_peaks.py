@@ -1,4 +1,4 @@
-"""Peaks with prominence, beside scipy's on curves with flats and ties."""
+"""Peaks with prominence against scipy on curves with plateaus and ties."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Modes that lie askew to x and y: invariances, the kinship of the methods, bad input."""
+"""Modes with rotated principal directions: invariances, agreement of methods, bad input."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class Certificates(NamedTuple):
 
 
 def certify(folder: Path, names: str) -> Certificates:
-    """A new authority, and a certificate by it for these names; skips where there is no openssl."""
+    """Make a new authority and its certificate for these names. Skip the test without openssl."""
     if shutil.which("openssl") is None:
         pytest.skip("openssl is not installed")
     folder.mkdir()

@@ -1,4 +1,4 @@
-"""What several tests of the application share."""
+"""Fixtures that several tests of the application share."""
 
 from __future__ import annotations
 
@@ -41,23 +41,23 @@ depth_mm = {depth:g}
 
 
 class Shop:
-    """The example machine in a folder "m", tapped by whoever likes."""
+    """Example machine in a folder "m", with tap tests on demand."""
 
     start = START
 
     def __init__(self, path: Path) -> None:
-        """New: without a tap test, with the programs of the example."""
+        """Create a machine with the example programs, without a tap test."""
         make_machine_folder(path, "surrogate_machine.toml")
         self.path = path
 
     @property
     def folder(self) -> MachineFolder:
-        """As it is now."""
+        """Machine folder as it is now."""
         return MachineFolder(self.path)
 
     @property
     def logbook(self) -> Logbook:
-        """As it is now."""
+        """Logbook as it is now."""
         return Logbook.open(self.path)
 
     def edit(self, old: str, new: str) -> None:
@@ -94,7 +94,7 @@ class Shop:
         conditions: Conditions = UNKNOWN_CONDITIONS,
         operator: str = "",
     ) -> str:
-        """A tap test without noise, so many days after the start; its identity."""
+        """Store a noise-free tap test so many days after the start, and return its id."""
         when = START + timedelta(days=days)
         text = (self.path / "machine.toml").read_text("utf-8")
         about = Circumstances("m", when, tool, direction, operator, text, conditions=conditions)
@@ -117,7 +117,7 @@ def new_shop() -> type[Shop]:
 
 @pytest.fixture
 def shop(tmp_path: Path) -> Shop:
-    """A machine that runs the safe slots, not tapped yet."""
+    """Return a machine that runs the safe slots and is not tapped yet."""
     found = Shop(tmp_path / "m")
     found.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200")
     found.run_safe_slots()

@@ -16,7 +16,7 @@ LINES = np.arange(5.0, 6000.0, 5.0)
 
 
 def accelerance(modes: list[Mode], frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Of these modes and a static residual flexibility."""
+    """Return the accelerance of these modes and a static residual flexibility."""
     flexibility = synthesize_frf(modes, frequency).receptance + STATIC_RESIDUAL
     return np.asarray(-((2 * np.pi * frequency) ** 2) * flexibility)
 

@@ -199,7 +199,7 @@ def share_held(modes: list[Mode], reach: NDArray[np.float64]) -> NDArray[np.floa
 @pytest.mark.parametrize("hammer_noise", [0.02, 0.1])
 @pytest.mark.parametrize("n_hits", [1, 2, 10])
 def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_noise: float) -> None:
-    """That of the fit for any number of hits, that over hits for ten."""
+    """Intervals of the fit for any number of hits, intervals over hits for ten."""
     modes = [first_mode(tap(1000 + seed, n_hits, hammer_noise)) for seed in range(TESTS)]
     of_fit = share_held(modes, np.array([t.ppf(0.975, mode.degrees_of_freedom) * mode.fit_error for mode in modes]))
     shown = share_held(modes, np.array([mode.quantile() * mode.standard_error for mode in modes]))
@@ -209,7 +209,7 @@ def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_no
 
 
 def correlation_of_neighbouring_lines(hits: list[Hit]) -> float:
-    """Of what the fit of the first mode leaves, weighted."""
+    """Return the weighted correlation of the residual of the first mode's fit."""
     left = extract_modes([estimate_frf(hits)]).bands[0].fit.complex_residual[0]
     return float(np.real(np.vdot(left[:-1], left[1:])) / np.linalg.norm(left) ** 2)
 

@@ -1,4 +1,4 @@
-"""What must not change the modes, or must change them in proportion."""
+"""Changes of input that leave modes unchanged or change them in proportion."""
 
 from __future__ import annotations
 

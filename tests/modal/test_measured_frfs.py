@@ -1,4 +1,4 @@
-"""What measured FRFs have and white noise has not: overloads, echoes, joints."""
+"""Effects of measured FRFs beyond white noise: overloads, echoes, joints."""
 
 from __future__ import annotations
 

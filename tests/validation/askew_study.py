@@ -1,4 +1,4 @@
-"""What is said of spindles whose modes lie askew: random ones, tapped in x and y (and across), judged, simulated.
+"""Verdicts on spindles with rotated principal directions: random ones, tapped in x and y (and cross), simulated.
 
 The truth is two modes square to each other, 5 to 85 degrees off x and y, within 18 % of each other. Their FRFs are
 noisy and fitted as those of a tap test; the limits that are said are held against `delayed_milling`, which shares
@@ -52,14 +52,14 @@ class AskewSpindle:
         return np.array([[c, s], [-s, c]])
 
     def assembly(self, rng: np.random.Generator, across: bool) -> Assembly:
-        """The tool as tap tests show it."""
+        """Return the tool as tap tests show it."""
         x, y, cross = (_fitted(modes, rng) for modes in project_modes(self.modes, self.vectors))
         time, sides = datetime(2026, 1, 1, tzinfo=UTC), ("x", "y")
         x, y = (list(select_credible_modes(modes).modes) for modes in (x, y))
         return Assembly("reference", time, "drawn", x, y, sides, None, {}, False, (), cross=cross if across else None)
 
     def truths(self, depth_mm: float) -> Iterator[DelayedCase]:
-        """The cut at a depth in each of its directions of feed."""
+        """Yield the cut at a depth in each of its feed directions."""
         cut = MACHINE.build_cut(self.cut)
         angles = np.arange(12) * math.pi / 12 if self.cut.feed == "both" else np.array([FEED_ANGLES[self.cut.feed]])
         for feed in angles.tolist():
@@ -105,7 +105,7 @@ def random_spindle(rng: np.random.Generator) -> AskewSpindle:
 
 @dataclass(frozen=True)
 class Saying:
-    """What was said of a spindle at half its limit."""
+    """Predicted limits of a spindle at half its limit."""
 
     spindle: AskewSpindle
     verdict: Verdict
@@ -116,7 +116,7 @@ class Saying:
 
 
 def sayings(count: int, seed: int, across: bool = False) -> list[Saying]:
-    """Of so many random spindles that have a limit, with a cut that is plausible."""
+    """Return predictions for so many random spindles that have a limit, each with a plausible cut."""
     made = list[Saying]()
     for rng in np.random.default_rng(seed).spawn(4 * count):
         spindle = random_spindle(rng)
@@ -133,7 +133,7 @@ def _at(cut: ProgramTable, depth_mm: float) -> ProgramTable:
 
 
 def hold(said: list[Saying], share: float) -> NDArray[np.bool_]:
-    """Whether each truth is stable at a share of the low end of what was said of it, by simulation."""
+    """Return for each truth if it is stable in the simulation at a share of the low end of its prediction."""
     cases = [(i, case) for i, saying in enumerate(said) for case in saying.spindle.truths(share * saying.low_mm)]
     growth, cycles = np.empty(len(cases)), [max(m[0] for m in case.modes) / case.speed_rpm for _, case in cases]
     for part in np.array_split(np.argsort(cycles), -(-len(cases) // 60)):

@@ -1,4 +1,4 @@
-"""Growth of milling with teeth as they stand and modes as they lie, stepped through time; shares nothing with `lobes`.
+"""Growth of milling with any pitch and any mode directions, by time stepping independent of `lobes`.
 
     F(t) = -b sum_j H_j(t) (q(t) - q(t - tau_j))
 

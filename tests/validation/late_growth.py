@@ -1,4 +1,4 @@
-"""How fast a linear, periodic motion grows in the end, from a record of it."""
+"""Final growth rate of a linear, periodic motion from its record."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 WINDOW = 48
 """Most periods that an estimate rests on."""
 FEWEST = 8
-"""Of a shorter record (growth by orders of magnitude a period) the mean growth is taken."""
+"""Record length (periods) below which the mean growth is used (orders of magnitude per period)."""
 RANK = (1e-12, 1e-10)
 """Parts of the motion smaller than this, relative to the largest, are rounding: in the fit, and in one to check it."""
 

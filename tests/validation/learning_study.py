@@ -1,4 +1,4 @@
-"""Test cuts on spindles that are not of the prior of the learning, judged by a simulation in time.
+"""Test cuts on spindles unlike the learning prior, evaluated by time-domain simulation.
 
 Truths are drawn by other rules than those of `lobewatch.cuts.learning.prior_samples`; words and frequencies come from
 `acquisition.emulation.simulate_cuts` (chips, run-out, loss of contact), the optimum from the textbook form of the lobes
@@ -57,11 +57,11 @@ class ForeignTruth:
     seed: int = 7
     """Seed of the truths: 7 for those that rules were chosen on, another for those they are measured on."""
     reads_power: bool = False
-    """Whether the power of each cut is read."""
+    """True if the power of each cut is read."""
     cuts: list[CutEvidence] = field(default_factory=list)
     """Test cuts as they were written down."""
     truly_stable: list[bool] = field(default_factory=list)
-    """Whether each was stable."""
+    """True stability of each cut."""
 
     def __post_init__(self) -> None:
         draw = self.random = np.random.default_rng((34, self.seed, self.number))
@@ -86,7 +86,7 @@ class ForeignTruth:
         self.drive = ShownPower(CUT, self.tangential, np.random.default_rng((35, self.seed, self.number)))
 
     def _before(self) -> Posterior:
-        """What is known before the first cut."""
+        """Return the posterior before the first cut."""
         x, y = ([Mode(*mode) for mode in modes] for modes in self.tapped)
         count = len(x) + len(y)
         exact = {"tap": np.zeros((count, 4))}
@@ -109,7 +109,7 @@ class ForeignTruth:
         return None if suggestion is None else (suggestion.speed_rpm, suggestion.depth)
 
     def milling(self, speed_rpm: float, depth: float) -> MillingCut:
-        """A test cut as it is made."""
+        """Return the true milling cut."""
         x, y = (Structure(*np.array(modes).T) for modes in (self.x, self.y))
         return MillingCut(
             TEETH, 0.0, math.pi, self.tangential, self.radial, depth, FEED, speed_rpm, x, y, runout=self.runout
@@ -131,7 +131,7 @@ class ForeignTruth:
 
     @property
     def knows_force(self) -> bool:
-        """Whether the 95 % interval of Kt holds the truth."""
+        """True if the 95 % interval of Kt contains the truth."""
         interval = self.learnt.intervals["tangential"]
         return interval.low <= self.tangential / TANGENTIAL <= interval.high
 

@@ -1,4 +1,4 @@
-"""Whether milling chatters, from a simulation in time that shares nothing with `lobes` but the conventions.
+"""Chatter of milling by time-domain simulation, which shares only the conventions with `lobes`.
 
 The tool is pushed a little away from the motion that repeats with each tooth (see `milling_steps`). What grows away
 from it, flip (period two) and Hopf alike, is chatter; forced vibration is not.
@@ -38,13 +38,13 @@ ALIKE = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What became of each case."""
+    """Result of each case."""
 
     chatters: NDArray[np.bool_]
     growth: Floats
     """Logarithm of the largest multiplier per tooth period; the border is at 0."""
     doubt: Floats
-    """How far the growth is in doubt; what chatters is sure where this is below the size of the growth."""
+    """Uncertainty of the growth; a result is certain if this is less than the absolute growth."""
     periods: NDArray[np.int64]
     """Tooth periods that were simulated."""
 

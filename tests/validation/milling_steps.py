@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 Modes = tuple[tuple[float, float, float], ...]
 """Frequency (Hz), damping ratio and stiffness (N/m) of each mode."""
 ComplexModes = tuple[tuple[float, float, float] | tuple[float, float, float, float], ...]
-"""The same, of some with the phase of the modal constant (deg)."""
+"""Modes, optionally with the phase of the modal constant (deg)."""
 
 CYCLE, PERIOD, ARC = 40, 60, 30
 """Fewest steps in a cycle of the fastest mode (as stiffened by the cut), in a tooth period, and in the arc of cut."""
@@ -191,7 +191,7 @@ def _normals(case: Case, steps: int) -> Floats:
 
 
 def _in_cut(case: Case, steps: int) -> tuple[Floats, Floats, Floats]:
-    """Of each tooth and slice at each step: share of the depth in cut, mean and standard deviation of its angles there.
+    """Return share of depth in cut, mean and standard deviation of its angles, for each tooth and slice at each step.
 
     Each (steps, teeth * slices), over the turn of the step and the lag along the slice.
     """

@@ -1,4 +1,4 @@
-"""Whether advice, pockets and recommendations say one thing, and that nearly the best that the judge lets pass.
+"""Consistency of advice, pockets and recommendations, and their distance from the best stable setting.
 
 Random machines and programs. The best is looked for here on a dense grid of speeds and depths, each judged by the
 judge of the search; only what cannot pass it (the middle or a few draws chatter) is left out unjudged.
@@ -53,7 +53,7 @@ class Answers:
 
 
 def answers(numbers: range, seed: int, most_modes: int = 12, dense: bool = True) -> Answers:
-    """Of random machines by their numbers, those without any limit left out: a part may be run alone."""
+    """Return the answers for random machines by number, without those that have no limit."""
     counts, rngs = Answers(), np.random.default_rng(seed).spawn(numbers.stop)
     for number in numbers:
         rng = rngs[number]
@@ -123,7 +123,7 @@ def _deeper(search: SettingSearch, chips: float) -> Iterator[float]:
 
 
 def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> np.ndarray:
-    """Whether the middle is stable at speeds (rpm) at the depth that so many chips ask for, with all to spare."""
+    """Return whether the median is stable at speeds (rpm) and the depth of a chip rate, with margins."""
     depths = (np.floor(chips / speeds / DEPTH_STEP_MM) + 1) * DEPTH_STEP_MM * (1 + MIN_DEPTH_MARGIN) / 1e3
     calm = np.ones(speeds.size, dtype=bool)
     for vectors in search.case.spindle.principal_directions.sign_patterns:
@@ -138,7 +138,7 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 
 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
-    """Whether the middle and the hardest draws let a setting pass."""
+    """Return whether the median and the critical samples allow a setting."""
     at = search.case.at(speed, depth_mm)
     limit, axes, _ = find_worst_limit(at)
     if limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:

@@ -10,7 +10,7 @@ from milling_steps import Case, Floats
 
 
 class PlainCut(NamedTuple):
-    """What happens step by step, shape (periods, steps) each."""
+    """Simulated motion step by step, shape (periods, steps) each."""
 
     motion: Floats
     """Displacement along the feed in feeds per tooth."""
@@ -21,7 +21,7 @@ class PlainCut(NamedTuple):
 
 
 def plain_cut(case: Case, steps: int, periods: int) -> PlainCut:
-    """A cut from rest in a part cut at rest.
+    """Simulate a cut that starts at rest in a smooth part.
 
     Machine axes throughout; every pass leaves its mark on the part. Semi-implicit Euler.
     """

@@ -55,7 +55,7 @@ class RandomMilling:
         return tuple(FEED_ANGLE.values()) if self.feed == "both" else (FEED_ANGLE[self.feed],)
 
     def case(self, depth: float, feed_angle: float) -> Case:
-        """The program at a depth (m), fed at an angle (rad) from machine x."""
+        """Return the program at a depth (m), fed at an angle (rad) from machine x."""
         return Case(
             self.x,
             self.y,
@@ -98,7 +98,7 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _modes(rng: np.random.Generator) -> Modes:
-    """A dominant mode, and none to five others that are similar or stiffer."""
+    """Return a dominant mode, and none to five others that are similar or stiffer."""
     stiffness = _between(rng, 5e6, 1e8)
     dominant = (_between(rng, 300, 3000), rng.uniform(0.01, 0.06), stiffness)
     others = (
@@ -109,7 +109,7 @@ def _modes(rng: np.random.Generator) -> Modes:
 
 
 def _similar(rng: np.random.Generator, modes: Modes) -> Modes:
-    """The other direction: each mode moved a little; in one machine of three all but the dominant one are new."""
+    """Return modes of the other direction: each shifted a little; in one of three machines all but the dominant new."""
     if rng.random() < 1 / 3:
         modes = (modes[0], *_modes(rng)[1:])
     return tuple(

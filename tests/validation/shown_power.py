@@ -31,7 +31,7 @@ class ShownPower:
         self.edge = EDGE_LENGTH * cut.tangential * harder * random.uniform(*DULL)
 
     def says(self, speed_rpm: float, depth: float, truly_stable: bool, chatters: bool) -> PowerEvidence:
-        """What a slot says that is stable or not, and is called so or not.
+        """Return the power evidence of a slot with its true and its recorded label.
 
         Kt times the chips removed in a second, and the edges on half of a turn.
         """

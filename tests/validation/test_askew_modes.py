@@ -18,7 +18,7 @@ DEEPEST = 0.03
 
 
 def beside_the_limit(rng: np.random.Generator) -> list[DelayedCase]:
-    """A random cut just below and just above its limit on a random spindle of up to four modes at any angles."""
+    """Return a random cut just below and just above its limit; spindle with up to four modes at any angles."""
     teeth, number = int(rng.integers(2, 6)), int(rng.integers(1, 5))
     teeth = teeth if 360 % teeth == 0 else 3
     immersion, lag = float(rng.choice([0.05, 0.1, 0.25, 0.5, 0.75, 1.0])), float(rng.choice([0, 0, 72.2]))

@@ -1,4 +1,4 @@
-"""What is said of spindles whose modes lie askew, held against a simulation: docs/lobes.md has the figures."""
+"""Verdicts on spindles with rotated principal directions against a simulation; docs/lobes.md has the figures."""
 
 from __future__ import annotations
 

@@ -180,7 +180,7 @@ def measured(tip: Phased, noise: float, seed: int) -> Frf:
 
 
 def far_apart(modes: Sequence[Mode], frf: Frf) -> tuple[float, float]:
-    """How far limits from modes are from those of the FRF, relative: the lowest, and over speeds."""
+    """Return relative differences between limits from modes and from the FRF: of the lowest limit, and over speeds."""
     cut = cut_of(4, 1.0)
     one, other = (zero_order_lobes(tip, tip, cut, SPEEDS) for tip in (modes, frf))
     return abs(one.minimum.depth / other.minimum.depth - 1), float(np.max(np.abs(one.depth / other.depth - 1)))

@@ -28,7 +28,7 @@ from dsm.spindle.segment import ring_area, ring_second_moment
 
 
 def mismatch(spindle: Spindle, frequency: float) -> float:
-    """Determinant of moment and force at the free far end; 0 at a natural frequency (Hz)."""
+    """Return the determinant of moment and force at the free far end; 0 at a natural frequency (Hz)."""
     state, start = np.eye(4)[:, :2], 0.0
     size = np.array([1.0, 1 / spindle.length, 1e6 * spindle.length, 1e6])[:, np.newaxis]
     state = state * size
@@ -70,7 +70,7 @@ def _along(
 
 
 def stepped_shaft(draw: np.random.Generator) -> Spindle:
-    """A random one of three to six segments, every second of them a cone, some hollow or short, on two bearings."""
+    """Return a random shaft on two bearings: three to six segments, every second a cone, some hollow or short."""
     segments, outer = [], float(draw.uniform(0.03, 0.09))
     for number in range(int(draw.integers(3, 7))):
         length, next_outer = float(draw.uniform(0.01, 0.12)), float(draw.uniform(0.03, 0.09))
@@ -89,7 +89,7 @@ def stepped_shaft(draw: np.random.Generator) -> Spindle:
 
 
 def wrong_modes(number: int, within: float) -> int:
-    """How many of six modes each of so many shafts are not within a relative error."""
+    """Return how many of six modes of so many shafts are not within a relative error."""
     draw, wrong = np.random.default_rng(17), 0
     for _ in range(number):
         shaft = stepped_shaft(draw)

@@ -1,4 +1,4 @@
-"""What five test cuts find on spindles of another kind than the prior, and with one of them written down wrong."""
+"""Results of five test cuts on spindles unlike the prior, and with one wrong label."""
 
 from __future__ import annotations
 

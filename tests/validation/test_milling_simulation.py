@@ -53,7 +53,7 @@ def unequal(speed_rpm: float, depth: float, **changes: Any) -> Case:
 
 
 def errors(rows: Sequence[Row], fineness: float = 1.0) -> Floats:
-    """Of the largest multipliers, relative to the exact ones."""
+    """Return errors of the largest multipliers, relative to the exact ones."""
     exact = np.array([float(row["mu_exact"]) for row in rows])
     return np.asarray(np.exp(judge([benchmark(row) for row in rows], fineness).growth) / exact - 1)
 

@@ -1,7 +1,7 @@
-"""The 18-element rotor of H. D. Nelson and J. M. McVaugh, The Dynamics of Rotor-Bearing Systems Using Finite Elements,
-Journal of Engineering for Industry 98 (1976), as an Euler-Bernoulli shaft with a point mass for its disk.
+"""Rotor of Nelson & McVaugh (18 elements) as an Euler-Bernoulli shaft with a point mass for its disk.
 
-Reference speeds: 40-digit transfer matrices.
+Source: H. D. Nelson and J. M. McVaugh, The Dynamics of Rotor-Bearing Systems Using Finite Elements,
+Journal of Engineering for Industry 98 (1976). Reference speeds: 40-digit transfer matrices.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whether `check`, `lobes` and `recommend` say one thing: docs/long-tests.md has the last figures."""
+"""Consistency of `check`, `lobes` and `recommend`; docs/long-tests.md has the last figures."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_no_depth_is_named_that_would_be_asked_about() -> None:
 
 
 def search_of(number: int, depth_mm: float = 1.0) -> SettingSearch:
-    """Of a random cut; where it is deep itself, so may be what is looked for."""
+    """Return the setting search of a random cut with this depth."""
     milling = random_case(np.random.default_rng(6).spawn(number + 1)[number])
     return SettingSearch(ProgramCase(program(milling, depth_mm), assembly(milling), MACHINE))
 
@@ -77,7 +77,7 @@ def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
 
 
 def test_one_look_at_a_depth_at_which_draws_chatter_in_a_cut_passed_over_says_how_deep_is_safe() -> None:
-    """Of the directions of feed those are looked at first in which the middle is near its limit."""
+    """The feed directions in which the median is near its limit are checked first."""
     search = search_of(71, 0.4388)
     less = search.verify(15600.0, 1.25)
     assert isinstance(less, float)

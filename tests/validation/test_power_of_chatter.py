@@ -20,7 +20,7 @@ PERIODS, LATE = 240, 120
 
 
 def simulated(speed_rpm: float, share: float) -> tuple[Case, PlainCut]:
-    """A slot at a share of its limit, and what happens when it has settled."""
+    """Simulate a slot at a share of its limit; return its settled motion."""
     limit = float(slot_limits(X, Y, KT, KR, np.array([0.999, 1.0, 1.001]) * speed_rpm)[1])
     case = Case(X, Y, 0.0, 4, 1.0, "down", KT, KR, 0.0, speed_rpm, share * limit)
     return case, PlainCut(*(record[-LATE:] for record in plain_cut(case, 200, PERIODS)))
@@ -43,7 +43,7 @@ def test_the_power_of_a_stable_cut_says_its_kt(speed_rpm: float) -> None:
 
 @pytest.mark.parametrize("speed_rpm", SPEEDS)
 def test_chips_of_a_cut_that_chatters_are_those_of_its_feed_and_its_edges_rub_less(speed_rpm: float) -> None:
-    """What is removed is removed once, whatever the tool does: without edges its power is the same."""
+    """Chips are removed once, whatever the tool motion: without edge forces the power is the same."""
     case, cut = simulated(speed_rpm, 1.5)
     assert np.min(cut.touching) < 2
     assert kt_by_power(case, cut, 0.0) == pytest.approx(1.0, abs=0.01)

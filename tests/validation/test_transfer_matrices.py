@@ -73,7 +73,7 @@ def _along(spindle: Spindle, frequency: float, position: float) -> tuple[mpmath.
 
 
 def _parts(spindle: Spindle, place: mpf, w2: mpf) -> mpmath.matrix:
-    """What bearings, masses and joints at one place do; none of them meet there."""
+    """Return the transfer matrix of bearings, masses and joints at one place, where at most one is."""
     matrix = mpmath.eye(4)
     for bearing in spindle.bearings:
         if bearing.position == place:
@@ -251,7 +251,7 @@ def random_spindle(draw: np.random.Generator) -> Spindle:
 
 
 def refused_and_missed(number: int, checked: int, seed: int) -> tuple[int, int]:
-    """How many of `number` spindles are refused, and how many of the first `checked` have modes too few or too many.
+    """Return how many of `number` spindles are rejected, and how many of the first `checked` have wrong modes.
 
     The determinant changes its sign at each mode and nowhere else: signs half-way between modes alternate.
     """

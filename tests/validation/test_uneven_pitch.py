@@ -18,7 +18,7 @@ DEEPEST = 0.03
 
 
 def random_pitch(rng: np.random.Generator) -> tuple[int, ...]:
-    """Of two to five teeth, in whole degrees, up to 40 % off the even pitch; some of four repeat after two."""
+    """Return pitches of two to five teeth in whole degrees, up to 40 % unequal; some of four repeat after two."""
     teeth = int(rng.integers(2, 6))
     even = 360 // teeth
     while True:
@@ -38,7 +38,7 @@ def random_modes(rng: np.random.Generator, frequency: float, number: int) -> lis
 
 
 def beside_the_limit(rng: np.random.Generator) -> list[DelayedCase]:
-    """A random cut just below and just above its limit; none where it has no limit."""
+    """Return a random cut just below and just above its limit; an empty list without a limit."""
     pitch = random_pitch(rng)
     immersion, lag = float(rng.choice([0.05, 0.1, 0.25, 0.5, 0.75, 1.0])), float(rng.choice([0, 0, 72.2]))
     direction: Literal["up", "down"] = "up" if rng.random() < 0.5 else "down"
@@ -82,7 +82,7 @@ def test_limits_of_300_random_cutters_are_those_of_a_simulation() -> None:
 
 @pytest.mark.parametrize(("speed", "limit"), [(5000.0, 0.408624e-3), (9000.0, 3.009210e-3), (20000.0, 1.417506e-3)])
 def test_the_simulation_finds_limits_of_exact_floquet_theory(speed: float, limit: float) -> None:
-    """Of the slot in tests/data/milling_stability/stability_boundary_reference.csv, one direction."""
+    """Slot of tests/data/milling_stability/stability_boundary_reference.csv, one direction."""
     mode = (922.0, 0.011, 0.03993 * (2 * math.pi * 922) ** 2, 0.0)
     cases = [
         DelayedCase((mode,), (180, 180), 1.0, "down", 6e8, 2e8, 0.0, speed, limit * side)

@@ -1,4 +1,4 @@
-"""Whether `stable` means stable, and whether it is said where it could be: docs/long-tests.md has the last figures."""
+"""Truth and sharpness of the verdict `stable`; docs/long-tests.md has the last figures."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
 @pytest.mark.long
 @pytest.mark.timeout(7200)
 def test_shares_that_are_called_stable_by_wear() -> None:
-    """Of random programs of machines of at most six modes, at 50 and 70 % of their limit with new edges."""
+    """Random programs of machines with at most six modes, at 50 and 70 % of their limit with new edges."""
     words: dict[tuple[ToolWear, float], list[Stability]] = {
         (wear, part): [] for wear in WEAR_FACTORS for part in (0.5, 0.7)
     }

@@ -1,4 +1,4 @@
-"""What becomes of cuts that were called stable: random machines and programs, true systems drawn inside the doubt.
+"""Outcome of cuts that were called stable, on random machines with true systems within the uncertainty.
 
 Truths are drawn here, by the table of docs/lobes.md, and judged by the simulation in the time domain: neither shares
 code with what made the verdicts.
@@ -66,7 +66,7 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
 
 
 def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTable]:
-    """The programs that are recommended in place of one."""
+    """Yield the programs recommended in place of one."""
     advice = advise(evaluate_program(table, assembly(milling), MACHINE), MACHINE)
     for setting in dict.fromkeys(filter(None, (advice.best, advice.deepest_here))):
         yield program(milling, setting.depth_mm, setting.speed_rpm)
@@ -99,13 +99,13 @@ def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
 
 
 def chattering(truths: list[Case]) -> int:
-    """How many chatter; a case that is not settled counts."""
+    """Return how many cases chatter; one that has not settled counts."""
     simulated = milling_simulation.judge(truths)
     return int(np.sum(simulated.chatters | (simulated.doubt >= np.abs(simulated.growth))))
 
 
 def upper_limit(number: int, of: int) -> float:
-    """Of a share, one-sided, 95 %. Source: Clopper & Pearson 1934."""
+    """Return the one-sided 95 % upper limit of a share. Source: Clopper & Pearson 1934."""
     return float(beta.ppf(0.95, number + 1, of - number)) if number < of else 1.0
 
 
@@ -117,7 +117,7 @@ def limit_mm(milling: RandomMilling) -> float:
 
 
 def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = None) -> ProgramTable:
-    """The cut as it would stand in machine.toml."""
+    """Return the cut as written in machine.toml."""
     return ProgramTable(
         name="drawn",
         teeth=milling.teeth,
@@ -134,7 +134,7 @@ def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = N
 
 
 def assembly(milling: RandomMilling, directions: tuple[str, ...] = ("x", "y")) -> Assembly:
-    """The machine as tap tests without errors would show it."""
+    """Return the machine as tap tests without errors would show it."""
     x, y = _modes(milling)
     if directions == ("x",):
         y = x

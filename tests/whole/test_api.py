@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 API = ROOT / "docs" / "api"
 PACKAGES = ("acquisition", "modal", "dsm", "lobes")
-ROOMS = ("decay", "history", "logbook", "machine", "measuring", "plant", "tool", "verdicts")
+ROOMS = ("fleet", "history", "logbook", "machine", "measurement", "monitoring", "tool", "verdicts")
 MODULES = (*PACKAGES, "lobewatch", *(f"lobewatch.{room}" for room in ROOMS))
 
 

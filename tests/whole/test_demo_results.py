@@ -1,4 +1,4 @@
-"""What the demo and the commands on it come to, word by word and number by number: as it was when last looked at.
+"""Output of the demo and of the commands on it, compared word by word with the last reviewed output.
 
 A change that is meant shows here: the new text lies in the folder that the failure names, to be read and copied.
 """
@@ -63,7 +63,7 @@ QUESTIONS = {
 }
 """Commands by the name of what they print, in this order."""
 TEXTS = [name for name, command in QUESTIONS.items() if "--json" not in command and not command.startswith("report")]
-"""Those whose answers are text for people."""
+"""Names of the answers that are text for people."""
 MEANT = {
     "DEMO": "lobewatch-demo",
     "LONG": "long end mill",
@@ -84,18 +84,18 @@ class December(datetime):
     """A clock that stands five days after the last test of the demo; what it makes are plain times."""
 
     def __new__(cls, *parts: Any, **named: Any) -> Any:
-        """A plain time: nothing that encodes times knows another kind."""
+        """Return a plain time, as encoders of times know no other type."""
         return datetime(*parts, **named)  # noqa: DTZ001
 
     @classmethod
     def now(cls, tz: tzinfo | None = None) -> Any:
-        """The same whenever it is asked."""
+        """Return a fixed time."""
         return cls(2025, 12, 20, 9, tzinfo=tz)
 
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
-    """What is printed, by name; the pictures lie in the present folder."""
+    """Yield printed output by name; pictures are in the working directory."""
     with pytest.MonkeyPatch.context() as patch:
         for name in [module.name for module in pkgutil.walk_packages(lobewatch.__path__, "lobewatch.")]:
             module = importlib.import_module(name)
@@ -114,13 +114,13 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
 
 
 def svg_and_png(figure: Figure) -> str:
-    """A picture of the report, the newest kept as a file too, by its ordinate."""
+    """Render a report figure as SVG, and save it as PNG named after its ordinate."""
     save_figure(figure, Path(f"report {figure.axes[0].get_ylabel().partition(' (')[0]}.png"))
     return render_svg(figure)
 
 
 def answer(command: str) -> str:
-    """What a command prints; on the port of the emulated cut where it asks for one."""
+    """Return the output of a command, with the port of the emulated cut if it needs one."""
     with port_of_a_cut() if "PORT" in command else nullcontext("") as port:
         words = [(MEANT | {"PORT": port}).get(word, word) for word in command.split()]
         told = CliRunner(env={"COLUMNS": "80"}).invoke(app, words)
@@ -130,7 +130,7 @@ def answer(command: str) -> str:
 
 @contextmanager
 def port_of_a_cut() -> Iterator[str]:
-    """A is cut again and again, too deep."""
+    """Emulate program A, cut too deep again and again."""
     folder, passage = MachineFolder("lobewatch-demo"), Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
     setting = find_cut_setting(folder.machine, MEANT["A"], None, 6.0)
     with emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage).device as device:

@@ -31,12 +31,12 @@ class December(datetime):
     """The clock by which README was written; what it makes are plain times."""
 
     def __new__(cls, *parts: Any, **named: Any) -> Any:
-        """A plain time: nothing that encodes times knows another kind."""
+        """Return a plain time, as encoders of times know no other type."""
         return datetime(*parts, **named)  # noqa: DTZ001
 
     @classmethod
     def now(cls, tz: tzinfo | None = None) -> Any:
-        """Always the same."""
+        """Return a fixed time."""
         return cls(2025, 12, 20, tzinfo=tz)
 
 
@@ -80,7 +80,7 @@ def test_readme_is_short_and_names_ten_commands() -> None:
 
 
 def shown(command: str, page: str = README) -> str:
-    """What README, or another page, shows below a command."""
+    """Return the output shown below a command in README or another page."""
     block = re.search(rf"^\$ {re.escape(command)}\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert block is not None
     return block[1]

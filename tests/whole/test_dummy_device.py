@@ -36,7 +36,7 @@ def run(*arguments: str, plugin: Path = PLUGIN) -> subprocess.CompletedProcess[s
 
 @pytest.fixture
 def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The example machine with a dummy device, in the working directory."""
+    """Return the example machine with a dummy device, in the working directory."""
     monkeypatch.chdir(tmp_path)
     make_machine_folder(Path("trial"), "surrogate_machine.toml")
     toml = Path("trial/machine.toml")
@@ -46,7 +46,7 @@ def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @contextmanager
 def emulated(*options: str) -> Iterator[str]:
-    """The port of a dummy device."""
+    """Yield the port of a dummy device."""
     with subprocess.Popen(
         command("emulate", "dummy", "trial", "--json", *options),
         stdout=subprocess.PIPE,

@@ -21,7 +21,7 @@ PRINTED = {
     "forecast_csv": r"1624 Hz: between day 517 and 528 \(80 %\), probably day 522",
     "paper_figures": r"paper 0\.9000, model 0\.9856",
 }
-"""What each says at its end, by its name."""
+"""Last line printed by each program."""
 
 
 def run(program: Path, folder: Path) -> str:

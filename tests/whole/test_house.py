@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 HOUSE = House(ROOT)
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
 DOOR = ("lobewatch.cli", "lobewatch.commands")
-"""What a person starts: it imports when it knows what is wanted."""
+"""Entry points, which import modules on demand."""
 DOMAIN = ("machine", "measurement", "tool", "verdicts", "cuts", "history", "monitoring", "logbook", "fleet")
 """Rooms that neither print nor draw."""
 LIBRARY = (*DOMAIN, "tap", "sensors", "paper")

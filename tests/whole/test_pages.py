@@ -20,7 +20,7 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "commands.md"
 
 
 def shown_commands(page: Path) -> Iterator[str]:
-    """What stands behind a prompt."""
+    """Yield the commands after each prompt."""
     text = page.read_text("utf-8").replace("\\\n", " ")
     for line in re.findall(r"^ *\$ (?:python3 run\.py|lobewatch) ?(.*)$", text, re.MULTILINE):
         yield line.partition(" # ")[0]
@@ -29,7 +29,7 @@ def shown_commands(page: Path) -> Iterator[str]:
 
 
 def command_of(words: list[str]) -> tuple[str, set[str]]:
-    """The name of the command that is called, and its options."""
+    """Return the name of the called command, and its options."""
     group = typer.main.get_command(app)
     name = words[0] if words else "demo"
     command = group.commands[name]  # type: ignore[attr-defined]

@@ -11,9 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
 CODE = r"[a-z]+(?:-[a-z]+)*"
-SHARED: dict[str, str] = {
-    "one-direction": "of an assembly, and of the standing that it leads to",
-}
+SHARED: dict[str, str] = {}
 """Codes that several modules give, each with the reason why they mean the same."""
 
 
@@ -34,7 +32,7 @@ def codes_of(tree: ast.AST) -> Iterator[str]:
 
 
 def homes() -> dict[str, set[str]]:
-    """The modules that give each code."""
+    """Return the modules that give each code."""
     found: dict[str, set[str]] = defaultdict(set)
     for file, tree in trees():
         for code in codes_of(tree):

@@ -15,7 +15,7 @@ F = np.arange(1.0, 400.0)
 
 
 def put(file: Path, *frequencies: float) -> None:
-    """A receptance with these modes."""
+    """Write a receptance with these modes."""
     file.parent.mkdir(parents=True, exist_ok=True)
     h = np.sum([1 / (4e8 * (1 - (F / own) ** 2 + 0.02j * F / own)) for own in frequencies], axis=0)
     file.write_text("".join(f"{f:g}\t{v.real:.9e}\t{v.imag:.9e}\n" for f, v in zip(F, h, strict=True)), "utf-8")

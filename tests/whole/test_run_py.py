@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def run_py(tmp_path: Path) -> ModuleType:
-    """A copy of run.py in a folder of its own."""
+    """Return run.py, copied to a folder of its own, as a module."""
     for path in (ROOT / "run.py", ROOT / "pyproject.toml", *ROOT.glob("requirements*.lock")):
         shutil.copy(path, tmp_path)
     spec = importlib.util.spec_from_file_location("run_py", tmp_path / "run.py")

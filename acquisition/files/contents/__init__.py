@@ -1,1 +1,1 @@
-"""Contents of a recorded file, the user's description of it, and the hits or the FRF resolved from both."""
+"""Contents of a recorded file, and the hits or the FRF resolved with the user's description."""

@@ -45,9 +45,9 @@ class Signal:
     record: int = 0
     """Number of the record: signals recorded together have the same."""
     per_full_scale: bool = False
-    """Whether the values are shares of an unknown full scale."""
+    """True if the values are shares of an unknown full scale."""
     is_before_window: bool = False
-    """Whether it was recorded before the window that the file states."""
+    """True if it was recorded before the window that the file states."""
     n_rows: int = 0
     """Number of rows of its table, the first of them its first value; 0 where it is no column of a table."""
     flaws: Mapping[int, str] = field(default_factory=dict)

@@ -48,7 +48,7 @@ class Description:
     sensitivity: tuple[str, ...] = ()
     """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
     without_force: bool = False
-    """Whether no force was measured, so that only a response is needed."""
+    """True if no force was measured, so that only a response is needed."""
     sensor: str = "accelerometer"
     """Kind of sensor of a recorded cut: accelerometer or microphone."""
     tacho: str = ""
@@ -123,7 +123,7 @@ class ImportReport:
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing is missing or wrong."""
+        """True if nothing is missing or wrong."""
         return not self.missing and not self.faults
 
     def format_problems(self) -> str:

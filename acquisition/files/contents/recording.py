@@ -40,7 +40,7 @@ class Recording:
     facts: tuple[Fact, ...] = ()
     """Known facts, each from the file, by option or by default."""
     problems: str = ""
-    """What is missing, with the fields of `Description` that state it, and what is wrong; empty where nothing is."""
+    """Missing facts, with the fields of `Description` that state them, and errors; empty if there are none."""
     created: datetime | None = None
     """Time of recording (timezone-aware); None where unknown."""
     tool: str = ""

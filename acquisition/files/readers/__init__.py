@@ -1,1 +1,1 @@
-"""Readers of recorded files, which return the contents of a file without interpreting them."""
+"""Readers of recorded file formats, without interpretation of the contents."""

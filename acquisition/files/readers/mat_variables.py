@@ -1,4 +1,4 @@
-"""Read the variables of a MATLAB or HDF5 file in a subprocess: scipy and HDF5 crash or hang on damaged ones.
+"""Read the variables of a MATLAB or HDF5 file in a subprocess, as damaged files may crash or hang.
 
 The subprocess returns them as MessagePack: structs as maps, cells as lists, arrays as `numpy.save` writes them, and nil
 for what no layout reads. A text in their place states why the file cannot be read.

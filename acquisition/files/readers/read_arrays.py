@@ -55,7 +55,7 @@ MAT_FORMAT = Format("mat", "MATLAB file", (".mat", ".vna"), _is_mat, read_mat)
 
 
 NPY_SIGNATURE, ZIP_SIGNATURE = b"\x93NUMPY", b"PK\x03\x04"
-"""How these files begin."""
+"""Signatures at the beginning of these files."""
 
 
 def read_numpy(path: Path) -> Contents:

@@ -1,1 +1,1 @@
-"""Chatter detection: cuts in a recording, true spindle speed, chatter or not; arrays in, a record out."""
+"""Chatter detection: cuts in a recording, true spindle speed, and verdict; arrays in, records out."""

@@ -11,71 +11,72 @@ import scipy
 from lobewatch.arrays import Flags, Floats
 
 CUT_PIECE_LENGTH = 0.04
-"""Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
+"""Length of the compared pieces (s), at least two turns; pieces overlap by half."""
 MIN_CUT_LOUDNESS = 0.2
-"""A cut is this much louder than air, in log10 of the power."""
+"""Smallest loudness of a cut above air (log10 of the power)."""
 POWER_STEP_MARGIN = 1.0
-"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10):
-chatter of few peaks is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
+"""Step of piece power over step of piece loudness above which power locates the cut (log10); chosen.
+
+Chatter of few peaks is ten times louder than broadband air noise, and fills less of the spectrum."""
 MIN_AIR_SHARE = 0.1
-"""Share of a recording that is air, at least; or air is the quietest part."""
+"""Smallest share of air in a recording; if there is less, the quietest part counts as air."""
 N_QUIET_PIECES = 5
-"""Pieces in a row that the quietest part has; chosen."""
+"""Number of consecutive pieces in the quietest part; chosen."""
 MAX_POWER_OVER_AIR = 1e3
-"""Largest power at one frequency, over that in air, that counts."""
+"""Largest ratio of power to air power that counts at one frequency."""
 MIN_LOUDNESS_FREQUENCY = 100.0
-"""Frequency above which it is compared how loud pieces are (Hz): below it floors and pumps sound; chosen."""
+"""Frequency above which the loudness of pieces is compared (Hz), as floor and pumps are loud below; chosen."""
 N_SMOOTHED_PIECES = 3
-"""Pieces over which the power in air is smoothed; chosen."""
+"""Number of pieces over which the air power is smoothed; chosen."""
 MAX_THRESHOLD_STEPS = 50
-"""Steps after which the threshold stands."""
+"""Largest number of iterations of the threshold."""
 ENTRY_LOUDNESS_STEP = 0.3
-"""Entry and exit are this much louder or quieter than most of a cut, in log10 of the power: twice."""
+"""Loudness difference of entry and exit from most of a cut (log10 of the power), a factor of two."""
 MIN_CUT_LENGTH_SHARE = 1 / 6
-"""What has this much of the length of the longest cut beside it is none; chosen."""
+"""Length over that of the longest cut, up to which a loud part is not a cut; chosen."""
 MAX_ENTRY_TIME = 2.0
 """Longest entry or exit (s)."""
 MAX_PAUSE_TIME = 0.1
-"""Pauses up to this belong to a cut (s)."""
+"""Longest pause within a cut (s)."""
 MAX_KNOCK_TIME = 0.15
-"""Time up to which what is louder is a knock, not a cut (s)."""
+"""Longest loud part that is a knock and not a cut (s)."""
 MIN_AIR_TIME = 0.15
-"""Shortest air (s)."""
+"""Shortest part that counts as air (s)."""
 CUT_SETTLING_TIME = 0.1
-"""Time after the beginning of a cut from which it is listened to (s)."""
+"""Time after the beginning of a cut before its evaluated part starts (s)."""
 MIN_CUT_TIME = 0.3
-"""Time that is listened to, at least (s) ..."""
+"""Shortest evaluated part of a cut (s)."""
 MAX_CUT_TIME = 2.0
-"""... and at most, its end: no spindle is so steady that more is of use (s)."""
+"""Longest evaluated part of a cut (s), its end; no spindle is steady enough for more."""
 KNOCK_PEAK_RATIO = 4.0
-"""A piece of a cut with a peak this many times those around it is a knock."""
+"""Peak of a piece of a cut over the peaks around it, above which the piece is a knock."""
 N_KNOCK_NEIGHBORS = 6
-"""Pieces on each side that a piece is compared with ..."""
+"""Number of pieces on each side that a piece is compared with."""
 KNOCK_PEAK_QUANTILE = 0.75
-"""... by this quantile of their peaks; chosen."""
+"""Quantile of the neighboring peaks that a piece is compared with; chosen."""
 
 
 class CutParts(NamedTuple):
-    """Where a cut is; or why it cannot be said, a code."""
+    """Location of a cut in a recording, or the code of the reason why there is none."""
 
     reason: str
-    """Code of what is wrong; empty where all is well."""
+    """Code of the reason why there is no cut; empty if there is one."""
     air: slice = slice(0, 0)
-    """Samples of the spindle turning in air."""
+    """Samples of air, with the spindle running."""
     cut: slice = slice(0, 0)
-    """Samples that are listened to: the end of its steady part."""
+    """Evaluated samples: the end of the steady part of the cut."""
     begin: float = np.nan
     """Time at which the cut begins (s)."""
     end: float = np.nan
-    """Time at which it ends (s)."""
+    """Time at which the cut ends (s)."""
     steady_begin: float = np.nan
-    """Time at which its entry is over (s)."""
+    """Time at which the entry ends (s)."""
     steady_end: float = np.nan
-    """Time at which its exit begins (s)."""
+    """Time at which the exit begins (s)."""
 
 
 WHOLE_SIGNAL = CutParts("")
-"""Of a cut that is given by itself, not found in a recording."""
+"""Parts of a cut that was given directly and not found in a recording."""
 
 
 def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]:
@@ -170,7 +171,7 @@ def _build_parts(
 
 
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
-    """How many pieces at the beginning and at the end of a cut stand beside its longest part of one loudness.
+    """Return the number of pieces at the beginning and the end of a cut outside its longest evenly loud part.
 
     Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself
     changes.
@@ -242,7 +243,7 @@ def _find_longest_air(loud: Sequence[tuple[int, int]], count: int, step: int) ->
 
 
 def _has_knock(signal: Floats, step: int) -> bool:
-    """Whether single pieces stand out of those around them: a hammer, a dropped part."""
+    """Return whether single pieces exceed those around them, as by a hammer or a dropped part."""
     count = signal.size // step
     peak = np.max(np.abs(signal[: count * step].reshape(count, step)), axis=1)
     wide = np.lib.stride_tricks.sliding_window_view(

@@ -1,4 +1,4 @@
-"""Evaluate recorded cuts: stable, chatter, flip, or the reason why it cannot be told.
+"""Evaluate recorded cuts: stable, chatter, flip, or a reason for no verdict.
 
 The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
 (docs/cuts.md, How often it is right).
@@ -45,59 +45,59 @@ from lobewatch.cuts.chatter_detection.spindle_speed import (
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
-"""Energy of what is left over that of the comb: above it, with sidebands, a cut chatters ..."""
+"""Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
-"""... without sidebands above this ..."""
+"""Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
 MAX_STABLE_ENERGY = 2e-4
-"""... and below this it is stable."""
+"""Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_COMB_ENERGY = 1e-9
-"""Least energy that the comb is taken to have, over that of what is left."""
+"""Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
-"""Number of peaks of a family that is chatter for sure."""
+"""Number of peaks of a sideband family that proves chatter."""
 FLIP_TOLERANCE = 0.003
-"""Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
+"""Distance from half the tooth passing frequency, relative to that, within which chatter is of period two (flip)."""
 MAX_UNEVEN_ENERGY = 5.0
-"""Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
+"""Energy of orders without run-out (modulo the teeth neither 0 nor +-1) over that of orders with run-out, at most."""
 MAX_RUNOUT_ENERGY = 8.0
-"""... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
+"""Largest energy of all other orders over that of tooth passing, in a cut narrower than a slot."""
 SLOT_IMMERSION = 0.95
-"""Immersion from which on tooth passing nearly vanishes."""
+"""Immersion above which tooth passing nearly vanishes (-)."""
 END_PEAK_TOLERANCE = 1.0
-"""Distance of a peak at the end of a cut up to which it is that of the whole cut (bins)."""
+"""Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutEvaluation:
-    """Evaluation of one cut in a recording, with its evidence; None and NaN where it did not get so far."""
+    """Evaluation of one cut in a recording with its evidence; None and NaN for steps that were not reached."""
 
     verdict: CutVerdict
     """Verdict on the cut."""
     reason: str
-    """Code of why it cannot be told; empty where it can."""
+    """Code of the reason why there is no verdict; empty with a verdict."""
     parts: CutParts = WHOLE_SIGNAL
-    """Parts of the recording that are the cut, and air."""
+    """Parts of the recording: cut and air."""
     spindle_speed: SpindleSpeed | None = None
-    """True speed of the spindle."""
+    """True spindle speed."""
     energy_ratio: float = np.nan
-    """Energy of what is left, at the end of the cut, over that of the harmonics of the spindle."""
+    """Energy of unexplained peaks at the end of the cut over that of the spindle harmonics."""
     chatter: ChatterPeaks | None = None
-    """Peaks of chatter."""
+    """Chatter peaks."""
     peaks: PeaksByOrigin | None = None
-    """All peaks, by where they come from."""
+    """All peaks by origin."""
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
     distant_rpm: float = np.nan
-    """Speed further from the one that was commanded that the peaks fit (rpm); NaN without one, or where one is near."""
+    """Speed far from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
     tone: float = np.nan
-    """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
+    """Frequency of an unexplained tone (Hz); NaN unless that is the reason."""
     axis: int = 0
-    """Which of several axes the verdict rests on, from 0."""
+    """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
-    """Speed by the tachometer in the cut (rpm), NaN where it gave none there; None without a tachometer."""
+    """Tachometer speed in the cut (rpm), NaN without pulses there; None without a tachometer."""
 
     @property
     def speed_rpm(self) -> float:
-        """True spindle speed (rpm); NaN where it was not found."""
+        """True spindle speed (rpm); NaN if not found."""
         return np.nan if self.spindle_speed is None else 60 * self.spindle_speed.frequency
 
 
@@ -186,7 +186,7 @@ def _find_speed(
 
 
 def _evaluate_without_air(spectra: Sequence[Spectrum], teeth: int, commanded: float) -> CutEvaluation:
-    """Evaluate the speed only, where there is no air or it sounds like the cut."""
+    """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
     silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     turning = find_speed_of_spectra(spectra, silence, teeth, commanded)
     if turning is None:
@@ -282,24 +282,24 @@ def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
 
 
 class CutRecording(NamedTuple):
-    """A recording that is to be listened to."""
+    """Recording to be evaluated."""
 
     signal: Floats
-    """Acceleration of the housing (m/s^2), shape (n,), or (axes, n) where several axes hear one spindle."""
+    """Acceleration of the housing (m/s^2), shape (n,), or (axes, n) for several axes on one spindle."""
     sample_rate: float
     """Sample rate (Hz)."""
     teeth: int
     """Number of teeth of the cutter."""
     immersion: float
-    """Radial depth over diameter (-)."""
+    """Radial depth of cut over diameter (-)."""
     commanded_rpm: float
-    """Spindle speed as it was set (rpm)."""
+    """Commanded spindle speed (rpm)."""
     clipped: Flags | None = None
-    """Overload of the sensor or its input, shape (n,); None: nowhere."""
+    """Overloaded samples of sensor or input, shape (n,); None without overload."""
     lost_scans: int = 0
-    """Number of scans that are missing."""
+    """Number of lost scans."""
     measured_rpm: Floats | None = None
-    """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
+    """Tachometer speed at each sample (rpm), NaN without pulses, shape (n,); None without a tachometer."""
 
 
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:

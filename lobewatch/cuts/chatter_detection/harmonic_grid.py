@@ -10,40 +10,41 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
 
 MAX_SIDEBAND_FAMILIES = 4
-"""Largest number of frequencies that are no harmonics, with their sidebands."""
+"""Largest number of sideband families, one for each frequency that is not a harmonic."""
 MAX_GRID_ERRORS = 10.0
-"""Standard errors that a peak is away that does not belong to the harmonic grid."""
+"""Distance (standard errors) above which a peak is not on the harmonic grid."""
 GRID_TOLERANCES = 1.2, 0.6, 0.6, 0.6
-"""Distances from the harmonic grid (bins) up to which peaks belong to it, one for each step of the least squares;
-chosen: the first as wide as a peak (`PEAK_TOLERANCE`), since a speed by votes is off, then half of that."""
+"""Distances (bins) within which peaks belong to the harmonic grid, one for each least-squares step; chosen.
+
+The first is a peak width (`PEAK_TOLERANCE`), since a speed by votes is rough, the others half of that."""
 MAX_SPEED_CHANGE = 0.005
-"""Relative change of the spindle frequency by which least squares have run away; chosen."""
+"""Relative change of the spindle frequency above which least squares have diverged; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class SidebandFamily:
-    """Peaks at sign * r + k f, f the frequency of the spindle."""
+    """Peaks at sign * r + k f with the spindle frequency f."""
 
     indices: Indices
-    """Places of its peaks among all, shape (n,)."""
+    """Indices of the peaks of the family, shape (n,)."""
     sign: Floats
-    """Sign of r in each peak, shape (n,); 0 where r is 0."""
+    """Sign of r in each peak, shape (n,); 0 if r is 0."""
     order: Floats
     """Order k of each peak, shape (n,)."""
 
 
 @dataclass(frozen=True)
 class SpindleSpeed:
-    """How fast the spindle turns."""
+    """True spindle speed with its error."""
 
     frequency: float
-    """Turns a second (Hz)."""
+    """Spindle frequency (Hz)."""
     error: float
-    """Standard error (Hz); inf where it does not follow from several peaks."""
+    """Standard error (Hz); inf unless it follows from several peaks."""
     share: float
-    """Share of the peaks checked that it explains."""
+    """Share of the checked peaks that it explains."""
     agreeing: int
-    """Peaks that agree on it, beyond those that it is worked out from."""
+    """Number of matching peaks beyond those that determine it."""
     misfit: float
     """Mean square distance of all peaks from it, in standard errors of each, at most `MAX_GRID_ERRORS` squared."""
 

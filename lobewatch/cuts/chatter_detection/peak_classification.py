@@ -22,17 +22,17 @@ from lobewatch.cuts.chatter_detection.spectrum import (
 )
 
 N_STEADINESS_PARTS = 4
-"""Parts that a cut is divided into."""
+"""Number of parts into which a cut is divided."""
 N_STEADINESS_PEAKS = 8
-"""Harmonics that are checked."""
+"""Number of checked harmonics."""
 MAX_UNSTEADINESS = 2e-3
-"""Largest change that is searched, relative."""
+"""Largest relative speed change that is searched."""
 MIN_UNSTEADINESS = 1e-4
-"""Change that every spindle varies by, relative; chosen."""
+"""Relative speed variation of every spindle; chosen."""
 UNSTEADINESS_FACTOR = 3.0
-"""Change of the speed over that of the means of the parts: within a part it varies too; chosen."""
+"""Speed variation over that of the means of the parts, as speed also varies within a part; chosen."""
 MIN_STEADINESS_PEAKS = 3
-"""Harmonics that must have changed alike."""
+"""Smallest number of harmonics that must show the same change."""
 
 
 def estimate_unsteadiness(
@@ -67,55 +67,55 @@ def _speed_change(off: Floats) -> float:
 
 
 PEAK_TOLERANCE = 1.2
-"""A peak belongs to a frequency that is no further away than this (bins)."""
+"""Largest distance of a peak from a frequency that it belongs to (bins)."""
 MAX_AIR_POWER_RATIO = 9.0
-"""Power of a peak over that which it has in air, below which it comes from elsewhere."""
+"""Power of a peak over its power in air, up to which it is not caused by the cut."""
 AIR_PEAK_TOLERANCE = 2.0
-"""Distance up to which a peak of the air part is the same (bins of its own)."""
+"""Distance up to which a peak in air is the same peak (bins of the air spectrum)."""
 AIR_PIECE_LENGTH = 0.5
-"""Length of the pieces of air in which tones are searched that come and go (s); each begins in the middle of the one
-before it; chosen ..."""
+"""Length of the overlapping pieces of air that are searched for intermittent tones (s); chosen."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
-"""... and the power of a tone there over that of the noise of this many bins on each side: noise reaches it near a peak
-once in 1000 airs of 10 s; chosen."""
+"""Smallest power of an intermittent tone over the noise, and number of bins on each side for the noise; chosen.
+
+Noise near a peak reaches this once in 1000 recordings of 10 s of air."""
 MAX_FOLDED_RATES = 2.0
-"""Harmonics are searched up to this many sample rates: a device without a filter folds them back ..."""
+"""Upper end of the searched harmonics (sample rates), as a device without a filter folds them back."""
 UPPER_BAND_SHARE = 0.7
-"""... and is hardly louder there (`MAX_FOLDED_AMPLITUDE`) than the loudest harmonic above this share of half the
-sample rate ..."""
+"""Share of half the sample rate above which the loudest harmonic limits the folded ones (`MAX_FOLDED_AMPLITUDE`)."""
 MAX_HARMONICS = 16
-"""... or than any, where fewer than this are below half the sample rate; chosen."""
+"""Number of harmonics below half the sample rate, under which any harmonic limits the folded ones; chosen."""
 MIN_TOOTH_HARMONICS = 3
-"""Harmonics of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
+"""Number of tooth passing harmonics below half the sample rate, under which folded ones may have any amplitude."""
 FOLDED_PEAK_SLACK = 1e-3
-"""... and this much further off, relative: from few peaks the speed is no better known."""
+"""Relative extra tolerance of folded harmonics, as few peaks determine the speed less exactly."""
 MAX_FOLDED_AMPLITUDE = 1.5
-"""Amplitude of a folded harmonic over that of the loudest harmonic, at most."""
+"""Largest amplitude of a folded harmonic over that of the loudest harmonic."""
 MAX_WAVERING_ENERGY = 0.05
-"""Energy of all that is left over that of the harmonics up to which peaks as near to these as `MAX_UNSTEADINESS` are
-of a speed that wavers; chosen, with a stable cut that a microphone has recorded in sight."""
+"""Energy of unexplained peaks over that of the harmonics, up to which a varying speed explains near peaks; chosen.
+
+Near is within `MAX_UNSTEADINESS`. Value from a stable cut recorded by a microphone."""
 MAX_SPEED_ERRORS = 3.0
-"""Standard errors of the spindle frequency within which its harmonics may lie; chosen."""
+"""Standard errors of the spindle frequency within which its harmonics are searched; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class PeaksByOrigin:
-    """All peaks of a cut."""
+    """All peaks of a cut by origin."""
 
     comb: SpectralPeaks
-    """Harmonics of the frequency of the spindle, the first left out: it is there in air."""
+    """Spindle harmonics without the first, which is in air, too."""
     tooth_order: Integers
-    """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
+    """Order of each harmonic modulo the number of teeth; 0 is tooth passing."""
     air: SpectralPeaks
-    """Peaks that are there in air."""
+    """Peaks that are in air, too."""
     folded: SpectralPeaks
-    """Peaks where harmonics above half the sample rate are folded to."""
+    """Peaks at folded harmonics from above half the sample rate."""
     unexplained: SpectralPeaks
-    """Peaks that are left: chatter, where there is any."""
+    """Unexplained peaks: chatter if there is any."""
 
 
 def is_in_air(peaks: SpectralPeaks, air: Spectrum) -> Flags:
-    """Whether peaks are there in air too."""
+    """Return whether each peak is in air, too."""
     return np.asarray(
         peaks.amplitude**2 <= MAX_AIR_POWER_RATIO * air.max_power_near(peaks.frequency, AIR_PEAK_TOLERANCE)
     )
@@ -154,14 +154,14 @@ def find_cut_peaks(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> Spec
 
 
 def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
-    """Whether fewer than three harmonics of tooth passing are below half the sample rate."""
+    """Return whether fewer than three tooth passing harmonics are below half the sample rate."""
     return spectrum.sample_rate / 2 < MIN_TOOTH_HARMONICS * teeth * turning.frequency
 
 
 def classify_peaks(
     peaks: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
-    """Classify peaks by origin; a spindle harmonic above half the sample rate lies where it is folded to.
+    """Classify peaks by origin; spindle harmonics above half the sample rate are folded.
 
     unsteady: by how much the speed varies, relative: harmonics are this much wider.
     """
@@ -197,7 +197,7 @@ def _remove_wavering(
 def _is_near_folded(
     peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> Flags:
-    """Whether peaks lie where harmonics of the spindle above half the sample rate are folded to."""
+    """Return whether each peak is at a folded spindle harmonic from above half the sample rate."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(MAX_FOLDED_RATES * rate / turning.frequency) + 1)
     if not orders.size:
@@ -210,29 +210,29 @@ def _is_near_folded(
 
 
 MIN_CHATTER_AMPLITUDE = 0.1
-"""Share of the loudest amplitude that a peak has that names chatter ..."""
+"""Smallest amplitude of a peak that names the chatter frequency, as a share of the loudest."""
 MIN_FAMILY_AMPLITUDE = 1e-3
-"""... and one that belongs to it."""
+"""Smallest amplitude of a peak of the chatter family, as a share of the loudest."""
 MAX_CHATTER_ANCHORS = 12
-"""Peaks whose families are compared."""
+"""Largest number of peaks whose families are compared."""
 CHATTER_HARMONICS = 3
-"""Harmonics of a frequency that are searched."""
+"""Number of searched harmonics of a frequency."""
 DISPLACEMENT_WEIGHT = 0.3
-"""Weight of the displacement of a family beside the peaks that it explains; chosen ..."""
+"""Weight of the displacement of a family relative to its number of peaks; chosen."""
 MIN_FAMILY_ENERGY = 0.25
-"""... which has this share of the energy of the largest at least."""
+"""Smallest energy of the chosen family over that of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChatterPeaks:
-    """One family."""
+    """One family of chatter peaks."""
 
     frequency: float
     """Frequency of the peak with the largest displacement (Hz)."""
     error: float
     """Standard error of the frequency (Hz)."""
     peaks: SpectralPeaks
-    """All peaks f_c + k tooth passing."""
+    """All peaks at f_c plus multiples of the tooth passing frequency."""
 
 
 def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: float) -> ChatterPeaks:

@@ -23,39 +23,39 @@ def sideband_distance(frequency: Floats | float, chatter: float, teeth: float) -
 
 
 BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)
-"""Blackman-Harris: side lobes at -92 dB (Harris 1978, Proc. IEEE 66, 51-83)."""
+"""Coefficients of the Blackman-Harris window, side lobes -92 dB (Harris 1978, Proc. IEEE 66, 51-83)."""
 PADDING_FACTOR = 2
-"""How many times the length of the signal is transformed."""
+"""Length of the transform over that of the signal (zero padding)."""
 NOISE_BINS = 64
-"""Bins from which the noise is taken ..."""
+"""Number of bins for the local noise."""
 NOISE_QUANTILE = 0.25
-"""... as this quantile of their power: peaks may fill the rest."""
+"""Quantile of the power in these bins that is the noise; peaks may fill the rest."""
 MIN_PEAK_POWER = 25.0
-"""A peak has this many times the power of the noise: noise reaches it once in 1e11 bins."""
+"""Smallest power of a peak over the noise; noise reaches it once in 1e11 bins."""
 MIN_PEAK_DISTANCE = 1.5
-"""Least distance of two peaks that are told apart (bins)."""
+"""Smallest distance of two separate peaks (bins)."""
 SKIRT_BINS = 10.0
-"""Distance up to which a peak has a skirt (bins): 5 of the window's own width ..."""
+"""Largest distance of the skirt of a peak (bins): 5 of the width of the window."""
 SKIRT_AMPLITUDE_RATIO = 3.0
-"""... of peaks this many times fainter: a tenth of its power."""
+"""Amplitude of a peak over that of a fainter one on its skirt, a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
-"""Standard error of the frequency of a peak, over the root of its clearness (bins) ..."""
+"""Standard error of the frequency of a peak times the root of its signal-to-noise ratio (bins)."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
-"""... and the part of it that stays however clear the peak is (bins)."""
+"""Smallest standard error of the frequency of a peak (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """What a part of a recording sounds like."""
+    """Spectrum of a part of a recording."""
 
     frequency: Floats
     """Frequencies (Hz), shape (n,)."""
     power: Floats
-    """Square of the amplitude of a sine ((m/s^2)^2), shape (n,)."""
+    """Squared sine amplitude ((m/s^2)^2), shape (n,)."""
     noise: Floats
-    """Power that the noise alone has, shape (n,)."""
+    """Power of the noise ((m/s^2)^2), shape (n,)."""
     bin_width: float
-    """One over the length of the part (Hz)."""
+    """Reciprocal length of the part (Hz)."""
     sample_rate: float
     """Sample rate of the recording (Hz)."""
 
@@ -67,14 +67,14 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class SpectralPeaks:
-    """Single frequencies in a spectrum."""
+    """Peaks of a spectrum."""
 
     frequency: Floats
-    """Frequency of each (Hz), shape (n,)."""
+    """Frequency of each peak (Hz), shape (n,)."""
     amplitude: Floats
-    """Amplitude of each (m/s^2), shape (n,)."""
+    """Amplitude of each peak (m/s^2), shape (n,)."""
     clearness: Floats
-    """Power over that of the noise, shape (n,)."""
+    """Signal-to-noise ratio of the power of each peak, shape (n,)."""
 
     def __getitem__(self, places: Flags | Indices) -> SpectralPeaks:
         return SpectralPeaks(self.frequency[places], self.amplitude[places], self.clearness[places])
@@ -84,7 +84,7 @@ class SpectralPeaks:
 
     @property
     def energy(self) -> float:
-        """Energy of all of them ((m/s^2)^2)."""
+        """Energy of all peaks ((m/s^2)^2)."""
         return float(np.sum(self.amplitude**2))
 
     def loudest(self, count: int) -> SpectralPeaks:

@@ -29,40 +29,40 @@ from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
 )
 
 COMB_SPEED_TOLERANCE = 0.05
-"""Relative distance from the speed that was commanded up to which a plain comb is searched ..."""
+"""Relative distance from the commanded speed within which a plain comb is searched."""
 USUAL_SPEED_TOLERANCE = 0.002
-"""... up to which most spindles turn: the nearer a comb is, the fewer as near are tried; chosen ..."""
+"""Relative speed deviation of most spindles, in which fewer neighboring combs are tried; chosen."""
 SAME_SPEED_TOLERANCE = 1e-3
-"""... and up to which it is the same as that of the votes, which know of sidebands; it is taken where it explains as
-many peaks: it has one unknown, they have one more for each family of sidebands."""
+"""Relative distance within which a plain comb and the votes are the same speed.
+
+A comb that explains as many peaks is preferred, since it has one unknown. Votes have one more for each family of
+sidebands."""
 MIN_SURE_VOTES = 6
-"""Peaks that must agree on a speed by votes that has no plain comb, and that does not fit (`MAX_SPEED_MISFIT`) all
-of them."""
+"""Number of matching peaks that a speed by votes needs without a plain comb and with a misfit (`MAX_SPEED_MISFIT`)."""
 VOTE_SPEED_TOLERANCE = 0.021
-"""Relative distance from the speed that was commanded up to which votes are counted."""
+"""Relative distance from the commanded speed within which votes are counted."""
 MAX_VOTE_HARMONIC = 60
-"""Harmonics of the frequency of the spindle by which two of them may differ."""
+"""Largest difference of the orders of two voting harmonics."""
 VOTE_WIDTH = 0.25
-"""Standard deviation of a peak in the count of votes (bins)."""
+"""Standard deviation of a peak in the vote count (bins)."""
 VOTE_GRID_STEP, FINEST_VOTE_HARMONIC = 0.25, 40
-"""Step of the grid of speeds, over the standard deviation of the vote of this harmonic; chosen."""
+"""Step of the speed grid over the standard deviation of the vote of a harmonic, and that harmonic; chosen."""
 OWN_PEAK_TOLERANCE = 0.5
-"""Distance up to which a peak is that of the rotating spindle (bins); chosen."""
+"""Distance within which a peak is the first spindle harmonic (bins); chosen."""
 VOTE_REACH = 2
-"""Standard deviations up to which a vote is spread."""
+"""Reach of a vote (standard deviations)."""
 MIN_OWN_PEAK_VOTES = 0.2
-"""A speed whose own peak is recorded is taken where it has this much of the votes of the best one."""
+"""Share of the most votes from which a speed with a recorded first harmonic is preferred."""
 MAX_SPEED_MISFIT = 4.0
-"""A speed with a larger misfit is compared with others ..."""
+"""Misfit above which a speed is compared with others."""
 MAX_RIVAL_SPEEDS = 12
-"""... this many that have the most votes ..."""
+"""Number of speeds with the most votes that are compared."""
 VOTE_PEAK_WIDTH = 9
-"""... of as many steps of the grid around each."""
+"""Number of grid steps around each compared speed."""
 MIN_GRID_SHARE = 0.5
-"""Share of the peaks that must belong to the harmonic grid, and must have a neighbour one or two turns or teeth away
-..."""
+"""Smallest share of peaks on the harmonic grid, and of peaks with a neighbor one or two turns or teeth away."""
 MIN_AGREEING_PEAKS = 3
-"""... and number of them that must agree: a pump that is switched on has peaks of its own."""
+"""Smallest number of matching peaks, as a pump has a comb, too."""
 
 
 def find_spindle_speed(
@@ -197,12 +197,13 @@ def _smooth_votes(votes: Floats, width: float) -> Floats:
 
 
 TACHOMETER_TOLERANCE = 2e-3
-"""Relative difference up to which a tachometer and the peaks say one speed: a column may be rounded; chosen."""
+"""Relative difference within which tachometer and peaks agree, as a column may be rounded; chosen."""
 TACHOMETER_ERROR = 5e-5
-"""Relative standard error of a tachometer: a sample at each end of a second or two; chosen."""
+"""Relative standard error of a tachometer: one sample at each end of one or two seconds; chosen."""
 PULSE_RATIO_TOLERANCE = 0.02
-"""Relative distance from a whole number within which a tachometer over the speed that was commanded, or the inverse,
-speaks of pulses that were counted wrong; chosen."""
+"""Relative distance of a speed ratio from an integer that shows wrongly counted pulses; chosen.
+
+The ratio is tachometer speed over commanded speed, or its inverse."""
 
 
 def check_tachometer_speed(
@@ -227,7 +228,7 @@ def check_tachometer_speed(
 
 
 def is_pulse_multiple(ratio: float) -> bool:
-    """Whether a tachometer over the speed that was commanded is a whole number above 1, or one over it."""
+    """Return whether tachometer speed over commanded speed is an integer above 1, or the reciprocal of one."""
     whole = max(ratio, 1 / ratio)
     return round(whole) > 1 and abs(whole / round(whole) - 1) < PULSE_RATIO_TOLERANCE
 
@@ -245,9 +246,9 @@ def _use_tachometer_speed(spectra: Sequence[Spectrum], air: Sequence[Spectrum], 
 
 
 HUM_FREQUENCIES, HUM_TOLERANCE = (50.0, 60.0), 2e-3
-"""Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
+"""Mains frequencies (Hz), whose hum is a comb, too, and their largest relative deviation."""
 MIN_DISTANT_SHARE = 0.5
-"""Share of the peaks beside the harmonics of a speed, or of their energy, on another that takes its place; chosen."""
+"""Share of peaks or energy off a speed's harmonics, from which another speed replaces it; chosen."""
 
 
 def find_distant_speed(

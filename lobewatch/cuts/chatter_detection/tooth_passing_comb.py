@@ -14,36 +14,36 @@ from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERA
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, find_peaks, fold_frequency, join_peaks
 
 COMB_TOLERANCE = 1.2
-"""Distance from a harmonic up to which a peak belongs to it (bins): as wide as a peak (`PEAK_TOLERANCE`)."""
+"""Distance from a harmonic within which a peak belongs to it (bins), the width of a peak (`PEAK_TOLERANCE`)."""
 COMB_SPEED_WAVER = 1e-4
-"""Change of every speed, relative (`MIN_UNSTEADINESS`): by this much harmonics are unsure."""
+"""Relative speed variation of every spindle (`MIN_UNSTEADINESS`), by which harmonics are uncertain."""
 MAX_COMB_PEAKS = 40
-"""Peaks that are checked ..."""
+"""Largest number of checked peaks."""
 MAX_COMB_ANCHORS = 16
-"""... and those that a comb is searched from; chosen."""
+"""Largest number of peaks from which combs are searched; chosen."""
 COMB_FIT_STEPS = 3
-"""Steps of the least squares."""
+"""Number of least-squares steps."""
 MAX_COMB_CHANCE = 1e-4
-"""A comb that as many peaks as random would have more often than this, over all combs that are tried, is none."""
+"""Largest probability of a comb among random peaks, over all combs tried."""
 MAX_PEAK_WEIGHT = 3.0
-"""Most that one peak counts, in log10 of its clearness: a loud one is no more than a peak; chosen."""
+"""Largest weight of a peak (log10 of its signal-to-noise ratio), so that one loud peak does not decide; chosen."""
 MIN_COMB_SHARE = 0.5
-"""Share of the peaks that a comb far from the speed that was commanded explains at least."""
+"""Smallest share of peaks explained by a comb far from the commanded speed."""
 MIN_COMB_HARMONICS = 3
-"""Harmonics that a comb has at least: any two peaks have one."""
+"""Smallest number of harmonics of a comb, as any two peaks have one."""
 
 
 class Comb(NamedTuple):
-    """A frequency, and the peaks that are its harmonics."""
+    """Frequency with the peaks that are its harmonics."""
 
     frequency: float
     """Frequency (Hz)."""
     is_member: Flags
-    """Which peaks are harmonics, shape (n,)."""
+    """Mask of the peaks that are harmonics, shape (n,)."""
     order: Floats
-    """Order of each, shape (n,)."""
+    """Order of each harmonic, shape (n,)."""
     offset: Floats
-    """Distance of each from its harmonic (Hz), as that is folded, shape (n,)."""
+    """Distance of each peak from its folded harmonic (Hz), shape (n,)."""
 
 
 def find_comb(
@@ -176,24 +176,25 @@ def _comb_speed(comb: Comb, peaks: SpectralPeaks, bin_width: float) -> SpindleSp
 
 
 MIN_HARMONIC_LEVEL = 0.6
-"""log10 of its power over that of the noise from which on a harmonic counts: noise is seldom so loud; chosen ..."""
+"""Smallest level of a harmonic that counts (log10 of its power over the noise), seldom reached by noise; chosen."""
 MAX_HARMONIC_LEVEL = 2.4
-"""... and the most that it counts beyond that; chosen."""
+"""Largest level above that minimum that counts (log10); chosen."""
 SUM_FREQUENCY_STEP = 0.25
-"""Step of the frequencies that are tried, over what moves the highest harmonic by a bin; chosen."""
+"""Step of the tried frequencies over the change that moves the highest harmonic by one bin; chosen."""
 N_SUM_LEVELS = 100
-"""Levels into which a harmonic's part of the sum is divided."""
+"""Number of levels into which the contribution of a harmonic is divided."""
 CLEAR_SUM_MEAN = 1 / 3
-"""Mean over the harmonics below which a comb must be far rarer by chance, which takes each for itself: sidebands of
-a peak that is no harmonic come together; chosen ..."""
+"""Mean over the harmonics below which a comb must be rarer (`FAINT_SUM_CHANCE`); chosen.
+
+Chance takes harmonics as independent, but sidebands of a peak that is not a harmonic come together."""
 FAINT_SUM_CHANCE = 1e-8
-"""... as this; chosen."""
+"""Largest probability of a faint comb by chance; chosen."""
 MAX_REMAINING_CHANCE = 0.05
-"""How often chance may make the harmonics that are left without those of one order; chosen."""
+"""Largest probability by chance of the harmonics that remain without those of one order; chosen."""
 HARMONIC_BINS = 4.0
-"""Distance from a harmonic up to which the spectrum is its own (bins): half the width of the window's main lobe."""
+"""Distance from a harmonic within which the spectrum belongs to it (bins), half the main lobe of the window."""
 WEAK_PEAK_POWER = 4.0
-"""Power over that of the noise of the peaks from which the frequency is made exact: as `MIN_HARMONIC_LEVEL`."""
+"""Power over the noise of peaks that refine the frequency, as for `MIN_HARMONIC_LEVEL`."""
 
 
 def find_comb_by_sum(

@@ -14,29 +14,32 @@ from lobewatch.machine.journal.cut_entry import CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
 
 DRIVE_POWER_SPREAD = 0.15
-"""Standard deviation, relative, of the power that a drive shows over that of its cuts, the same in all: efficiency
-of motor, belt and gears under load, what the display leaves out, edges that do not rub in proportion to Kt."""
+"""Relative standard deviation of displayed drive power over that of the cuts, common to all cuts.
+
+Causes: efficiency of motor, belt and gears under load, losses that the display omits, and edge forces that are not
+proportional to Kt."""
 EDGE_FORCE_SPREAD, UNKNOWN_EDGE_FORCE_SPREAD = 0.3, 0.5
-"""Standard deviations, relative, of Kte over Kt where it is known (edges are sharper or duller than those that it
-was measured with), and where it is not: what is published differs by three times."""
+"""Relative standard deviation of Kte over Kt if Kte is known, and if it is not.
+
+Edges may be sharper or duller than those measured. Published values differ by a factor of three."""
 POWER_READING_SPREAD = 0.05
-"""Standard deviation, relative, of one reading: a display that jumps, a feed or a radial depth a little off."""
+"""Relative standard deviation of one power reading, by an unsteady display, feed or radial depth."""
 CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD = 0.89, 0.08
-"""Power of a cut that chatters over that of a stable one, and how far that scatters from cut to cut, by simulations
-in time: edges that have left the cut do not rub, and thick chips, which it has next to thin ones, cost less.
-See docs/cuts.md."""
+"""Power of a chattering cut over that of a stable one, and its scatter between cuts, from time-domain simulations.
+
+Edges that leave the cut do not rub, and thick chips between thin ones take less power. See docs/cuts.md."""
 
 
 @dataclass(frozen=True)
 class PowerEvidence:
-    """Kt by power; errors as standard deviations of its logarithm."""
+    """Kt by power, with errors as standard deviations of its logarithm."""
 
     force: float
-    """Kt over the one that the cut was taken for."""
+    """Kt over the assumed Kt of the cut."""
     common_error: float
-    """Error that all readings of a material share."""
+    """Error common to all readings of a material."""
     own_error: float
-    """Error of this one alone."""
+    """Error of this reading only."""
 
 
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
@@ -50,9 +53,9 @@ def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerE
 
 
 AGED_FREQUENCY_CHANGE = 0.02
-"""Change of the natural frequency, relative, after which a cut says 61 % of what it said; chosen."""
+"""Relative change of the natural frequency after which a cut has 61 % of its weight; chosen."""
 REPEAT_SPEED_TOLERANCE, REPEAT_DEPTH_TOLERANCE = 0.002, 0.01
-"""Relative distances up to which a cut is another one again."""
+"""Relative differences of speed and depth within which a cut repeats another."""
 
 
 @dataclass(frozen=True)
@@ -60,31 +63,31 @@ class CutEvidence:
     """One test cut in SI units."""
 
     cut: Cut
-    """Teeth and their pitch, immersion, direction, helix, and the coefficients that its material was taken for."""
+    """Teeth, pitch, immersion, direction, helix, and assumed cutting coefficients."""
     speed_rpm: float
     """Spindle speed (rpm)."""
     depth: float
-    """Axial depth (m)."""
+    """Axial depth of cut (m)."""
     verdict: CutVerdict
-    """Verdict on its sound."""
+    """Verdict by chatter detection."""
     frequency: float = math.nan
-    """Chatter frequency (Hz); NaN where none was recorded or told."""
+    """Chatter frequency (Hz); NaN if not recorded."""
     feed_angles: tuple[float, ...] = (0.0,)
-    """Directions it may have been fed in, as angles from x (rad): the worst counts."""
+    """Possible feed directions as angles from x (rad); the worst counts."""
     material: int = 0
-    """Cuts with the same number share their cutting coefficients; 0 are those of the cut asked about."""
+    """Number of the material. Cuts with the same number share cutting coefficients; 0 is that of the evaluated cut."""
     speed_found: bool = True
-    """Whether the speed was found in the sound; else it is the commanded one."""
+    """True if the speed was found in the recording; False if it is the commanded one."""
     frequency_ratio: float = 1.0
-    """Natural frequency at rest when it was made, over that of now."""
+    """Natural frequency not rotating at the time of the cut over that of now."""
     id: str = ""
     """Number of the cut in the journal."""
     power: PowerEvidence | None = None
-    """Kt by its power; None where nobody has read it."""
+    """Kt by power; None without a power reading."""
 
     @property
     def weight(self) -> float:
-        """Weight of what it says: less, the more the natural frequency has moved since."""
+        """Weight of the cut, which decreases as the natural frequency changes."""
         return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
     def is_repeat_of(self, other: CutEvidence) -> bool:
@@ -95,25 +98,26 @@ class CutEvidence:
 
     @property
     def tooth_frequency(self) -> float:
-        """Times a second that the cut repeats (Hz): teeth a second where they are evenly spaced."""
+        """Repetition frequency of the cut (Hz), the tooth passing frequency for equal pitches."""
         return self.cut.repeats_per_turn * self.speed_rpm / 60
 
     @property
     def has_chatter(self) -> bool:
-        """Whether it was not stable."""
+        """True if the cut was not stable."""
         return self.verdict != "stable"
 
     @property
     def has_frequency(self) -> bool:
-        """Whether it says something of natural frequencies."""
+        """True if the cut has information on natural frequencies."""
         return self.verdict == "flip" or (self.has_chatter and math.isfinite(self.frequency))
 
 
 TAKEN_SPEED_TOLERANCE, TAKEN_DEPTH_TOLERANCE = 0.01, 0.04
-"""Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen: what is
-less deep than an edge (`LIMIT_SPREAD`) the spindles that are learned tell by themselves ..."""
+"""Relative distances in speed, and to smaller depth, within which a chattering cut excludes a candidate; chosen.
+
+Smaller differences in depth than `LIMIT_SPREAD` are left to the posterior samples."""
 REJECTED_DEPTH_TOLERANCE = 0.10
-"""... but not where they do not believe it."""
+"""Relative distance in depth within which a cut with a rejected label excludes no candidate."""
 
 
 def is_setting_taken(

@@ -22,46 +22,45 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 
 LIMIT_SPREAD = 0.05
-"""Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
+"""Relative standard deviation of the depth limit of a cut; chosen."""
 MISLABELED_SHARE = 0.03
-"""Share of cuts that are written down as what they are not; chosen: 2.7 % are recorded wrong, some are typed wrong."""
+"""Share of cuts with a wrong label; chosen: 2.7 % by chatter detection, and some by typing errors."""
 UNPITCHED_MISLABELED_SHARE = 0.06
-"""The same of chatter of which no frequency was told, so that nothing speaks for it but the verdict; chosen."""
+"""Share of wrong labels among chatter without a frequency, for which only the verdict is evidence; chosen."""
 CHATTER_FREQUENCY_SPREAD = 0.01
-"""Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
+"""Relative standard deviation of a chatter frequency around its prediction; chosen, see docs/cuts.md."""
 FOREIGN_FREQUENCY_SHARE = 0.05
-"""Share of chatter frequencies that say nothing; chosen, see docs/cuts.md, How good it is."""
+"""Share of chatter frequencies without information; chosen, see docs/cuts.md, How good it is."""
 WRONG_KIND_SHARE = 0.1
-"""Share of chatter that is recorded as that of the other kind; chosen."""
+"""Share of chatter that is recorded as the other kind (Hopf or flip); chosen."""
 MULTIPLIER_ACCURACY = 1e-3
-"""Accuracy of a multiplier, relative."""
+"""Relative accuracy of a multiplier."""
 FLIP_ANGLE_TOLERANCE = 1e-3
-"""Distance of the angle of a multiplier from pi (rad) up to which it is that of period two."""
+"""Distance of the angle of a multiplier from pi (rad) within which chatter is of period two."""
 MAX_LOG_EXCESS = 5.0
-"""Largest logarithm of depth over limit that counts, either way: a hundred times `EDGE`."""
+"""Largest absolute logarithm of depth over limit that counts: a hundred times `LIMIT_SPREAD`."""
 
 
 class CutPrediction(NamedTuple):
-    """What each spindle would do in a cut, shape (r,) each."""
+    """Predicted behavior of each sample in a cut, shape (r,) each."""
 
     excess: Floats
-    """Logarithm of depth over limit; positive where it chatters."""
+    """Logarithm of depth over limit; positive if it chatters."""
     frequency: Floats
-    """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
+    """Frequency of the largest multiplier (Hz), folded to 0 to half the tooth frequency; NaN if unknown."""
     limit_frequency: Floats
-    """Folded frequency at the limit of its speed, by the zero-order approximation (Hz); may be NaN where the cut
-    says nothing of any."""
+    """Folded frequency at the limit of its speed by the zero-order approximation (Hz); may be NaN without evidence."""
     is_flip: Flags
-    """Whether that is of period two."""
+    """True if chatter is of period two."""
 
     @property
     def chatter_probability(self) -> Floats:
-        """Chance that it chatters."""
+        """Chance of chatter."""
         return np.asarray(scipy.special.ndtr(self.excess / LIMIT_SPREAD))
 
     @property
     def label_probability(self) -> Floats:
-        """Chance that it is written down as chatter."""
+        """Chance of the label chatter."""
         return MISLABELED_SHARE + (1 - 2 * MISLABELED_SHARE) * self.chatter_probability
 
     def frequency_distances(self, cut: CutEvidence) -> Floats:
@@ -212,12 +211,12 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
 
 
 class ExpectedChatter(NamedTuple):
-    """What a cut sounds like in the direction of feed that is worst."""
+    """Expected chatter of a cut in its worst feed direction."""
 
     stable: bool
-    """Whether no multiplier reaches 1."""
+    """True if no multiplier reaches 1."""
     frequency: float
-    """Frequency of the largest multiplier (Hz): what chatter would sound with at this depth."""
+    """Frequency of the largest multiplier (Hz), the chatter frequency at this depth."""
 
 
 def predict_chatter(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> ExpectedChatter:

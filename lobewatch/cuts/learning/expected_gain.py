@@ -19,36 +19,36 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constan
 from modal import Mode
 
 SPEED_GRID_STEP = 0.008
-"""Relative step of the speeds that are checked."""
+"""Relative step of the checked speeds."""
 TRIED_SPEED_STEP_RPM, TRIED_DEPTH_STEP_MM = 10.0, 0.05
-"""Steps that can be set at a machine (rpm and mm)."""
+"""Steps of speed (rpm) and depth (mm) that a machine can set."""
 DEPTH_ROUNDING = 1e-6
-"""Share of a step of depth that rounding of numbers may miss."""
+"""Share of a depth step that rounding may lose."""
 N_COMPARED_SPEEDS = 80
 """Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
-"""Least and largest ratio of true limit to the zero-order limit that is believed; chosen."""
+"""Smallest and largest credible ratio of true limit to zero-order limit; chosen."""
 
 TipModes = Sequence[Mode] | None
 
 
 @dataclass(frozen=True, eq=False)
 class CutGrid:
-    """What may be chosen from."""
+    """Grid of possible test cuts."""
 
     cut: Cut
     """Geometry and coefficients of the program."""
     feed_angles: tuple[float, ...]
-    """Directions of feed (rad): the worst counts."""
+    """Feed directions (rad); the worst counts."""
     speeds: Floats
-    """Spindle speeds (rpm), rising, shape (s,)."""
+    """Spindle speeds (rpm), ascending, shape (s,)."""
     max_depths: Floats
-    """Depth that tool and drive allow at each (m), shape (s,)."""
+    """Largest depth of tool and drive at each speed (m), shape (s,)."""
     zero_order_trust: Floats
-    """True median limit over that by the zero-order approximation, at each speed, shape (s,)."""
+    """True median limit over that by the zero-order approximation at each speed, shape (s,)."""
 
     def contains(self, speed: float) -> bool:
-        """Return whether a speed (rpm) lies within the grid, with the tolerance of a recorded speed."""
+        """Return whether a speed (rpm) is within the grid, with the tolerance of a recorded speed."""
         return bool(self.speeds[0] * (1 - SPEED_GRID_STEP) <= speed <= self.speeds[-1] * (1 + SPEED_GRID_STEP))
 
     def build_evidence(self, speed: float, depth: float, word: CutVerdict = "stable") -> CutEvidence:
@@ -87,40 +87,41 @@ def compare_zero_order(
 
 
 MIN_STABLE_PROBABILITY = 0.5
-"""Chance of being stable that a test cut has at least."""
+"""Smallest chance that a test cut is stable."""
 TRIED_STABLE_PROBABILITIES = (0.51, 0.6, 0.7, 0.8, 0.9)
-"""Chances of being stable, of the depths that are checked; chosen."""
+"""Chances of stability for which depths are checked; chosen."""
 MAX_CANDIDATE_SPEEDS, MIN_CANDIDATE_DISTANCE = 8, 0.02
-"""Largest number of speeds that are checked, and their least relative distance; chosen."""
+"""Largest number of checked speeds and their smallest relative distance; chosen."""
 N_EXPECTED_FREQUENCIES = 4
-"""Number of chatter frequencies that may be recorded, of which it is worked out what they would tell."""
+"""Number of possible chatter frequencies for which the gain is computed."""
 FREQUENCY_ERROR_FACTOR = 1.5
-"""Factor on the error of a chatter frequency, since that at the limit stands for that at the depth; chosen."""
+"""Factor on the error of a chatter frequency, as that at the limit replaces that at the depth; chosen."""
 LIMIT_DEPTH_MARGIN = 1e-6
-"""Depth beyond the deepest that is allowed up to which limits are worked out (m)."""
+"""Depth beyond the deepest allowed one up to which limits are computed (m)."""
 MAX_LABEL_DEVIATION = 2.0
-"""Edges (`LIMIT_SPREAD`) by which a cut may be on the other side of the limit than its word says; chosen: beyond it
-the verdict is more likely wrong."""
+"""Largest distance from the limit (`LIMIT_SPREAD`) of a cut with a right label; chosen.
+
+A label beyond it is more likely wrong."""
 EQUAL_DEPTH_TOLERANCE = 1e-9
-"""Difference of two depths that is none (m)."""
+"""Difference of two equal depths (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitCharts:
-    """Limits of samples of equal weight over the speeds of a grid."""
+    """Limits of equally weighted samples over the speeds of a grid."""
 
     grid: CutGrid
-    """Speeds and depths that a cut may be chosen from."""
+    """Grid of speeds and depths of possible cuts."""
     limits: Floats
-    """Limits in the worst direction of feed, as deep as is allowed (m), shape (r, s)."""
+    """Limits in the worst feed direction, up to the largest allowed depth (m), shape (r, s)."""
     frequencies: Floats
-    """Chatter frequencies at them, folded by how often the cut repeats (Hz), shape (r, s)."""
+    """Chatter frequencies at the limits, folded by the repetition frequency of the cut (Hz), shape (r, s)."""
     depth_order: Indices
-    """Samples of each speed by their limits, the deepest first, shape (r, s)."""
+    """Samples at each speed in descending order of limits, shape (r, s)."""
     typical_frequency: float
-    """A natural frequency (Hz)."""
+    """Typical natural frequency (Hz)."""
     removal_rates: Floats
-    """Speed times the deepest depth that can be set and is stable (rpm m) for each of them, shape (r, s)."""
+    """Speed times the largest stable depth that can be set (rpm m), shape (r, s)."""
 
     @classmethod
     def of(cls, samples: SpindleSamples, grid: CutGrid) -> LimitCharts:

@@ -20,39 +20,38 @@ from lobewatch.cuts.learning.cut_likelihood import (
 from lobewatch.cuts.learning.posterior import USUAL_FREQUENCY_INTERVAL, NewEvidence, Posterior
 
 MAX_WRONG_PROBABILITY = 0.5
-"""Chance that the verdict of a cut is wrong, given all cuts, from which it is not believed."""
+"""Chance of a wrong label, given all cuts, from which a label is rejected."""
 N_CHECK_SAMPLES = 300
-"""Number of samples that are asked what they say of a cut."""
+"""Number of samples used to check a cut."""
 MAX_FREQUENCY_DEVIATION = 4.0
-"""Distance (standard deviations) from all frequencies predicted at which chatter is that of something else, and from
-the Kt that was known at which a power is not believed; chosen."""
+"""Largest credible deviation (standard deviations) of a chatter frequency or of Kt by power; chosen."""
 MIN_EXPLAINED_WEIGHT = 0.005
-"""Share of the weight by the other cuts that counts as nothing; chosen."""
+"""Share of the weight by the other cuts that counts as zero; chosen."""
 
 
 class Contradiction(StrEnum):
-    """In what a cut contradicts the model."""
+    """Contradiction between a cut and the model."""
 
     FREQUENCY = "frequency"
-    """It chatters where no mode is."""
+    """Chatter at a frequency without a mode."""
     CHATTERS = "chatters"
-    """It chatters where most spindles that explain the other cuts are stable."""
+    """Chatter where most samples that explain the other cuts are stable."""
     STABLE = "stable"
-    """It is stable where most of them chatter."""
+    """Stable where most samples that explain the other cuts chatter."""
     POWER = "power"
-    """Its power says another Kt than the cuts before it."""
+    """Power with another Kt than that of the cuts before it."""
 
 
 @dataclass(frozen=True)
 class InconsistentCut:
-    """A cut whose word or power is not believed, or whose frequency is of no mode."""
+    """Cut with a rejected label or power, or with a frequency of no mode."""
 
     cut: CutEvidence
-    """The cut."""
+    """Rejected cut."""
     contradiction: Contradiction
-    """Contradiction for which it is not believed."""
+    """Contradiction for which it is rejected."""
     wrong_probability: float = 0.0
-    """Chance that its word is wrong."""
+    """Chance of a wrong label."""
 
 
 def wrong_label_probability(evidence: NewEvidence) -> float:

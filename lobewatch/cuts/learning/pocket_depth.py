@@ -19,36 +19,36 @@ from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
 from lobewatch.verdicts.verdict import NOT_CHECKED_CODE, Stability, Verdict
 
 MAX_POCKET_CUTS = 5
-"""Number of test cuts in a pocket after which its depth stands."""
+"""Number of test cuts in a pocket after which its depth is final."""
 FIRST_DEPTH_SHARE = 0.25
-"""First depth over that of the program."""
+"""Depth of the first cut over that of the program."""
 MIN_DEPTH_RATIO = 1.2
-"""Shallowest depth with chatter over the deepest without, below which no cut between them is worth making."""
+"""Ratio of chattering to stable depth below which no further cut is made."""
 PROGRAM_SPEED_TOLERANCE = 0.01
-"""Relative distance of two speeds that are one."""
+"""Relative difference of two equal speeds."""
 
 
 @dataclass(frozen=True)
 class PocketDepth:
-    """A pocket with what was recorded in it."""
+    """Stable pocket with its test cuts."""
 
     pocket: SpeedPocket
     """Pocket by f_n and damping."""
     speed_rpm: float
-    """Speed to cut at (rpm), the middle of its window."""
+    """Speed to cut at (rpm), the middle of the window."""
     cuts: tuple[CutEvidence, ...]
-    """Cuts of the same cutter, material and immersion in its window."""
+    """Cuts of the same cutter, material and immersion in the window."""
     max_depth: float
-    """Deepest cut that machine and tool allow there (m)."""
+    """Largest depth that machine and tool allow there (m)."""
 
     @property
     def chatter_depth(self) -> float:
-        """Shallowest depth that chattered (m); inf where none did."""
+        """Smallest depth with chatter (m); inf without chatter."""
         return min((cut.depth for cut in self.cuts if cut.has_chatter), default=math.inf)
 
     @property
     def stable_depth(self) -> float:
-        """Deepest depth that was recorded stable, shallower than all chatter (m); 0 where none was."""
+        """Largest stable depth below all chatter (m); 0 without one."""
         stable = (cut.depth for cut in self.cuts if not cut.has_chatter)
         return max((depth for depth in stable if depth < self.chatter_depth), default=0.0)
 

@@ -1,4 +1,4 @@
-"""What was learned of the rotating spindle: samples from the prior, weighted by how well they explain its cuts."""
+"""Posterior of the rotating spindle: samples from the prior, weighted by the test cuts."""
 
 from __future__ import annotations
 
@@ -24,33 +24,32 @@ from lobewatch.verdicts.uncertainty import Uncertainty
 N_PRIOR_SAMPLES = 2000
 """Number of samples."""
 N_REFRESHED_SAMPLES = 500
-"""Number of samples that are redrawn where few have any weight left ..."""
+"""Number of samples after resampling."""
 MIN_EFFECTIVE_SAMPLES = 120
-"""... which is when the effective sample size is less."""
+"""Effective sample size below which samples are redrawn."""
 N_MARKOV_MOVES, MARKOV_STEP_SHARE = 4, 0.5
-"""Number of times that each is then moved, and how far, as a share of their own spread; chosen."""
+"""Number of Markov moves of each sample, and their size as a share of the spread."""
 ADDED_VARIANCE = 1e-4
-"""Variance that is added to that of the samples before they are moved: a few alike have none of their own."""
+"""Variance added to that of the samples before they are moved, as few equal samples have none."""
 NEGLIGIBLE_WEIGHT = 1e-6
-"""Share of the largest weight below which a sample is not checked any more."""
+"""Share of the largest weight below which a sample is ignored."""
 MIN_CHATTER_FREQUENCIES, OPEN_FREQUENCY_INTERVAL = 2, (0.90, 1.05)
-"""Chatter frequencies without which it is unknown how far a spindle at speed may be off, and how far that is;
-chosen."""
+"""Number of chatter frequencies that determine frequencies at speed, and interval with fewer (factors); chosen."""
 USUAL_FREQUENCY_INTERVAL = (0.945, 1.025)
-"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `ROTATING_FREQUENCY_FACTOR`."""
+"""95 % interval of natural frequencies at speed over those not rotating: `ROTATING_FREQUENCY_FACTOR`."""
 INTERVAL_LEVEL = 0.95
-"""Share of the weight that an interval holds."""
+"""Share of the weight within an interval."""
 
 
 class Interval(NamedTuple):
-    """A number that is learned, as a factor on that at rest (on that of the table, of coefficients)."""
+    """Interval of a learned factor, relative to the value not rotating or to the table for coefficients."""
 
     mean: float
     """Weighted mean."""
     low: float
-    """Lower end: 2.5 % of the weight lies below."""
+    """2.5 % quantile."""
     high: float
-    """Upper end: 2.5 % of the weight lies above."""
+    """97.5 % quantile."""
     std: float
     """Weighted standard deviation."""
 
@@ -64,11 +63,11 @@ class Posterior:
     """Weighted samples of the rotating spindle."""
 
     samples: SpindleSamples
-    """Spindles at speed."""
+    """Samples of the spindle at speed."""
     log_weight: Floats
-    """Logarithm of the weight of each, up to a constant, shape (r,)."""
+    """Logarithm of each weight, up to a constant, shape (r,)."""
     cuts: tuple[CutEvidence, ...] = ()
-    """Cuts that they were learned from."""
+    """Cuts that the weights are based on."""
     n_refreshed: int = 0
     """Number of times that the samples were redrawn."""
     seed: int = 0
@@ -103,7 +102,7 @@ class Posterior:
 
     @property
     def is_frequency_unusual(self) -> bool:
-        """Whether a natural frequency is more likely than not further from that at rest than 95 % of spindles are."""
+        """True if a natural frequency is probably further from that not rotating than in 95 % of spindles."""
         leading = [values for name, values in self.samples.ratios().items() if name in ("frequency_x", "frequency_y")]
         beside = [(USUAL_FREQUENCY_INTERVAL[0] < values) & (values < USUAL_FREQUENCY_INTERVAL[1]) for values in leading]
         return (
@@ -135,14 +134,14 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class NewEvidence:
-    """A cut before it teaches anything."""
+    """New cut before the posterior is updated."""
 
     prior: Posterior
-    """Posterior without it: samples that have any weight left, with coefficients of its material."""
+    """Posterior without the cut: samples that have weight, with coefficients of its material."""
     cut: CutEvidence
-    """The cut."""
+    """New cut."""
     prediction: CutPrediction
-    """Sound that each of these samples would make in it."""
+    """Predicted behavior of each sample in the cut."""
 
     def update(self) -> Posterior:
         """Update the posterior with the cut."""
@@ -213,7 +212,7 @@ def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], lea
 
 
 def _resample_indices(weights: Floats, count: int, random: np.random.Generator) -> Indices:
-    """Draw indices by weight, systematically: each as often as its weight says, give or take one."""
+    """Draw indices systematically by weight, each in proportion to its weight within one."""
     at = (np.arange(count) + random.uniform()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), at), weights.size - 1)
 

@@ -25,32 +25,33 @@ from lobewatch.verdicts.program_samples import (
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 
 ROTATING_FORCE_PRIOR = (1.1, ROTATING_FORCE_SPREAD)
-"""Middle of Kt at speed over that of the table, chosen, and its standard deviation relative to that; as FREQUENCY,
-DAMPING and STIFFNESS, which are those of the chance of chatter beside a verdict (the deviation of f_n absolute)."""
+"""Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
+
+Frequency, damping and stiffness are those of the chatter risk of a verdict (the deviation of f_n absolute)."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
-"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle
-is far off."""
+"""Share of frequencies that differ more, and factor on their deviation; chosen, as no measurements exist."""
 MIN_PRIOR_FACTOR = 0.1
-"""Least share of its middle that a factor has."""
+"""Smallest factor over its mean."""
 MAX_SAMPLED_DAMPING = 0.95
-"""Largest damping ratio: a mode that is drawn still rings."""
+"""Largest sampled damping ratio; modes stay underdamped."""
 OPEN_FORCE_RATIO_SHARE = 0.3
-"""Share of the ratios Kr/Kt that are anything from 0 to 1, whatever is published or written down; chosen."""
+"""Share of samples with any Kr/Kt from 0 to 1, whatever is published; chosen."""
 NUMBERS_PER_SPINDLE, NUMBERS_PER_MATERIAL = 4, 3
-"""Numbers of a sample beside the f of each mode: (zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as uncertain)
-of each material."""
+"""Number of values of a sample for the spindle and for each material, beyond f of each mode.
+
+Spindle: (zeta, K) in x, then in y. Material: Kt at speed, uncertain Kt, uncertain Kr/Kt."""
 MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS = 18, 3601
-"""End (standard deviations) and number of points of the table that `_mixture_quantiles` makes of the mixture."""
+"""End (standard deviations) and number of points of the mixture table of `_mixture_quantiles`."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpindleSamples:
-    """Spindles at speed: what was drawn, and what follows for rows of a cut."""
+    """Samples of the spindle at speed: drawn numbers, and the rows of a cut that follow."""
 
     normal: Floats
-    """Numbers for what differs from rest, each standard normal a priori, shape (r, modes + 4 + 3 materials)."""
+    """Standard normal numbers for the differences from the spindle not rotating, shape (r, modes + 4 + 3 materials)."""
     at_rest: MillingRows
-    """The spindles at rest, with the error of tap tests, r rows; their speeds are what a speed of 1 is truly."""
+    """Spindles not rotating with the error of tap tests, r rows; their speeds are factors on the commanded one."""
     uncertainty: Uncertainty
     """Uncertainty that the coefficients were drawn from."""
 
@@ -113,7 +114,7 @@ class SpindleSamples:
         return _count_spindle_numbers(self.at_rest) + NUMBERS_PER_MATERIAL * material
 
     def _flexibility(self) -> Floats:
-        """How far each mode gives way at its natural frequency, at rest (m/N), shape (r, n)."""
+        """Return the flexibility of each mode at its natural frequency, not rotating (m/N), shape (r, n)."""
         return np.asarray(1 / (2 * self.at_rest.damping_ratio * self.at_rest.stiffness))
 
     def _frequency_factors(self) -> Floats:

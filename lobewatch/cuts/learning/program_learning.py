@@ -31,40 +31,40 @@ from lobewatch.verdicts.uncertainty import uncertainty_of
 
 @dataclass(frozen=True, eq=False)
 class LearningResult:
-    """What was learned for one program."""
+    """Result of learning for one program."""
 
     program: ProgramTable
     """Program as in machine.toml."""
     prior: Posterior
-    """Spindle and coefficients as known without any cut."""
+    """Prior of spindle and coefficients without any cut."""
     posterior: Posterior
-    """Spindle and coefficients as known with the cuts."""
+    """Posterior of spindle and coefficients with the cuts."""
     inconsistent_cuts: tuple[InconsistentCut, ...]
-    """Cuts that are not believed; of some it is their power alone, without which they were learned from."""
+    """Rejected cuts. Of some only the power is rejected, and the rest was learned from."""
     own_cuts: tuple[CutEvidence, ...]
-    """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
+    """Cuts of this program's material and geometry, at any speed and depth."""
 
     @property
     def rejected_cuts(self) -> tuple[CutEvidence, ...]:
-        """Cuts whose word is not believed."""
+        """Cuts with a rejected label."""
         return tuple(odd.cut for odd in self.inconsistent_cuts if odd.contradiction is not Contradiction.POWER)
 
     @property
     def accepted_cuts(self) -> tuple[CutEvidence, ...]:
-        """Cuts that are."""
+        """Cuts with an accepted label."""
         return tuple(cut for cut in self.posterior.cuts if cut not in self.rejected_cuts)
 
 
 @dataclass(frozen=True, eq=False)
 class NextCut:
-    """What to cut next, and what it rests on."""
+    """Next test cut with its basis."""
 
     learning: LearningResult
-    """Lesson of the cuts that were made."""
+    """Result of the cuts made so far."""
     suggestion: Suggestion | None
-    """Cut to make; None where nothing more is to be gained, or all cuts are made."""
+    """Suggested cut; None if nothing can be gained or all cuts are made."""
     cuts_left: int
-    """Number of test cuts that are still to be made."""
+    """Number of test cuts left."""
     cut_range: CutRange
     """Speeds and depths that machine and tool allow."""
 

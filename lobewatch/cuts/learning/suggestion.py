@@ -1,4 +1,4 @@
-"""Suggest the next test cut."""
+"""Suggest the next test cut by its expected gain and risk."""
 
 from __future__ import annotations
 
@@ -17,38 +17,39 @@ from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_SUGGESTION_SAMPLES = 300
-"""Number of samples that chances are worked out from."""
+"""Number of samples from which chances are computed."""
 TRIED_DEPTH_SHARES = (1.0, 0.85, 0.7, 0.5, 0.35)
-"""Shares of a depth that are checked in turn where the zero-order approximation is not exact; chosen."""
+"""Shares of a depth checked in turn where the zero-order approximation is inexact; chosen."""
 MAX_FIRST_CUT_RISK, FIRST_CUT_DEPTH_FACTOR = 0.2, 1.5
-"""Greatest chance of chatter of a first test cut that is deeper than this many times the depth of its program."""
+"""Largest chatter risk of a first cut deeper than a factor times the program depth, and that factor."""
 FIRST_CUT_DEPTH_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
-"""Shares of a depth that are checked in turn for such a first cut; chosen."""
+"""Shares of a depth checked in turn for such a first cut; chosen."""
 MIN_REPEAT_PROBABILITY = 0.05
-"""Chance that a word "chatter" is wrong, from which it is asked for again while another cut is left; chosen, see
-docs/cuts.md: the last of five cuts gains 4 % of the optimum, a word that is wrong costs 20 %."""
+"""Chance of a wrong label "chatter" from which a cut is repeated, unless it is the last; chosen, see docs/cuts.md.
+
+The last of five cuts gains 4 % of the optimum. A wrong label costs 20 %."""
 MIN_EXPECTED_GAIN = 0.005
-"""Share of the best removal rate so far below which an expected gain is none; chosen."""
+"""Smallest expected gain as a share of the best removal rate so far; chosen."""
 MIN_REMOVAL_RATE_SHARE = 1e-3
-"""Share of the largest removal rate of the grid that the best so far is taken for at least."""
+"""Smallest best removal rate so far, as a share of the largest of the grid."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A test cut that is worth making."""
+    """Suggested test cut."""
 
     speed_rpm: float
     """Spindle speed (rpm)."""
     depth: float
-    """Axial depth (m)."""
+    """Axial depth of cut (m)."""
     chatter_probability: float
-    """Chance that it chatters."""
+    """Chance of chatter."""
     gain: float
-    """Expected gain of removal rate, relative to the best recorded stable so far; inf where there is none."""
+    """Expected gain in removal rate over the best recorded stable rate so far; inf if there is none."""
     most_informative: str
-    """Name of what it tells most of (as in `SpindleSamples.ratios`)."""
+    """Name of the quantity that it determines most (as in `SpindleSamples.ratios`)."""
     repeats: str = ""
-    """Number in the journal of the cut that it makes again, since that is not believed; empty for a new one."""
+    """Journal number of the rejected cut that it repeats; empty for a new cut."""
 
 
 def find_best_removal_rate(cuts: Sequence[CutEvidence]) -> float:

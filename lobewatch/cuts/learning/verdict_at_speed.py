@@ -27,7 +27,7 @@ from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program
 
 INTERVAL_QUANTILES = (0.025, 0.975)
-"""Quantiles that 95 % of samples lie between."""
+"""Quantiles of a 95 % interval."""
 
 
 def evaluate_at_speed(
@@ -120,9 +120,9 @@ class LobesAtSpeed(NamedTuple):
     n_cuts: int
     """Number of test cuts that they were learned from."""
     lobes: StabilityLobes
-    """Lobes in the learned median."""
+    """Lobes of the learned median."""
     band: LimitBand
-    """Band of the limits that the cuts have left open."""
+    """Remaining uncertainty band of the limits."""
 
 
 def compute_lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:

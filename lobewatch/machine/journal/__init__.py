@@ -1,1 +1,1 @@
-"""Journal of a machine and its lines."""
+"""Journal of a machine and its entries."""

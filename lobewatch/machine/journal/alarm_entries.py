@@ -1,4 +1,4 @@
-"""Journal lines for acknowledged alarms and fleet scatter. Imports no numpy, as `lobewatch status` must start fast."""
+"""Journal lines for acknowledged alarms and fleet scatter, without numpy for a fast start."""
 
 from __future__ import annotations
 
@@ -43,8 +43,7 @@ class Acknowledgement(msgspec.Struct, frozen=True):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        fields: dict[str, Any] = msgspec.to_builtins(self)
-        return {"kind": "ack", **fields}
+        return {"kind": "ack", **msgspec.to_builtins(self)}
 
     def __str__(self) -> str:
         by = f" by {self.operator}" if self.operator else ""
@@ -80,8 +79,7 @@ class FleetScatter(msgspec.Struct, frozen=True):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        fields: dict[str, Any] = msgspec.to_builtins(self)
-        return {"kind": "scatter", **fields}
+        return {"kind": "scatter", **msgspec.to_builtins(self)}
 
 
 def read_fleet_scatters(entries: Sequence[Mapping[str, Any]]) -> tuple[FleetScatter, ...]:

@@ -1,4 +1,4 @@
-"""Speeds and depths that machine and tool bear in a cut: nothing outside of them is recommended."""
+"""Range of speeds and depths that machine and tool allow, the bounds of recommendations."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class CutRange:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no speed is allowed."""
+        """True if no speed is allowed."""
         return self.low_rpm > self.high_rpm
 
     @property

@@ -1,1 +1,1 @@
-"""Setup questions of a new machine, and what their answers make of machine.toml."""
+"""Setup questions of a new machine, and machine.toml from their answers."""

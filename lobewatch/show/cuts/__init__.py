@@ -1,1 +1,1 @@
-"""Show recorded and suggested test cuts."""
+"""Presentation of recorded and suggested test cuts."""

@@ -1,1 +1,1 @@
-"""Plot figures: trend, modes, model, stability lobes."""
+"""Figures: trend, modes, spindle model, stability lobes."""

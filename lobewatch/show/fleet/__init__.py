@@ -1,1 +1,1 @@
-"""Show and export many machines at once."""
+"""Presentation and export of many machines."""

@@ -1,1 +1,1 @@
-"""Show the comparison with the paper."""
+"""Presentation of the comparison with the paper."""

@@ -1,1 +1,1 @@
-"""Show verdicts, lobes and advice for cutting programs."""
+"""Presentation of verdicts, lobes and advice for cutting programs."""

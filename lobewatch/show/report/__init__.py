@@ -1,1 +1,1 @@
-"""Write the HTML report of a machine or a fleet."""
+"""HTML report of a machine or a fleet."""

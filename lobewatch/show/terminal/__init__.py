@@ -1,1 +1,1 @@
-"""Print to the terminal, and run the screen of a tap test in it."""
+"""Terminal output, setup dialogue, and the tap test screen in characters."""

@@ -27,7 +27,7 @@ def structure(modes: tuple[tuple[float, float, float], ...]) -> Structure:
 
 
 STEPS = 160
-"""Of the plain simulation, a tooth period."""
+"""Steps of the plain simulation per tooth period."""
 
 
 def cut_of(cut: Cut, speed_rpm: float, depth: float, **changes: Any) -> MillingCut:

@@ -14,7 +14,10 @@ RATE = 12800.0
 
 
 def filled_up(left: float, times: int, noise: float = 0.002, seed: int = 0) -> Frf:
-    """Of an impulse response that ends where so much of the mode at 1500 Hz is left, as long again `times` times."""
+    """Return the FRF of a truncated and zero-padded impulse response.
+
+    `left` is the remaining share of the mode at 1500 Hz, `times` the padding over the record length.
+    """
     size = int(-np.log(left) / (2 * np.pi * 1500 * 0.005) * RATE)
     time = np.arange(size) / RATE
     response = np.zeros(size)

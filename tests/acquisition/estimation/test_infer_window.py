@@ -1,4 +1,4 @@
-"""Exponential windows that nobody told of, by the noise of the hits."""
+"""Unstated exponential windows, inferred from the noise of the hits."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def covariance(columns: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
 
 
 def impulse_variance() -> NDArray[np.float64]:
-    """Of H1 / H for an impulse of 1 N on noise of 1 N rms, one hit, at the lines.
+    """Return the variance of H1 / H for one hit: an impulse of 1 N with noise of 1 N rms, at the lines.
 
     The window has 18 samples of weight 1, and 7 on either side of weights cos^2(pi k / 16): squares add up to 23. The
     error of the mean of the baseline is the same at all of them, so that their spectrum counts.

@@ -70,7 +70,7 @@ def of_frf(extension: str) -> Callable[[Path], None]:
 
 
 def uncounted(path: Path) -> None:
-    """As our first versions wrote a table: without its count of rows."""
+    """Write a table as the first versions did: without its number of rows."""
     of_frf(".csv")(path)
     path.write_text(path.read_text().replace("# rows: 40\n", ""))
 

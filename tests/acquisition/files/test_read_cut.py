@@ -39,7 +39,7 @@ def test_a_wav_file_needs_its_full_scale_and_unit(tmp_path: Path) -> None:
 
 
 def axes_table(path: Path) -> Path:
-    """As a sensor of three axes writes it, with a column beside it that is no response."""
+    """Write a table of a three-axis sensor, with one more column that is not a response."""
     rows = (f"{i / 1650:.9f},{a:.6f},{2 * a:.6f},{-a:.6f},0.7" for i, a in enumerate(WAVE))
     path.write_text("\n".join(["Time (s),Accel X (m/s^2),Accel Y (m/s^2),Accel Z (g),CI Value", *rows]) + "\n")
     return path

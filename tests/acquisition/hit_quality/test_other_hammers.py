@@ -33,7 +33,7 @@ def hit(width: float, *, second: float = 0.0, high_pass: float = 0.0, before: in
 
 
 def recorded(one: Hit, bits: int, force_range: float = 2200.0) -> Hit:
-    """As a text or MAT file holds it: in steps of the converter, but without its codes."""
+    """Return a hit as in a text or MAT file: in steps of the converter, but without its codes."""
     channels = (Channel("force", 1.0, force_range, bits), Channel("acceleration", 1.0, 2000.0, bits))
     codes = np.stack([c.encode(s) for c, s in zip(channels, (one.force, one.acceleration), strict=True)])
     return replace(Hit.from_codes(codes, channels, RATE, BEFORE), codes=None, channels=None)

@@ -1,4 +1,4 @@
-"""Verdicts on hits whose force nobody measured."""
+"""Verdicts on hits without a measured force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the hammer pulse stands, by pulses whose samples are known."""
+"""Location of the hammer pulse, for pulses with known samples."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Wiring:
     faults: set[str] = field(default_factory=set)
     """Faults that begin at the next read: "overrun", "unplugged", "silent"."""
     log: list[Any] = field(default_factory=list)
-    """What was set, in order."""
+    """Settings in order."""
 
     def stream(self, rate: float, n_inputs: int) -> Callable[[int], Volts]:
         """Return the function that reads next scans: number -> (n_inputs, n), open inputs at 0 V."""

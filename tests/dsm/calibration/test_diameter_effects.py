@@ -43,12 +43,12 @@ def one_tool_off(spindles: Sequence[Spindle], draw: np.random.Generator) -> list
 
 
 class Outcome(NamedTuple):
-    """Of many simulated spindles."""
+    """Results of many simulated spindles."""
 
     joint: list[bool]
-    """Whether the 95 % interval of a stiffness of the joint that is not open holds the truth."""
+    """True for each 95 % interval of a closed joint stiffness that contains the truth."""
     third: list[bool]
-    """Whether f_1 of the third tool is within 1.96 times its standard error."""
+    """True for each f_1 of the third tool within 1.96 times its standard error."""
     misfits: int
     """Fits whose frequencies do not fit one spindle, and those that found nothing; not counted."""
 

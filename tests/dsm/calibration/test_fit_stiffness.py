@@ -334,7 +334,7 @@ def worn_six_and_four(front: float, rear: float) -> Spindle:
 
 
 def three_modes(draws: int) -> list[FloatArray]:
-    """Of six bearings at 0.6 and four at 0.8 of 1280 N/um, with 0.3 %."""
+    """Return frequencies with six bearings at 0.6 and four at 0.8 of 1280 N/um, with 0.3 %."""
     draw, exact = np.random.default_rng(3), natural_frequencies(worn_six_and_four(0.6, 0.8), 3)
     return [exact * (1 + 3e-3 * draw.normal(size=3)) for _ in range(draws)]
 

@@ -27,7 +27,7 @@ from dsm.calibration.stiffness_groups import scale_groups
 
 HOLDER, TILTING = "holder", "holder tilting"
 NOISE = 1e-3
-"""Of every measured frequency, relative."""
+"""Relative noise of every measured frequency."""
 MODES = 3
 """Measured with each of the two tools."""
 
@@ -135,16 +135,16 @@ def test_which_spindle_is_to_be_said(shaft: list[int] | None) -> None:
 
 
 class Outcome(NamedTuple):
-    """Of many simulated spindles."""
+    """Results of many simulated spindles."""
 
     inside: dict[str, list[bool]]
-    """Whether the 95 % interval of a stiffness that is not open holds the truth, by group."""
+    """True for each 95 % interval of a closed stiffness that contains the truth, by group."""
     frequency: list[float]
     """Error of f_1 of the third tool, relative."""
     peak: list[float]
     """Error of the largest |H| of the third tool, relative."""
     stated: list[bool]
-    """Whether f_1 of the third tool is within twice its standard error."""
+    """True for each f_1 of the third tool within twice its standard error."""
     failed: int
     """Fits that found nothing."""
 

@@ -1,4 +1,4 @@
-"""The receptance map is the receptance of each spindle in it; nothing moves where a rigid bearing stands."""
+"""Receptance map against the receptance of each spindle; no motion at a rigid bearing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a calibrated bearing stiffness says of the preload, and where it says nothing."""
+"""Preload from a calibrated bearing stiffness, and its limits."""
 
 from __future__ import annotations
 

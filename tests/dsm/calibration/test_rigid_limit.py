@@ -29,12 +29,12 @@ def random_shaft(draw: np.random.Generator) -> Spindle:
 
 
 class Outcome(NamedTuple):
-    """Of many simulated shafts."""
+    """Results of many simulated shafts."""
 
     inside: list[bool]
-    """Whether the interval holds the truth."""
+    """True for each interval that contains the truth."""
     unremarked: list[bool]
-    """The same where there was no remark."""
+    """True for each such interval without a remark."""
     refused: int
     """Frequencies measured above the limit."""
 

@@ -1,4 +1,4 @@
-"""What must hold for every spindle, on random ones."""
+"""Properties of every spindle, on random ones."""
 
 from __future__ import annotations
 

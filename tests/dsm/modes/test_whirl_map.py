@@ -1,4 +1,4 @@
-"""Whirl of a shaft that spins, in the frame that stands still and in the one that turns.
+"""Whirl of a spinning shaft in the fixed and in the rotating frame.
 
 Rigid rotor: G. Genta, Dynamics of Rotating Systems, 2005. Fixed and rotating frame of a round Euler-Bernoulli shaft:
 O. Gaber and S. M. Hashemi, Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, 2015, figure 9.

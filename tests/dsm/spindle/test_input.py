@@ -1,4 +1,4 @@
-"""What the spindle model refuses, and how it says so."""
+"""Invalid input of the spindle model, and its error messages."""
 
 from __future__ import annotations
 

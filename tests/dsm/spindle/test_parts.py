@@ -191,7 +191,7 @@ def test_a_stiff_joint_is_none() -> None:
 
 
 def test_a_hinge_in_the_middle_of_a_symmetric_shaft() -> None:
-    """Of a symmetric shaft: each half ends free (symmetric modes) or pinned (antisymmetric ones)."""
+    """Each half ends free (symmetric modes) or pinned (antisymmetric ones)."""
     ends = [Bearing(0.0, math.inf), Bearing(1.0, math.inf)]
     hinged = Spindle(
         [Segment(1.0, 0.05)], [*ends, Bearing(0.3, 1e7), Bearing(0.7, 1e7)], joints=[Joint(0.5, 1e12, 1e-3)]

@@ -50,7 +50,7 @@ def with_growing(beam: SpinningBeam, count: int, spin: float) -> tuple[NDArray[n
 
 
 def closed_form(planar: Sequence[float], rigidity_yy: float, spin: float) -> list[float]:
-    """Those that last, of EIxx = 1, from the planar ones of EI = 1."""
+    """Return the stable frequencies for EIxx = 1 from the planar ones for EI = 1."""
     squares = []
     for a in np.array(planar) ** 2:
         b = rigidity_yy * a

@@ -1,4 +1,4 @@
-"""The lowest crossing beside flip lobes, and checks that rest on it: against dense scans of the spectral radius."""
+"""Lowest crossing near flip lobes, and dependent checks, against dense scans of the spectral radius."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ DEPTHS = np.geomspace(0.05e-3, 8e-3, 16)[np.newaxis]
 NEAR = 0.2
 """Growth around zero that counts."""
 HARD = (278, 658, 838, 918, 1092, 1436, 1451)
-"""Of 1500 programs some of those in which residuals of the multipliers say least of their errors."""
+"""Numbers of programs (of 1500) whose multiplier residuals are the poorest estimates of their errors."""
 
 
 def program(seed: int) -> MillingRows:

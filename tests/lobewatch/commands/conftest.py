@@ -24,7 +24,7 @@ from lobewatch.verdicts import Advice
 
 
 class Said(NamedTuple):
-    """What a command ends with."""
+    """Result of a command."""
 
     code: int
     out: str
@@ -64,7 +64,7 @@ def trial(run: Run) -> MachineFolder:
 
 
 class Checked(Said):
-    """What `lobewatch check` ends with."""
+    """Result of `lobewatch check`."""
 
     @property
     def programs(self) -> dict[str, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Names and texts of any characters, and what is said of them: exact and valid, or one clear error."""
+"""Names and texts with any characters: output is exact and valid, or one clear error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`lobewatch check`: four words, their doubt, settings that are safe, exit codes."""
+"""`lobewatch check`: verdicts, uncertainty, safe settings, exit codes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lobewatch.verdicts.program_case import cutting_conditions_of
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:

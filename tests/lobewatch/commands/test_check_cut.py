@@ -10,7 +10,7 @@ import pytest
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def test_a_cut_is_judged_without_a_program_as_one(shop: Shop, check: Check, no_search: None) -> None:

@@ -82,7 +82,7 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
 
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SHORT = """
 import time
 from filelock import FileLock
@@ -154,7 +154,7 @@ def test_only_who_was_asked_to_write_waits(
         waited.append(patience)
         return held(lock, patience)
 
-    monkeypatch.setattr(FolderLock, "held", asked)
+    monkeypatch.setattr(FolderLock, "hold", asked)
     name, *options = command
     assert run(name, shop.path, *options).code == 0
     assert waited[0] == patience

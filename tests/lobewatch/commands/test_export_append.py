@@ -18,7 +18,7 @@ from acquisition import DataError
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 KILLED = """
 import os, sys, typer.testing
 from lobewatch.cli import app

@@ -1,4 +1,4 @@
-"""lobewatch export --to: a real PostgreSQL, also one that goes away."""
+"""`lobewatch export --to`: a real PostgreSQL server, also when it disconnects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from lobewatch.show.fleet import export_postgres as table_postgres
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Server = Any
 """PostgreSQL of conftest.py."""
 SECRET = "quite-secret"

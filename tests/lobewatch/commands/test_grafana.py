@@ -24,7 +24,7 @@ from lobewatch.notify.prometheus import METRIC_FAMILIES
 Server = Any
 """PostgreSQL of conftest.py."""
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 BOARD = json.loads((Path(__file__).parents[3] / "docs" / "grafana.json").read_text("utf-8"))
 COLUMNS = {
     "Natural frequency": ["time", "metric", "frequency_hz"],

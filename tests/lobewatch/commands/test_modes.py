@@ -1,4 +1,4 @@
-"""`lobewatch modes`: what is printed and drawn stands where the numbers say."""
+"""`lobewatch modes`: printed text and figures show the right numbers."""
 
 from __future__ import annotations
 

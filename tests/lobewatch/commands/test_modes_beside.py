@@ -1,4 +1,4 @@
-"""`lobewatch modes --beside`: a mode that other measurements of the same structure have too is less in doubt."""
+"""`lobewatch modes --beside`: a mode that other measurements of the structure have, too, is more trusted."""
 
 from __future__ import annotations
 

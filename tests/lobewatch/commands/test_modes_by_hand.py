@@ -17,7 +17,7 @@ from lobewatch.show.terminal.option_names import with_option_names
 from modal import Mode, Trust, assess_trust, synthesize_frf
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 LINES = np.arange(4.0, 4000.0, 4.0)
 MODES = [Mode(900.0, 0.03, 9e7), Mode(1713.0, 0.03, 3.5e7), Mode(2500.0, 0.02, 2e8)]
 

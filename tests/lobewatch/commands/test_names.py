@@ -1,4 +1,4 @@
-"""Names that people give: shown as they are, whatever stands in them, or refused with one clear error."""
+"""Names given by users: shown unchanged, or rejected with one clear error."""
 
 from __future__ import annotations
 

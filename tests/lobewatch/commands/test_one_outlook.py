@@ -1,4 +1,4 @@
-"""Of a machine every channel says the same: light, fall, alarms, and the dates of what is to come."""
+"""Agreement of all outputs on a machine: status, frequency drop, alarms and forecast dates."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from lobewatch.notify.publish_status import make_message_content
 from lobewatch.screen.dashboard_server import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Rows = dict[str, dict[str, Any]]
-"""What `status` says, by machine."""
+"""Output of `status` by machine."""
 MACHINES = 50
 ISO = r"\d{4}-\d{2}-\d{2}"
 SLOTS = [("A", 12900, 1.5), ("B", 8700, 0.4), ("C", 6500, 1.0)]

@@ -16,7 +16,7 @@ from lobewatch.tool.assembly import Assembly
 
 TWO = "teeth = 2\ntool_diameter_mm = 20\nradial_depth_mm = 20"
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

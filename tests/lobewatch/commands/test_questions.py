@@ -36,7 +36,7 @@ depth_mm = 0.2
 
 """
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from lobewatch.show.terminal.option_names import with_option_names
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 F = np.arange(4.0, 4000.0, 4.0)
 
 

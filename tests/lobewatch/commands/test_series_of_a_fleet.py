@@ -1,4 +1,4 @@
-"""What is said with a tap test, and what other machines tell, in the standing of a machine."""
+"""Conditions of tap tests and data of other machines in the status of a machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lobewatch.fleet.summarize import learn_scatter, summarize_machine
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 Run = Callable[..., Any]
 FREQUENCY = 1713.0
 

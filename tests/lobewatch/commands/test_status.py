@@ -17,7 +17,7 @@ from lobewatch.cli import app
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:

@@ -11,7 +11,7 @@ import pytest
 from lobewatch.cli import main
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Machines as they ought not to be: what stands of them, and that none costs the others anything."""
+"""Defective machines: what remains readable, without effect on the other machines."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from lobewatch.monitoring.status_rules import StatusLevel
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def codes(shop: Shop, days: float) -> set[str]:
-    """Of the reasons at a time."""
+    """Return the codes of the reasons at a time."""
     ((_, _, _, dated),) = Fleet({"m": shop.path}).assess_machines(shop.start + timedelta(days=days))
     return {one.code for one in dated.remarks}
 

@@ -1,4 +1,4 @@
-"""Folders that somebody has made to hang or to break what looks at them, beside a good one."""
+"""Hostile folders that could hang or crash a reader, next to a good one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lobewatch.cli import main
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 SPARSE = 200_000_000_000
 PATIENCE = 60
 """Time for one command on one machine (s): a hang is told from a busy computer."""

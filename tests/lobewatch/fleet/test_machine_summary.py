@@ -24,7 +24,7 @@ from lobewatch.machine.verify_files import DAMAGE_CODES
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 PROGRAM = """

@@ -23,7 +23,7 @@ from lobewatch.fleet.summarize import summarize_in_parallel
 from lobewatch.measurement.share_work import Workers
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture(scope="module")

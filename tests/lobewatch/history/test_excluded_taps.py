@@ -1,4 +1,4 @@
-"""What excluded tap tests say: in rows of their own, followed from what was known before them."""
+"""Rows of excluded tap tests, followed from the tests before them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lobewatch.machine.folder_updates import exclude_entry
 from modal import Mode, synthesize_frf
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 LINES = np.arange(4.0, 4000.0, 4.0)
 
 

@@ -1,4 +1,4 @@
-"""The history as columns: limits and words of programs, and what nobody has asked yet."""
+"""Columns of the history: limits and verdicts of programs, and values not computed yet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from lobewatch.history.export_columns import make_export_columns
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: Shop) -> None:

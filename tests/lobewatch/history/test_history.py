@@ -1,4 +1,4 @@
-"""The history on the disk says what was worked out, value by value and in the same units."""
+"""History on disk against computed results, value by value and in the same units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A history of an older version is worked out anew, and what cannot be is kept and said."""
+"""History of an older version: computed again, or kept with a remark."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lobewatch.measurement import Measurement, measure
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 OLDER = "lobewatch 0.0.1"
 
 

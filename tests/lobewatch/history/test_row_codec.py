@@ -1,4 +1,4 @@
-"""Rows decoded where they are asked for are those that were stored; a logbook that goes on is as one opened anew."""
+"""Lazily decoded rows equal the stored ones; an updated logbook equals a newly opened one."""
 
 from __future__ import annotations
 

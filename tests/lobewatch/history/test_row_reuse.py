@@ -1,4 +1,4 @@
-"""After a change in the middle only what builds on it is analysed anew, and all is as if made from the start."""
+"""Changes in mid-history: only dependent rows are analyzed again, with the result of a full analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One bad tap does not block a machine: all is said from the rest, with a remark and the exit code of the rest."""
+"""One bad tap test does not block a machine: results from the rest, with a remark and their exit code."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lobewatch.tap.session import build_outcome
 from lobewatch.verdicts import Stability
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def flip(path: Path) -> None:

@@ -18,7 +18,7 @@ from tests.lobewatch.conftest import START
 
 __all__ = ["run"]
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 WIGGLE = (0.05, -0.05, 0.1, -0.1, 0.0)
 MONTH = 30.0
 LONG_AGO = -1500.0

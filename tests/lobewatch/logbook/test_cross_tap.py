@@ -1,4 +1,4 @@
-"""A cross tap among those in x and in y: it says to which side modes lie, and nothing else is taken from it."""
+"""Cross tap with taps in x and y: determines the rotation of modes, and nothing else."""
 
 from __future__ import annotations
 

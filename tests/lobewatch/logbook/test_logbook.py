@@ -1,4 +1,4 @@
-"""The logbook: every tap test analysed once, readers that disturb nobody, one verdict in every place."""
+"""Logbook: every tap test analyzed once, independent readers, one verdict everywhere."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ depth_mm = 4.55
 
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from lobewatch.verdicts import Stability
 from lobewatch.verdicts.frequency_drop import find_critical_drop, find_tolerable_drop, model_softening
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:
@@ -245,7 +245,7 @@ def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothin
 
 
 def preload_in_trend(shop: Shop) -> list[float] | None:
-    """Of direction x, as `lobewatch trend --json` has it."""
+    """Return the preload in direction x from `lobewatch trend --json`."""
     found: list[float] | None = json.loads(run("trend", shop.path, "--direction", "x", "--json").stdout)["preload_left"]
     return found
 

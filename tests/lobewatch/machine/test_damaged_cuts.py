@@ -1,4 +1,4 @@
-"""Recordings of test cuts damaged in the folder of a machine: named, mended, and what was heard in them counts."""
+"""Damaged recordings of test cuts: reported and repaired, while their evaluation still counts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.verify_files import verify
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
 CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 
@@ -102,7 +102,7 @@ def test_six_hundred_damaged_recordings_are_named_and_mended(heard: Path, tmp_pa
 
 
 def test_a_damaged_recording_alters_nothing_that_is_said(heard: Path) -> None:
-    """What was heard stands in the journal."""
+    """The evaluation is stored in the journal."""
 
     def said() -> list[tuple[int, str]]:
         commands = (["history", "--json"], ["check", "--json"], ["suggest", "--program", "A", "--json"])

@@ -1,4 +1,4 @@
-"""The lock of a machine folder: waited for, and whoever holds it is named."""
+"""Lock of a machine folder: waiting, and the name of its holder."""
 
 from __future__ import annotations
 

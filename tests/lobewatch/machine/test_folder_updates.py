@@ -1,4 +1,4 @@
-"""Test cuts as lines of the journal, their recordings beside the tap tests, and what damage does to them."""
+"""Test cuts as journal lines, their recordings in the folder, and the effects of damage."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from lobewatch.show.history import untapped_remarks
 from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
 CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 
@@ -77,7 +77,7 @@ FEED = ("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
 
 
 def test_the_power_of_a_cut_stands_in_its_line_with_the_kt_that_it_says(shop: Shop) -> None:
-    """Of a slot at 12 900 rpm, 1.5 mm deep: 1.1 times Kt of 1400 N/mm2 and edges of 42 N/mm on half of a turn."""
+    """Slot at 12 900 rpm, 1.5 mm deep: 1.1 times Kt of 1400 N/mm2 and edges of 42 N/mm on half a turn."""
     shop.edit(*FEED)
     rate = 4 * 215 * 1.5e-3 * 0.02
     watts = 1.1 * rate * (1.4e9 * 1e-4 + 42e3 * np.pi / 2)
@@ -279,4 +279,4 @@ def test_what_cannot_be_told_teaches_nothing_and_is_kept(shop: Shop) -> None:
     store_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
     logbook = Logbook.open(shop.path)
     assert logbook.cuts == ()
-    assert len(logbook.files.cuts) == 1
+    assert len(logbook.files.contents.cuts) == 1

@@ -14,7 +14,7 @@ from tests.lobewatch.conftest import Shop
 
 
 def calls_of_verify(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """How often a file is opened, a folder listed, a program started."""
+    """Count opened files, listed folders and started programs."""
     counts = dict.fromkeys(("open", "scandir", "listdir"), 0)
 
     def counted(name: str, real: Any) -> Any:

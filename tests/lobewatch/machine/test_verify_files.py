@@ -1,4 +1,4 @@
-"""Every damage of a machine folder is named, or harmless; and what is said to mend it does."""
+"""Damage to a machine folder: reported or harmless, and repaired by the stated remedy."""
 
 from __future__ import annotations
 

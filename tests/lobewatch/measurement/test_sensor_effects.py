@@ -17,7 +17,7 @@ from lobewatch.measurement.tap_measurement import TapFit, fit_tap
 from modal import Mode, synthesize_frf
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 LINES = np.arange(4.0, 4000.0, 4.0)
 MODES = [Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.03, 6e7)]
 TOML = '[machine]\nname = "m"\n[tap]\n'

@@ -1,4 +1,4 @@
-"""Work shared with a Dask cluster: the same results bit by bit, though a worker is killed in the middle."""
+"""Work shared with a Dask cluster: identical results, even if a worker is killed meanwhile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is not believed is neither followed, calibrated nor used for lobes."""
+"""Rejected modes: neither followed nor calibrated nor used for lobes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What raises an alarm, what closes it, and what begins the watch anew."""
+"""Alarms by change detection: triggered, closed, restarted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a fall is found, and when: printed numbers, a public series, least squares written out, simulated series."""
+"""Detection of drops against printed numbers, a public series, plain least squares and simulated series."""
 
 from __future__ import annotations
 

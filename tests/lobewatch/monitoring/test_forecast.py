@@ -140,7 +140,7 @@ Curve = Callable[[Floats], Floats]
 
 
 def curve_of(kind: str, random: np.random.Generator) -> Curve:
-    """How the fall goes over the share of the history that has passed."""
+    """Return the curve of a drop over the elapsed share of the history."""
     bend, rate = random.uniform(0.2, 0.75), random.uniform(1, 4)
     return {
         "linear": lambda x: x,

@@ -1,4 +1,4 @@
-"""What share of the dates lies in the range of 80 %, over courses that a spindle may take and three ways to tap it."""
+"""Coverage of 80 % forecast ranges over possible trends and three kinds of measurement."""
 
 from __future__ import annotations
 

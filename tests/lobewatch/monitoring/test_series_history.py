@@ -1,4 +1,4 @@
-"""Where a series starts: below eight points at the highest of its first three."""
+"""Start of a series: below eight points the highest of its first three."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ LONG = 60
 
 
 class Mails(socketserver.StreamRequestHandler):
-    """As much of SMTP (RFC 5321) as taking mails needs."""
+    """SMTP server (RFC 5321) that can only receive mails."""
 
     def handle(self) -> None:
         server: Any = self.server

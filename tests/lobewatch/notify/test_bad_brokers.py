@@ -1,4 +1,4 @@
-"""Brokers that do not do their part: a command ends soon, says one sentence for each, and keeps what was not sent."""
+"""Faulty brokers: a command ends soon with one sentence for each, and keeps unsent messages."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from lobewatch.notify import mqtt
 from tests.lobewatch.notify.conftest import Mosquitto, received, run
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A broker whose certificate is of the plant's own authority, as docs/alarms.md says."""
+"""Broker with a certificate of the factory's own authority, as in docs/alarms.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standings for Prometheus: its own check of the text, and a real one that fires a rule."""
+"""Machine status for Prometheus: checked by promtool, and by a real server with a rule."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lobewatch.cli import app
 from lobewatch.screen import DashboardServer
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 PROMETHEUS, PROMTOOL = shutil.which("prometheus"), shutil.which("promtool")
 pytestmark = pytest.mark.skipif(
     not (PROMETHEUS and PROMTOOL) and "CI" not in os.environ, reason="prometheus is not installed"

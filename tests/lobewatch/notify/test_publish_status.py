@@ -1,4 +1,4 @@
-"""What is told again and what is not, and that a failure is told too: a real broker, machines that break."""
+"""Publishing on changes only, with failures included: a real broker, machines that break."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from tests.lobewatch.notify.conftest import Mosquitto, received, run
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The paper's element as printed, beside the element of dsm, which is checked against 60 digits of the right form."""
+"""Element as printed in the paper, against the element of dsm, which is checked to 60 digits."""
 
 from __future__ import annotations
 

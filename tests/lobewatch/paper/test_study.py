@@ -1,4 +1,4 @@
-"""What is compared with the paper: numbers that were measured before and by other means, and what follows from them."""
+"""Comparison with the paper against numbers measured earlier by other means."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_the_curve_of_figure_8_is_that_of_the_frequencies(study: PaperStudy) -> 
 
 
 def test_the_words_on_claims_follow_from_the_numbers(study: PaperStudy) -> None:
-    """What makes a claim fail or hold, asked of the numbers once more."""
+    """Check the condition of each claim on the numbers again."""
     words = [claim.verdict for claim in study.claims]
     assert words == ["fails", "holds", "holds in part", "holds in part", "fails", "holds", "holds in part"]
     assert study.meshes.at("linear") < study.plain.rigid_frequency < printed.FEM_FREQUENCY

@@ -1,4 +1,4 @@
-"""What several tests of the screen share: a page in a real browser."""
+"""Fixtures of the screen tests: a page in a real browser."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ class Browser:
         return [error for error in errors if "ERR_CONNECTION_REFUSED" not in error]
 
     def requested(self) -> set[str]:
-        """Where requests went to."""
+        """Addresses of all requests."""
         messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
         sent = [
             m["params"] for m in messages if m["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated")

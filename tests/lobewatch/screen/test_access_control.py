@@ -1,4 +1,4 @@
-"""Who knocks at the screen without end: what it may hold, and that a test goes on meanwhile."""
+"""Flood of connections to the screen: bounded, while a test continues."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def port_of(server: ScreenServer) -> int:
 
 
 def is_answered(server: ScreenServer) -> bool:
-    """Whether a page with the token is let in."""
+    """Return whether a page with the token is served."""
     connection = http.client.HTTPConnection("127.0.0.1", port_of(server), timeout=60)
     with contextlib.closing(connection):
         connection.request("GET", "/access", headers={"Authorization": f"Bearer {server.token}"})
@@ -75,7 +75,7 @@ async def next_state(feed: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
 
 @contextlib.asynccontextmanager
 async def feed_of(server: ScreenServer) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
-    """As the page opens it."""
+    """Open the live feed as the page does."""
     headers, protocols = {"Origin": server.origin}, ("lobewatch", f"token.{server.token}")
     async with (
         aiohttp.ClientSession() as client,

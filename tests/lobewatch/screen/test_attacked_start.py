@@ -86,13 +86,13 @@ def head(server: WebServerThread) -> bytes:
 
 
 def is_refused(answer: tuple[int, Any], *statuses: int) -> bool:
-    """Whether that is one sentence with such a status."""
+    """Return whether the answer is one sentence with one of these statuses."""
     status, content = answer
     return status in statuses and set(content) == {"error"} and 0 < len(content["error"]) < 300
 
 
 def begins(server: DashboardServer) -> bool:
-    """Whether a test has ever begun on the machine."""
+    """Return whether a test has ever started on the machine."""
     return ask(server, "GET", "/tap/mill/access")[0] != 404
 
 

@@ -84,7 +84,7 @@ def test_escape_stops_only_when_pressed_twice(browser: Browser, session: Session
 
 
 def sounded(browser: Browser, tones: list[float]) -> bool:
-    """Whether these and no other tones (Hz) were played."""
+    """Return whether exactly these tones (Hz) were played."""
     return bool(browser.ask("tones") == tones)
 
 

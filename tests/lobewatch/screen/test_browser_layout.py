@@ -1,4 +1,4 @@
-"""What can be seen of the screen in a real browser: sizes, contrast, curves, and by those who cannot see it."""
+"""Layout of the screen in a real browser: sizes, contrast, curves and accessibility."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIZES = ((1280, 800), (1920, 1080), (820, 1180))
 ESSENTIALS = ("text", "good", "reason", "undo", "mute", "stop", "frf", "coherence", "force", "change", "taken")
 EXTENT = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
 COLOURS = "['color', 'backgroundColor'].map((name) => getComputedStyle(document.querySelector('%s'))[name])"
-"""Of a part of the page: its letters and what is below them."""
+"""Text color and background of a part of the page."""
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Session = Any
@@ -91,7 +91,7 @@ def test_no_caption_of_a_curve_is_cut_off_on_a_telephone(
 
 
 def contrast(*colours: str) -> float:
-    """Of WCAG 2.2, from two CSS colours rgb(r, g, b)."""
+    """Return the WCAG 2.2 contrast of two CSS colors rgb(r, g, b)."""
     lights = []
     for colour in colours:
         shares = [int(part) / 255 for part in colour.partition("(")[2].rstrip(")").split(",")[:3]]
@@ -131,7 +131,7 @@ def test_the_curves_are_drawn(browser: Browser, session: Session, server: Screen
 
 
 def middle(browser: Browser, part: str) -> tuple[float, float]:
-    """Where a part of the drawing is (dots, y upwards)."""
+    """Return the center of a part of the drawing (pixels, y upwards)."""
     script = f"(({{ x, y, width, height }}) => [x + width / 2, -y - height / 2])({part}.getBoundingClientRect())"
     x, y = browser.ask(script.replace(part, f"document.querySelector('#guide {part}')"))
     return x, y

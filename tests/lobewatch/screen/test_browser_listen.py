@@ -47,13 +47,13 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def listen() -> None:
-    """As at the terminal."""
+    """Run `lobewatch listen` as in a terminal."""
     with contextlib.suppress(SystemExit):
         main()
 
 
 def collected(told: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """All that has been printed to stderr."""
+    """Return all output to stderr so far."""
     told.append(capsys.readouterr().err)
     return "".join(told)
 

@@ -26,7 +26,7 @@ from lobewatch.show.terminal.output import format_csv
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 DEMO = Path(__file__).parents[2] / "data" / "demo"
 STYLE = files("lobewatch.show.report") / "static" / "report.css"
 MARKS = ("0, 158, 115", "160, 0, 0")
@@ -36,7 +36,7 @@ const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.h
 let count = 0;
 for (let i = 0; i < pixels.length; i += 4) count += pixels[i] === r && pixels[i + 1] === g && pixels[i + 2] === b;
 return count; })()"""
-"""How many pixels of the slider's diagram have this colour."""
+"""Number of pixels of this color in the slider's diagram."""
 BREAKS = """(() => {
   const kept = (one, name) => getComputedStyle(one)[name].includes("avoid");
   const loose = [...document.querySelectorAll("h2")].filter((one) => !kept(one.parentElement, "breakInside"));
@@ -77,13 +77,13 @@ CELLS = """[...document.querySelectorAll("tbody tr")].filter((row) => row.closes
     return [heads[cell.cellIndex], cell.textContent, before, left, right, top >= above.bottom];
   });
 })"""
-"""Of each cell but the first of its row: the heading of its column, its text, what stands before it, where it is."""
+"""Column heading, text, preceding text and position of each cell but the first of its row."""
 HIDDEN = """[...document.querySelector("tbody tr").querySelectorAll("div")]
   .reduce((sum, one) => sum + one.scrollHeight - one.clientHeight, 0)"""
 """Height of what the first line does not show (px)."""
 TURNED = """[...document.querySelectorAll("figure svg")]
   .map((one) => [getComputedStyle(one).filter, !!one.querySelector("image")])"""
-"""Of each picture: how its colours are turned, and whether it is a map."""
+"""Color filter of each picture, and whether it is a map."""
 SAVED = """(() => {
   const saved = [], made = URL.createObjectURL;
   URL.createObjectURL = (blob) => { saved.push(blob.text()); return made.call(URL, blob); };
@@ -108,7 +108,7 @@ NAMES = [
     "a=b",
     "ä",
 ]
-"""Of machines; some of them would run in a spreadsheet."""
+"""Machine names, some of which a spreadsheet would run as formulas."""
 
 
 def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser: Browser, shop: Shop) -> None:
@@ -161,7 +161,7 @@ def test_the_slider_marks_the_test_cuts_known_at_each_test(browser: Browser, sho
 
 @pytest.fixture(scope="module")
 def reports(new_shop: Callable[[Path], Shop], tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Of a machine that falls, with a program, a forecast and a course of its lobes; and of all of a folder."""
+    """Return reports of a machine with a drop, program, forecast and lobe history, and of a folder of machines."""
     path = tmp_path_factory.mktemp("plant")
     shop = new_shop(path / "m")
     shop.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200")

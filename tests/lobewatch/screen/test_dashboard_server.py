@@ -1,4 +1,4 @@
-"""lobewatch serve: what it says of machines, and the tap test that its button starts."""
+"""`lobewatch serve`: machine data, and the tap test that its button starts."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def tap(folder: MachineFolder, stiffness: float, when: datetime, direction: TapD
 
 
 def ask(server: DashboardServer, method: str, path: str, body: object = None, token: str = "") -> tuple[int, Any]:
-    """As the page asks."""
+    """Send a request as the page does."""
     connection = http.client.HTTPConnection(server.origin.removeprefix("http://"), timeout=60)
     headers = {"Origin": server.origin, "Authorization": f"Bearer {token or server.token}"}
     connection.request(method, path, json.dumps(body), headers)
@@ -257,7 +257,7 @@ def test_a_page_that_has_watched_a_test_to_its_end_sees_the_next(
 ) -> None:
     """Also where START is pressed before the thread of the failed test has ended."""
     machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
-    monkeypatch.setattr("lobewatch.screen.dashboard_server.release_memory", lambda: time.sleep(0.3))
+    monkeypatch.setattr("lobewatch.screen.dashboard_server._release_memory", lambda: time.sleep(0.3))
 
     async def titles(server: DashboardServer) -> list[str]:
         found: list[str] = []

@@ -1,4 +1,4 @@
-"""What a page of many machines is sent: all of it once, then what has changed."""
+"""Updates of the dashboard table: all machines first, then changes only."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lobewatch.screen import dashboard_table as board
 from tests.lobewatch.screen.test_dashboard_server import ask
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.fixture(autouse=True)

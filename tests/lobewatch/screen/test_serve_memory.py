@@ -1,4 +1,4 @@
-"""What a server that runs for months keeps: no more memory with every tap test, one test and one report a machine."""
+"""Memory of a server over months: constant with tap tests, one test and one report per machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The screen's server: who is let in, what is sent, and that a slow page holds nobody up."""
+"""Web server of the screen: access, sent data, and no delay by slow pages."""
 
 from __future__ import annotations
 

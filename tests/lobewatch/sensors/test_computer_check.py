@@ -1,4 +1,4 @@
-"""lobewatch doctor: what of a computer stands in the way, told with its cure."""
+"""`lobewatch doctor`: obstacles on a computer, each with its remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A tool as tap tests tell it: what is not known of a direction, and why."""
+"""Tool assembled from tap tests, and the reasons for unknown directions."""
 
 from __future__ import annotations
 

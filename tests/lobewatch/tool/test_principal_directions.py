@@ -1,4 +1,4 @@
-"""Along which axes modes are taken to lie, by taps in x, in y and across."""
+"""Principal directions of modes from taps in x, in y and cross taps."""
 
 from __future__ import annotations
 

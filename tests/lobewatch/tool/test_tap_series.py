@@ -19,7 +19,7 @@ from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 WARM = Conditions(stick_out_mm=80.0, state="warm")
 
 

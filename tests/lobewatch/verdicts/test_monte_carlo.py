@@ -1,4 +1,4 @@
-"""What the word on a program rests on: a cut that is stable in the middle with much to spare may chatter in a draw."""
+"""Monte Carlo basis of verdicts: a stable median with much margin may still chatter in a sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A program in all that it is to the spindle: engagements, feeds, wear, thin walls, what it does not say."""
+"""Program as the spindle sees it: engagements, feed directions, wear, thin walls, missing keys."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nothing that a tool does not bear is advised, by `check`, `lobes` or `suggest`; a program outside is remarked."""
+"""Tool limits in `check`, `lobes` and `suggest`: nothing beyond is recommended, programs beyond get a remark."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lobewatch.verdicts.recommendation import find_stable_pockets
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 CARBIDE = '[[tool]]\nname = "reference"\ntool_material = "carbide"\n'
 KT_AND_KR = "tangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 500"
 COATED = CARBIDE.replace("carbide", "coated carbide")

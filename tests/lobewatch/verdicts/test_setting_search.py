@@ -1,4 +1,4 @@
-"""The search for settings: what it passes over to be fast is not what decides, and it looks beside what is likely."""
+"""Setting search: shortcuts do not change results, and neighbors of likely settings are searched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws that test cuts have left are the middle times what each of them differs by."""
+"""Samples left by test cuts are the mean times the factors of each."""
 
 from __future__ import annotations
 

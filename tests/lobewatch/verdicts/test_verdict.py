@@ -1,4 +1,4 @@
-"""The verdict over its doubt: what widens it, what settles it, predicted tools beside tapped ones, decay left."""
+"""Verdict and its uncertainty: causes, remedies, predicted and tapped tools, frequency margin."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softeni
 from lobewatch.verdicts.program_case import build_program
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 TWIN = """
 [[tool]]
 name = "twin"

@@ -1,4 +1,4 @@
-"""Zero order of many spindles at once: beside lobes.zero_order, and beyond the limit beside semi-discretisation."""
+"""Zero-order approximation of many spindles, against lobes.zero_order and semi-discretization."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def drifting(random: np.random.Generator) -> Frf:
 
 
 def followed(count: int, seed: int) -> tuple[int, list[Mode]]:
-    """How often the true mode is the one to follow, and what is followed instead."""
+    """Return how often the true mode is followed, and the modes followed instead."""
     random, right, wrong = np.random.default_rng(seed), 0, list[Mode]()
     for _ in range(count):
         mode = predominant_mode(select_credible_modes(fit_modes(drifting(random))).modes)

@@ -20,7 +20,7 @@ LEVEL = 0.03
 FRFS, LEAST = 400, {0.0: 0.92, 0.001: 0.9}
 """FRFs, and the share of the intervals that hold the truth, at least, by the white floor under the noise."""
 FEW_FRFS, LEAST_OF_FEW = 100, 0.87
-"""Of so few the share of the intervals that hold the truth has a standard error of 0.022."""
+"""Number of FRFs, and smallest share of intervals with the truth; its standard error is 0.022."""
 
 
 def measured(truth: list[Mode], seed: int, floor: float = 0.0) -> Frf:
@@ -35,7 +35,7 @@ def measured(truth: list[Mode], seed: int, floor: float = 0.0) -> Frf:
 
 
 def are_held(mode: Mode, truth: Mode) -> NDArray[np.bool_]:
-    """Whether the 95 % intervals of f, zeta and K hold the truth."""
+    """Return whether the 95 % intervals of f, zeta and K contain the truth."""
     value = np.array([truth.frequency, truth.damping_ratio, truth.stiffness])
     low, high = mode.interval(0.95).T
     return np.asarray((low < value) & (value < high))

@@ -74,7 +74,7 @@ def dense(seed: int) -> tuple[list[Mode], Frf]:
 
 
 def stands_alone(mode: Mode, modes: list[Mode]) -> bool:
-    """Whether its half-power band touches that of no other."""
+    """Return whether its half-power band is apart from those of all others."""
     reach = [mode.damping_ratio * mode.frequency + other.damping_ratio * other.frequency for other in modes]
     distance = [abs(other.frequency - mode.frequency) for other in modes]
     return sum(apart < near for apart, near in zip(distance, reach, strict=True)) == 1
@@ -83,7 +83,7 @@ def stands_alone(mode: Mode, modes: list[Mode]) -> bool:
 @pytest.mark.long
 @pytest.mark.timeout(900)
 def test_95_percent_intervals_hold_the_truth_among_modes_that_are_not_fitted() -> None:
-    """Of modes that stand alone; a mode found in place of two has no true value of its own."""
+    """Only separate modes count, as a mode fitted in place of two has no true value."""
     held: dict[Trust, list[NDArray[np.bool_]]] = {trust: [] for trust in Trust}
     for seed in range(40):
         modes, frf = dense(seed)

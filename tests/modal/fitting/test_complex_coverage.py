@@ -30,7 +30,7 @@ def structure(phase: float, neighbour: bool) -> list[Mode]:
 
 
 def are_held(mode: Mode, truth: Mode) -> NDArray[np.bool_]:
-    """Whether the 95 % intervals of f, zeta, K and phase hold the truth."""
+    """Return whether the 95 % intervals of f, zeta, K and phase contain the truth."""
     error = np.append(mode.standard_error, mode.phase_deg_std)
     off = [
         getattr(mode, name) - getattr(truth, name) for name in ("frequency", "damping_ratio", "stiffness", "phase_deg")

@@ -1,4 +1,4 @@
-"""Modes that decay alike, as under an exponential window."""
+"""Modes with a common decay rate, as under an exponential window."""
 
 from __future__ import annotations
 

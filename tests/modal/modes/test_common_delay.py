@@ -1,4 +1,4 @@
-"""A delay between the channels turns all modal constants alike; complex modes do not."""
+"""A channel delay rotates all modal constants consistently; complex modes do not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speaks against a mode is said with the mode."""
+"""Remarks on modes by their quality."""
 
 from __future__ import annotations
 

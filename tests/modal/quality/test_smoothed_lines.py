@@ -1,4 +1,4 @@
-"""Lines that an analyser has smoothed: seen by their noise, and said of narrow modes."""
+"""Lines smoothed by an analyzer: detected by their noise, and remarked for narrow modes."""
 
 from __future__ import annotations
 

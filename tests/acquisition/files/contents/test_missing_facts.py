@@ -1,4 +1,4 @@
-"""What a file does not say is asked for in one message, by the name of the option, and never guessed."""
+"""Missing facts of a file: requested in one message by option name, never guessed."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def saved(variables: dict[str, Any], **options: Any) -> bytes:
 
 
 def hdf5(variables: dict[str, Any]) -> bytes:
-    """As MATLAB -v7.3 writes it: a header of 512 bytes, then HDF5, text as codes, cells as references."""
+    """Return a MATLAB -v7.3 file: a header of 512 bytes, then HDF5, text as codes, cells as references."""
     content = io.BytesIO()
     with h5py.File(content, "w", userblock_size=512) as file:
         for name, value in variables.items():
@@ -58,7 +58,7 @@ def hdf5(variables: dict[str, Any]) -> bytes:
 
 
 def sound_files() -> dict[str, bytes]:
-    """Those of other programs that are at hand, our own, and one of each version and layout."""
+    """Return sound files: available third-party files, our own, and one of each version and layout."""
     files = {path.name: path.read_bytes() for path in sorted(DATA.glob("*/*.mat"))}
     generator = np.random.default_rng(1)
     hits = [Hit(generator.normal(size=60), generator.normal(size=60), 1000.0) for _ in range(3)]
@@ -125,10 +125,10 @@ for line in sys.stdin:
         command, pipe = [sys.executable, "-Wignore", "-c", self.SERVER], subprocess.PIPE
         self._server = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
         self.ended_by: Counter[str] = Counter()
-        """How often readers ended by a signal."""
+        """Number of reader processes ended by each signal."""
 
     def run_apart(self, _module: str, path: str, **_: float) -> bytes:
-        """As acquisition.apart.run_apart."""
+        """Run a reader as `run_in_subprocess` does."""
         assert self._server.stdin is not None
         assert self._server.stdout is not None
         self._server.stdin.write(f"{path}\n")
@@ -184,7 +184,7 @@ def test_five_thousand_damaged_files_are_read_or_refused(tmp_path: Path, forks: 
 
 
 def test_a_file_that_would_be_read_for_hours_is_refused_after_seconds(tmp_path: Path) -> None:
-    """Of a struct without fields, which take no bytes, a length tells scipy to make three million."""
+    """The length of a struct without fields, which need no bytes, makes scipy create three million."""
     content = bytearray(saved({"c": {"x": np.array([[{}]], dtype=object)}}))
     at = content.rindex(struct.pack("<4i", 5, 8, 1, 1)) + 8  # behind the tag of the dimensions of the innermost
     content[at : at + 4] = struct.pack("<i", 3_000_000)

@@ -87,7 +87,7 @@ def test_text_of_signalcalc(tmp_path: Path) -> None:
 
 
 def pulse(header: dict[str, str], *blocks: str) -> str:
-    """As PULSE exports it; the real ones have more keys, and empty lines of blanks among them."""
+    """Return text as exported by PULSE; real files have more keys, and blank lines among them."""
     keys = "".join(f"{key}:\t{value}\t \r\n \t \r\n" for key, value in header.items())
     head = "Z-index:\t \t{}\r\nDate:\t \t24/05/2019\r\nTime:\t \t18:23:06:464\r\nZ-axis:\t \t 0.0\r\n"
     return f"Header Size:\t 79\t \r\n{keys}" + "".join(head.format(i) + block for i, block in enumerate(blocks, 1))

@@ -1,4 +1,4 @@
-"""How programs of several countries and makers write names, units, levels, notes and tables beneath each other."""
+"""Names, units, levels, notes and stacked tables as written by software of several countries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`lobewatch lobes`: methods, the band of the doubt, pictures."""
+"""`lobewatch lobes`: methods, uncertainty band, figures."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_methods_and_shifts(run: Run, folder: MachineFolder) -> None:
 
 
 def relative_width(folder: MachineFolder) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Of the band around the line of the reference cut, at each speed."""
+    """Return the relative width of the band around the line of the reference cut, at each speed."""
     assembly = Logbook(folder).assembly()
     line = compute_lobes(assembly, folder.machine)["reference cut"]
     band = compute_limit_band(line, "reference cut", assembly, folder.machine)

@@ -1,4 +1,4 @@
-"""Words on cuts made of sines: what turns with the spindle, what was there before, chatter, and what cannot be told."""
+"""Verdicts on cuts made of sines: spindle harmonics, air, chatter, and cases without a verdict."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RATE = 25600.0
 SPEED = 12077.0
 """The true one (rpm)."""
 SET = 12000.0
-"""What was set."""
+"""Commanded speed (rpm)."""
 TURN = SPEED / 60
 FOREIGN = ((3333.3, 2.0), (717.0, 1.0), (100.0, 0.5))
 AIR, CUT, AFTER = 0.5, 1.2, 0.3

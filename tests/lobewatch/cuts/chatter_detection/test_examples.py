@@ -1,4 +1,4 @@
-"""The examples of the functions that take arrays, as they stand in their docstrings."""
+"""Docstring examples of the functions that take arrays."""
 
 from __future__ import annotations
 

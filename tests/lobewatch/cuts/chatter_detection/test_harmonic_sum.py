@@ -1,4 +1,4 @@
-"""Combs of multiples that are too weak to stand clear of noise one by one, in signals made by hand."""
+"""Combs of harmonics that are individually below the noise, in synthetic signals."""
 
 from __future__ import annotations
 

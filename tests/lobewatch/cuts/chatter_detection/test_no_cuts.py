@@ -1,4 +1,4 @@
-"""What is no plain cut: music, two spindles, a ramp of the speed, interrupted cuts, hum, coolant; no false word."""
+"""Recordings without a plain cut: music, two spindles, speed ramps, interrupted cuts, hum, coolant."""
 
 from __future__ import annotations
 

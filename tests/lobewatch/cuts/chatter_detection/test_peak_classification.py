@@ -1,4 +1,4 @@
-"""Where lines come from, on spectra made by hand."""
+"""Origin of spectral peaks, on synthetic spectra."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often listening is right, on cuts of a simulation that knows nothing of it: words, frequency, speed.
+"""Accuracy of chatter detection on cuts of an independent simulation: verdict, frequency, speed.
 
 Truth: what the tip itself does in the simulation. Run-out keeps teeth out of the cut, so that the limit by
 semi-discretisation, from which depths are drawn, is not that of the simulation: a cut is near its own limit, and left
@@ -76,7 +76,7 @@ class Case:
 
 
 class TipRecord(NamedTuple):
-    """How the tip moves in a cut."""
+    """Motion of the tip in a cut."""
 
     frequency: float
     """Frequency of the loudest displacement that does not turn with the spindle (Hz)."""
@@ -86,7 +86,7 @@ class TipRecord(NamedTuple):
     """Displacement over depth."""
 
     def chatters(self, quiet: TipRecord) -> bool:
-        """Whether it chatters, beside one that does not."""
+        """Return whether it chatters, compared with one that does not."""
         return self.beside > CHATTERS or self.per_depth > LOCKED * quiet.per_depth
 
 
@@ -128,7 +128,7 @@ def cases(random: Random, count: int) -> Iterator[Case]:
 
 
 def tip_record(motion: TipMotion, turn: float, depth: float) -> TipRecord:
-    """How the tip moves; turn in Hz."""
+    """Record the motion of the tip; `turn` in Hz."""
     rate = motion.sample_rate
     first = round((PASSAGE.before + PASSAGE.ramp + 0.3 * PASSAGE.steady) * rate)
     last = round((PASSAGE.before + PASSAGE.ramp + PASSAGE.steady) * rate)
@@ -150,7 +150,7 @@ def listen(signal: NDArray[Any], case: Case, rate: float, random: Random) -> Cut
 
 @dataclass
 class Tally:
-    """How often the words are right."""
+    """Counts of right verdicts."""
 
     words: Counter[str] = field(default_factory=Counter)
     """By what the tip does: right, wrong, not told, near the limit."""
@@ -204,7 +204,7 @@ def judge(seed: int, count: int, tally: Tally) -> None:
 
 
 def share_right(words: Counter[str]) -> float:
-    """Of those that are told."""
+    """Return the share of right verdicts."""
     return words["right"] / (words["right"] + words["wrong"])
 
 

@@ -1,4 +1,4 @@
-"""How much a speed wavers, on signals in which it is known."""
+"""Speed variation, on signals with known variation."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_steady_spindle_wavers_by_what_every_spindle_does_and_none_by_more_tha
 
 
 def test_lines_that_lie_too_far_from_multiples_are_not_taken_for_them() -> None:
-    """Those of a shaft that turns 0.15 % faster, louder than the multiples, up to 2 % of order 28."""
+    """Peaks of a shaft that turns 0.15 % faster, louder than the multiples, up to 2 % of order 28."""
     shaft = {1.0015 * TURN * order: 30.0 for order in range(21, 29) if order % 4}
     assert wavers(np.zeros_like, shaft) == LEAST
 

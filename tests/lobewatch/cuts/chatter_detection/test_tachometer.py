@@ -1,4 +1,4 @@
-"""A tachometer beside a cut: it is followed where the lines allow it, and contradicted where they do not."""
+"""Tachometer with a cut: used if the spectrum allows it, else contradicted."""
 
 from __future__ import annotations
 

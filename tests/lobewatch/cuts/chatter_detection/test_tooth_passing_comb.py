@@ -35,14 +35,14 @@ def test_a_comb_further_away_is_none() -> None:
 
 
 def test_three_multiples_are_a_comb_and_two_are_none() -> None:
-    """Of tooth passing; three of the turns may be chance."""
+    """Multiples of tooth passing; three multiples of the spindle frequency may be chance."""
     assert comb_of([k * TURN for k in (4, 8, 12)]) == pytest.approx(TURN, rel=1e-9)
     assert np.isnan(comb_of([k * TURN for k in (3, 8, 13)]))
     assert np.isnan(comb_of([k * TURN for k in (4, 8)]))
 
 
 def test_lines_anywhere_are_no_comb() -> None:
-    """Of 200 sets of 12 lines none: a comb of chance is rarer than one in ten thousand."""
+    """None in 200 sets of 12 random peaks: a comb by chance is rarer than one in ten thousand."""
     random = np.random.default_rng(3)
     assert all(np.isnan(comb_of(random.uniform(200, 9000, 12))) for _ in range(200))
 
@@ -82,7 +82,7 @@ def swelling(random: np.random.Generator, rate: float, turn: float) -> Floats:
 
 
 def test_the_slopes_of_two_strong_lines_are_no_spindle() -> None:
-    """As on machines; by the distances of all peaks alone 8 of 30 are not found."""
+    """As on machines; by the distances of all peaks only, 8 of 30 are not found."""
     rate, turn = 1650.0, 66.65
     speeds = []
     for seed in range(30):

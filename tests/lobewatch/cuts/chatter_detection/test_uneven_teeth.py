@@ -1,4 +1,4 @@
-"""Cutters of unequal pitch are heard by the orders of the spindle, not by tooth passing alone."""
+"""Cutters of unequal pitch, detected by spindle orders and not only by tooth passing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spindle, a slot and a doubt that the tests of the learning share."""
+"""Spindle, slot and uncertainty shared by the learning tests."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Mill:
         return replace(self.cut, tangential=self.force * self.cut.tangential, radial=self.force * self.cut.radial)
 
     def multiplier(self, speed: float, depth: float) -> complex:
-        """Of the spindle that turns, by semi-discretisation."""
+        """Return the multiplier of the rotating spindle by semi-discretization."""
         x, y = self.turning
         rows = rows_at_speeds(build_milling_system([x], [y]), self.pushed, np.array([speed]))
         return complex(largest_multipliers(rows, np.array([[depth]]), count_pieces(rows, depth))[0, 0])
@@ -82,13 +82,13 @@ class Mill:
         return CutEvidence(self.cut, speed, depth, "chatter", float(family[np.argmin(near)]))
 
     def chatter(self, speed: float) -> CutEvidence:
-        """Of a slot a tenth deeper than its limit."""
+        """Return evidence of a slot a tenth deeper than its limit."""
         x, y = self.turning
         return self.hear(speed, 1.1 * float(zero_order_lobes([x], [y], self.pushed, [speed]).depth[0]))
 
 
 def doubt() -> Uncertainty:
-    """Of a tap test without errors; 20 % of the coefficients."""
+    """Return the uncertainty of a tap test without errors, with 20 % for the coefficients."""
     return Uncertainty(
         {"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, FactorRange(0.8, 1.2), FactorRange(0.8, 1.2)
     )

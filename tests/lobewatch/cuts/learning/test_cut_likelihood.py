@@ -1,4 +1,4 @@
-"""The likelihood of what was heard, in closed form where what each spindle would do is given."""
+"""Likelihood of recorded cuts, in closed form for given predictions."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_words_t
 
 @pytest.mark.parametrize("depth", [0.9, 0.97, 1.0, 1.1])
 def test_the_same_cut_made_twice_has_one_truth(depth: float) -> None:
-    """Of two words that differ one is wrong, however near the limit: stable with 3 %, or chatter untold with 6 %."""
+    """One of two contrary labels is wrong, even near the limit: stable 3 %, chatter without frequency 6 %."""
     prediction = predicted(0.0, 0.0, math.log(depth))
     chatter, stable = replace(CHATTER, frequency=math.nan), replace(CHATTER, verdict="stable", frequency=math.nan)
     chance = ndtr(math.log(depth) / 0.05)
@@ -175,7 +175,7 @@ def test_a_speed_that_was_not_found_is_as_far_off_as_the_doubt_of_the_machine_sa
 
 
 def test_an_old_cut_was_made_with_a_frequency_that_was_higher(mill: Mill) -> None:
-    """As of a spindle whose modes are 3 % higher."""
+    """The result is that of a spindle with modes 3 % higher."""
     stiff = Mill(x=mill.x.scaled(1.03, 1.0, ""), y=mill.y.scaled(1.03, 1.0, ""))
     cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")
     old = predict_cut(replace(cut, frequency_ratio=1.03), middle(mill)).excess[0]

@@ -1,4 +1,4 @@
-"""What five suggested cuts find on spindles whose truth at speed is hidden, judged by a simulation in time.
+"""Results of five suggested cuts on spindles with hidden truth, evaluated by time-domain simulation.
 
 The judge (`acquisition.emulation.simulate_cuts`: chips, surfaces that teeth have left, loss of contact) shares no code
 with `lobes/`. Truths: docs/cuts.md; spindles of 800 to 2500 Hz with one mode in each direction, slots of four teeth,
@@ -48,7 +48,7 @@ class Hidden:
     frequency: float | None = None
     """At speed over that at rest, in both directions; None: drawn."""
     reads_power: bool = False
-    """Whether the power of each cut is read."""
+    """True if the power of each cut is read."""
     cuts: list[CutEvidence] = field(default_factory=list)
     share: list[float] = field(default_factory=list)
     """Largest removal rate heard stable over the optimum, after each cut."""

@@ -1,4 +1,4 @@
-"""What the power of cuts teaches, against integration by brute force over the error that all readings share."""
+"""Learning from the power of cuts, against brute-force integration over the common error of all readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cuts contradict what was learnt, at the edges of chance, and what is said of them."""
+"""Cuts that contradict the learned model, at the limits of chance, and their remarks."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def evidence(cut: CutEvidence, share: float, base: float = 150.0) -> NewEvidence
 
 @pytest.mark.parametrize(("share", "is_odd"), [(0.029, True), (0.031, False)])
 def test_a_cut_is_not_believed_where_all_else_gives_it_less_than_it_is_to_be_wrong(share: float, is_odd: bool) -> None:
-    """Of weights that have learnt from the cut: 3 % of the weight before make half of that after."""
+    """With weights learned from the cut: 3 % of the weight before it are half of that after it."""
     without = replace(CHATTER, frequency=math.nan)
     after = share * 0.97 / (share * 0.97 + (1 - share) * 0.03)
     chatters, stable = find_contradiction(evidence(without, after)), find_contradiction(evidence(STABLE, 1 - after))

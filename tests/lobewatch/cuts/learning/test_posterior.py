@@ -1,4 +1,4 @@
-"""What cuts teach: the right way, of the right number, and no more than they say."""
+"""Learning from cuts: right direction, right size, and no more than the evidence."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
 
 
 def test_intervals_hold_95_percent_of_the_weight() -> None:
-    """Of 700 draws of which half have ten times the weight, against the weighted distribution itself."""
+    """For 700 samples of which half have ten times the weight, against the weighted distribution itself."""
     log_weight = np.where(np.arange(700) % 2 == 0, 0.0, np.log(10.0))
     learnt = replace(Mill().prior, log_weight=log_weight)
     values, interval = learnt.samples.ratios()["tangential"], learnt.intervals["tangential"]

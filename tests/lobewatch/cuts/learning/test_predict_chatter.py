@@ -1,4 +1,4 @@
-"""What a cut should sound like, against its limit and the chatter frequency there."""
+"""Predicted chatter of a cut, against its limit and the chatter frequency there."""
 
 from __future__ import annotations
 

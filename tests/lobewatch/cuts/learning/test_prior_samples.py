@@ -1,4 +1,4 @@
-"""The prior in closed form: what a draw of one standard deviation is, and what its rows cut with."""
+"""Prior in closed form: samples at one standard deviation, and the rows of their cuts."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_standard_deviation_is_25_percent_of_damping_and_10_of_stiffness(side:
 @pytest.mark.parametrize(("side", "first"), [("x", 0), ("y", 1)])
 @pytest.mark.parametrize("deviations", [-2.0, -0.5, 1.0, 3.5])
 def test_one_frequency_in_twenty_is_three_times_as_far_off(side: str, first: int, deviations: float) -> None:
-    """As many lie below as of the mixture of 95 % with a standard deviation of 2 % and 5 % with 6 %."""
+    """Quantiles of the mixture of 95 % with a standard deviation of 2 % and 5 % with 6 %."""
     factor = draws({first: deviations}).ratios()[f"frequency_{side}"][0]
     off = (factor - 0.985) / 0.02
     assert 0.95 * ndtr(off) + 0.05 * ndtr(off / 3) == pytest.approx(ndtr(deviations), rel=1e-3, abs=1e-6)
@@ -69,7 +69,7 @@ def test_kt_is_drawn_at_speed_and_as_doubted() -> None:
 @pytest.mark.parametrize("span", [KR_OVER_KT, FactorRange(-0.2, 0.5), FactorRange(2.0, 4.0), FactorRange(1.0, 1.0)])
 @pytest.mark.parametrize("deviations", [-3.0, -0.7, 0.0, 1.3, 2.5])
 def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: FactorRange, deviations: float) -> None:
-    """As many lie below as of the mixture; Kr/Kt of the slot is 5/14."""
+    """Quantiles of the mixture; Kr/Kt of the slot is 5/14."""
     drawn = draws({8: deviations}, ratio=span).ratios()["ratio"][0]
     assert 0 <= drawn <= max(2.8, span.high)
     width = max(span.high - span.low, 1e-9)

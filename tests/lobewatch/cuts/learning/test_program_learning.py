@@ -15,7 +15,7 @@ from lobewatch.machine.folder_updates import make_observed_cut
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def test_a_cut_of_another_material_or_geometry_is_not_the_best_of_a_program(shop: Shop) -> None:

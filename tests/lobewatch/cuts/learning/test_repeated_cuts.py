@@ -78,7 +78,7 @@ def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: M
 
 
 def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:
-    """As deep 1.5 % faster was stable: more likely right than wrong, and worth a cut."""
+    """An equal depth 1.5 % faster was stable: the label is more likely right than wrong, but worth a cut."""
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
     places = [(speed, 1.5e-3, "stable"), (speed, 2e-3, "chatter"), (1.015 * speed, 2e-3, "stable")]
     cuts = [CutEvidence(mill.cut, *place, id=f"c{k}") for k, place in enumerate(places, 1)]  # type: ignore[arg-type]

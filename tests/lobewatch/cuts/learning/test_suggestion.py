@@ -1,4 +1,4 @@
-"""The next test cut: one that can be set, more likely stable than not, and worth it; none where nothing is gained."""
+"""Next test cut: can be set, more likely stable than not, with a gain; none without a gain."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def test_a_gain_below_half_a_percent_of_the_best_so_far_is_none(mill: Mill) -> N
 
 
 def test_a_cut_settles_what_its_outcome_depends_on_most() -> None:
-    """Where lobes are far away the force; on the steep side of a pocket of a slender spindle the frequency."""
+    """Force if lobes are far away; frequency on the steep side of a pocket of a slender spindle."""
     plain = Mill()
     grid = replace(plain.grid, speeds=np.array([4500.0]), max_depths=np.array([0.012]), zero_order_trust=np.ones(1))
     suggestion = suggest_cut(plain.prior, grid, (), 1)

@@ -17,7 +17,7 @@ from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.verdicts import Stability
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> CutEntry:

@@ -1,4 +1,4 @@
-"""A replay finds what a live test finds, whoever does the work, bit by bit."""
+"""A replay gives the results of a live test, in any process, bit by bit."""
 
 from __future__ import annotations
 

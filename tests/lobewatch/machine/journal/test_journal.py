@@ -13,7 +13,7 @@ from acquisition import DataError, TapTest, new_tap_id
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.folder_updates import add_event
-from lobewatch.machine.journal.journal_scan import JournalFileState, scan_journal_file
+from lobewatch.machine.journal.journal import JournalFileState, scan_journal_file
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.verify_files import verify
 
@@ -126,7 +126,7 @@ def test_a_journal_from_before_there_was_a_copy_is_read_and_written(folder: Mach
 
 
 def write_without_numbers(path: Path, lines: list[dict[str, object]]) -> None:
-    """As the first version wrote it."""
+    """Write a journal as the first version did."""
     import hashlib
     import zlib
 

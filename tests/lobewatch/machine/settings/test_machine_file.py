@@ -1,4 +1,4 @@
-"""machine.toml: what is read, and that every mistake is told with its place."""
+"""machine.toml: parsed values, and every mistake reported with its place."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from lobewatch.machine.settings.setting_questions import (
     find_program_questions,
     find_template_bearings,
 )
-from lobewatch.machine.settings.toml_text import TablePath, edit_toml
+from lobewatch.machine.settings.toml import TablePath, edit_toml
 
 ROOT = Path(__file__).parents[4]
 UNSEEN = set(re.findall(r"^\| `([^`]+)` \|", (ROOT / "docs/plausible.md").read_text("utf-8"), re.MULTILINE))
@@ -36,7 +36,7 @@ tangential_edge_n_per_mm = 20
 radial_edge_n_per_mm = 30
 """
 LONG = {"tool_diameter_mm": 12, "flute_length_mm": 26}
-"""What a program says of the [[tool]] of the template."""
+"""Keys of a program for the [[tool]] of the template."""
 Place = tuple[str | int, ...]
 
 
@@ -82,7 +82,7 @@ def numbers(value: Any, place: Place = ()) -> Iterator[tuple[Place, float]]:
 
 
 def text_of(tables: dict[str, Any]) -> str:
-    """As TOML, inline below the first level."""
+    """Return tables as TOML, inline below the first level."""
     return "\n".join(f"{key} = {_inline(value)}" for key, value in tables.items())
 
 
@@ -105,7 +105,7 @@ def slipped(place: Place, factor: float) -> dict[str, Any]:
 
 
 def seen(tables: dict[str, Any]) -> bool:
-    """Whether a machine.toml is refused or asked about."""
+    """Return whether a machine.toml is rejected or questioned."""
     try:
         machine = parse_machine_file(text_of(tables))
     except DataError:

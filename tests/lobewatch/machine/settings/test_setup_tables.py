@@ -1,4 +1,4 @@
-"""[daq] and [[daq.channel]] of machine.toml: units at the door, and every mistake told with its table and key."""
+"""[daq] and [[daq.channel]] of machine.toml: units, and every mistake reported with table and key."""
 
 from __future__ import annotations
 

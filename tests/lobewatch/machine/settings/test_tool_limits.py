@@ -1,4 +1,4 @@
-"""What a tool bears: its own numbers, those of its programs, those published; what is asked; the drive; bad input."""
+"""Tool limits: own numbers, those of programs, published ones; missing data; drive; bad input."""
 
 from __future__ import annotations
 

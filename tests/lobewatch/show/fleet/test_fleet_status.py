@@ -14,7 +14,7 @@ from lobewatch.show.report.report import render_fleet
 pytestmark = pytest.mark.quick
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 @pytest.mark.parametrize(

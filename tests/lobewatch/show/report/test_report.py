@@ -23,7 +23,7 @@ from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def run(*arguments: object) -> Result:

@@ -16,7 +16,7 @@ from lobewatch.show.report.section import BulletList, DataTable, Drawing, Number
 from lobewatch.show.report.sections import SECTIONS
 
 Shop = Any
-"""Of tests/lobewatch/conftest.py."""
+"""Machine fixture of tests/lobewatch/conftest.py."""
 
 
 def hours(material: ReportData) -> list[Section]:

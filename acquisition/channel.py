@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +42,9 @@ def parse_direction(text: str) -> TapDirection:
     >>> parse_direction("x"), parse_direction("xy") == CROSS_TAP
     ('x', True)
     """
-    directions: tuple[TapDirection, ...] = get_args(TapDirection)
-    for direction in directions:
-        if text == direction:
-            return direction
-    raise ValueError(f"direction={text!r} is none of {', '.join(directions)}; give one of them")
+    if text not in get_args(TapDirection):
+        raise ValueError(f"direction={text!r} is none of {', '.join(get_args(TapDirection))}; give one of them")
+    return cast(TapDirection, text)
 
 
 @dataclass(frozen=True)

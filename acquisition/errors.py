@@ -89,10 +89,8 @@ def check_name(name: str, what: str) -> None:
     """
     found = CONTROL_CHARACTERS.search(name)
     if found is not None:
-        raise ValueError(
-            f"{what}={name!r} holds the control character {found[0]!r}; leave it out: a name is made of letters, "
-            "digits, signs and spaces"
-        )
+        cure = "leave it out: a name is made of letters, digits, signs and spaces"
+        raise ValueError(f"{what}={name!r} holds the control character {found[0]!r}; {cure}")
 
 
 @dataclass(frozen=True)

@@ -74,10 +74,8 @@ class Frf:
             raise ValueError(f"receptance {self.receptance.shape} and frequency {self.frequency.shape} differ in shape")
         bad = np.flatnonzero(~(np.abs(self.receptance) <= MAX_SI_VALUE))
         if bad.size:
-            first = f"first at {self.frequency[bad[0]]:g} Hz"
-            raise ValueError(
-                f"receptance is {describe_invalid_value(self.receptance[bad[0]])} at {bad.size} lines, {first}"
-            )
+            flaw, first = describe_invalid_value(self.receptance[bad[0]]), f"first at {self.frequency[bad[0]]:g} Hz"
+            raise ValueError(f"receptance is {flaw} at {bad.size} lines, {first}")
         if self.coherence is None:
             return
         if self.coherence.shape != self.frequency.shape:
@@ -129,10 +127,8 @@ class Frf:
         low, high = band
         keep = (self.frequency >= low) & (self.frequency <= high)
         if not low < high or keep.sum() < 2:
-            raise ValueError(
-                f"band {low:g}..{high:g} Hz holds {keep.sum()} lines of this FRF, which spans "
-                f"{self.frequency[0]:g}..{self.frequency[-1]:g} Hz; choose a wider band inside it"
-            )
+            span = f"which spans {self.frequency[0]:g}..{self.frequency[-1]:g} Hz; choose a wider band inside it"
+            raise ValueError(f"band {low:g}..{high:g} Hz holds {keep.sum()} lines of this FRF, {span}")
         coherence = None if self.coherence is None else self.coherence[keep]
         return replace(self, frequency=self.frequency[keep], receptance=self.receptance[keep], coherence=coherence)
 

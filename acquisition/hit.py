@@ -69,10 +69,8 @@ class Hit:
                 raise ValueError(f"{name} is {flaw} at {bad.size} samples, first at sample {bad[0]}")
         same = self.force.shape in (self.acceleration.shape, (0,))
         if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
-            raise ValueError(
-                f"force {self.force.shape} and acceleration {self.acceleration.shape} "
-                "must be 1-D records of equal length, at least 8 samples"
-            )
+            shapes = f"force {self.force.shape} and acceleration {self.acceleration.shape}"
+            raise ValueError(f"{shapes} must be 1-D records of equal length, at least 8 samples")
         if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
             raise ValueError(f"sample_rate={self.sample_rate} Hz is not > 0")
 

@@ -144,10 +144,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     HitFlags.NOT_DECAYED: HitFault(
         "not decayed",
         "Use a longer record; wait until the tool is still before the next hit.",
-        {
-            "": _RINGS,
-            "hum": f"{_RINGS}; it sounds like mains hum, which 20 ms before the hit would prove",
-        },
+        {"": _RINGS, "hum": f"{_RINGS}; it sounds like mains hum, which 20 ms before the hit would prove"},
         {"residual_share": 0.02, "noise_ratio": 2.0},
     ),
     HitFlags.LOST_SCANS: HitFault(

@@ -28,9 +28,8 @@ def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
     try:
         loaded = point.load()
     except PLUGIN_ERRORS as error:
-        return make_unusable_remark(
-            kind, point.name, f"the package {package} cannot be loaded ({format_exception_line(error)})"
-        )
+        text = f"the package {package} cannot be loaded ({format_exception_line(error)})"
+        return make_unusable_remark(kind, point.name, text)
     if not isinstance(loaded, kind):
         text = f"{point.value} of the package {package} is no acquisition.{kind.__name__}"
         return make_unusable_remark(kind, point.name, text)

@@ -139,16 +139,12 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
         records[0, backwards] = 0.0
         s_fx += spectra[0] * spectra[1]
         powers += np.square(parts, out=parts)
-    skew = _get_response_skew(hits[0])
+    channels = hits[0].channels
+    skew = channels[1].skew - channels[0].skew if channels else 0.0  # delay of the response (s)
     if skew:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
     return s_ff, s_xx, s_fx * (1 / len(hits))
-
-
-def _get_response_skew(hit: Hit) -> float:
-    """Return how much later the response is sampled than the force (s); its spectrum leads by 2 pi f skew."""
-    return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
 def find_usable_band(frequency: NDArray[np.floating[Any]], s_ff: Floats) -> tuple[float, float]:

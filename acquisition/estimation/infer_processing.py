@@ -64,11 +64,8 @@ def infer_averages(frf: Frf) -> int | None:
 
 
 def _compute_block_means(values: Floats) -> Floats:
-    return np.asarray(
-        values[: values.size // COHERENCE_BLOCK_LINES * COHERENCE_BLOCK_LINES]
-        .reshape(-1, COHERENCE_BLOCK_LINES)
-        .mean(axis=1)
-    )
+    whole = values[: values.size // COHERENCE_BLOCK_LINES * COHERENCE_BLOCK_LINES]
+    return np.asarray(whole.reshape(-1, COHERENCE_BLOCK_LINES).mean(axis=1))
 
 
 WINDOW_NOISE_RATIO = 2.0
@@ -194,9 +191,8 @@ def is_smoothed(frf: Frf) -> bool:
     if response is None:
         return False
     power, n = response**2, response.size
-    near, far = (
-        float(np.mean(power[round(begin * n) : round(end * n)])) for begin, end in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN)
-    )
+    spans = (slice(round(begin * n), round(end * n)) for begin, end in (NEAR_HIT_SPAN, FAR_FROM_HIT_SPAN))
+    near, far = (float(np.mean(power[span])) for span in spans)
     leaks = TAPER_LEAK_RATIO * ((1 - NEAR_HIT_SPAN[1]) * n) ** -10
     return bool(near > SMOOTHING_NOISE_RATIO**2 * far and leaks < near / np.max(power) < MAX_PRE_HIT_SHARE**2)
 

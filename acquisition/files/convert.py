@@ -8,20 +8,11 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.file_io import atomic_write
+from acquisition.files import writers
 from acquisition.files.contents.contents import format_window
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.recording import Recording
 from acquisition.files.read_recording import inspect_file, read_frf
-from acquisition.files.writers import (
-    ExportLabels,
-    encode_mat_frf,
-    encode_mat_hits,
-    encode_sep005_hits,
-    encode_table_frf,
-    encode_table_hits,
-    encode_uff_frf,
-    encode_uff_hits,
-)
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 
@@ -32,21 +23,21 @@ class ExportFormat:
 
     title: str
     """Name of the format, for people."""
-    encode_hits: Callable[[Sequence[Hit], ExportLabels], bytes]
+    encode_hits: Callable[[Sequence[Hit], writers.ExportLabels], bytes]
     """Function that writes signals over time."""
-    encode_frf: Callable[[Frf, ExportLabels], bytes] | None
+    encode_frf: Callable[[Frf, writers.ExportLabels], bytes] | None
     """Function that writes an FRF; None where the format has none."""
     precision: str
     """Precision of its numbers, for people."""
 
 
-_UFF_EXPORT = ExportFormat("universal file", encode_uff_hits, encode_uff_frf, "12 digits")
+_UFF_EXPORT = ExportFormat("universal file", writers.encode_uff_hits, writers.encode_uff_frf, "12 digits")
 EXPORT_FORMATS = {
     ".uff": _UFF_EXPORT,
     ".unv": _UFF_EXPORT,
-    ".csv": ExportFormat("text table", encode_table_hits, encode_table_frf, "17 digits"),
-    ".mat": ExportFormat("MATLAB file", encode_mat_hits, encode_mat_frf, "double precision"),
-    ".json": ExportFormat("SDyPy SEP005 time series", encode_sep005_hits, None, "17 digits"),
+    ".csv": ExportFormat("text table", writers.encode_table_hits, writers.encode_table_frf, "17 digits"),
+    ".mat": ExportFormat("MATLAB file", writers.encode_mat_hits, writers.encode_mat_frf, "double precision"),
+    ".json": ExportFormat("SDyPy SEP005 time series", writers.encode_sep005_hits, None, "17 digits"),
 }
 """Format by the extension of the written file."""
 
@@ -100,24 +91,18 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     if out.exists() and path.exists() and out.samefile(path):
         raise ValueError(f"{out}: this is the file that is read; name another")
     recording = inspect_file(path, description).require_valid()
-    labels = ExportLabels(
-        description.date.astimezone() if description.date else recording.created,
-        description.direction or recording.direction,
-        description.tool or recording.tool,
-        path.name,
-        format_window(recording.window),
-    )
+    created = description.date.astimezone() if description.date else recording.created
+    direction, tool = description.direction or recording.direction, description.tool or recording.tool
+    labels = writers.ExportLabels(created, direction, tool, path.name, format_window(recording.window))
     if writer.encode_frf is not None and not hits:
         frf = recording.frf or read_frf(path, description)
         content, amount = writer.encode_frf(frf, labels), f"FRF of {frf.frequency.size} lines"
     elif recording.hits:
         content, amount = writer.encode_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"
     else:
-        raise DataError(
-            f"{path}: holds an FRF, not the hits it was made from; write it as {', '.join(_FRF_EXTENSIONS)}"
-        )
+        raise DataError(f"{path}: holds an FRF, not the hits it was made from; write it as {_FRF_EXTENSIONS}")
     atomic_write(out, content)
     return Conversion(out, writer.title, amount, writer.precision, recording)
 
 
-_FRF_EXTENSIONS = [extension for extension, writer in EXPORT_FORMATS.items() if writer.encode_frf]
+_FRF_EXTENSIONS = ", ".join(extension for extension, writer in EXPORT_FORMATS.items() if writer.encode_frf)

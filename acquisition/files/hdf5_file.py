@@ -43,10 +43,8 @@ def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
         raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
     if sum(sizes) > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
         limits = f"at most {MIN_UNPACKED_LIMIT / 1e6:g} MB or {MAX_UNPACKED_RATIO} times the file are read"
-        raise DataError(
-            f"{path}: {packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; {limits}; no tap test is like "
-            "that: take it again from where it was recorded"
-        )
+        fault = f"{packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; {limits}; no tap test is like that"
+        raise DataError(f"{path}: {fault}: take it again from where it was recorded")
 
 
 def _measure_unpacked_size(data: h5py.Dataset) -> int:

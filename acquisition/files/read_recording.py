@@ -106,9 +106,8 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     if isinstance(held, Contents):
         contents = held
         if description.force is not None:
-            contents = append_force_signals(
-                held, _read_force_contents(description.force, description), description.force
-            )
+            force = _read_force_contents(description.force, description)
+            contents = append_force_signals(held, force, description.force)
         title = file_format.title
         return _convert_errors(file_format, path, lambda: resolve_recording(path, title, contents, description))
     about = file_format.read_circumstances(path)
@@ -280,10 +279,8 @@ def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result])
     except OSError:
         raise
     except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise DataError(
-            f"{path}: cannot be read as {file_format.title} ({reason}); export it in another format"
-        ) from error
+        fault = f"cannot be read as {file_format.title} ({type(error).__name__}: {error})"
+        raise DataError(f"{path}: {fault}; export it in another format") from error
 
 
 def _describe_broken_formats() -> str:

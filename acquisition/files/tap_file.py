@@ -6,6 +6,7 @@ complete. Every dataset has a `units` attribute. There are no pickles, so that h
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import io
@@ -96,9 +97,8 @@ def encode_tap(tap: TapTest) -> bytes:
     """Encode the file of a tap test."""
     memory = io.BytesIO()
     with open_hdf5(memory, "w") as file:
-        file.attrs.update(
-            format=TAP_FORMAT_NAME, version=_choose_version(tap.hits), software=_get_software_name(), id=tap.id
-        )
+        file.attrs.update(format=TAP_FORMAT_NAME, version=_choose_version(tap.hits))
+        file.attrs.update(software=_get_software_name(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
         write_raw_hits(file, tap.hits, tap.flags)
         if tap.frf is not None:
@@ -146,9 +146,8 @@ def read_tap(path: Path | str) -> TapTest:
     with _open_tap_file(Path(path)) as file:
         try:
             hits, flags = read_raw_hits(file)
-            return TapTest(
-                file.attrs["id"], _read_circumstances(file), _read_frf(file), hits, flags, _read_source(file)
-            )
+            tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
+            return TapTest(tap_id, about, frf, hits, flags, _read_source(file))
         except KeyError as error:
             raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
 
@@ -234,26 +233,20 @@ def _open_tap_file(path: Path) -> h5py.File:
     content = read_regular_file(path)
     if has_wrong_checksum(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
-    try:
-        file = open_hdf5(io.BytesIO(content), "r")
-    except OSError as error:
-        raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
-    try:
-        if file.attrs.get("format") != TAP_FORMAT_NAME:
-            raise DataError(
-                f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
-            )
-        newest = int(file.attrs.get("version", TAP_FORMAT_VERSION))
-        if newest > TAP_FORMAT_VERSION_WITHOUT_FORCE:
-            versions = f"a tap file of version {newest}, this lobewatch reads up to {TAP_FORMAT_VERSION_WITHOUT_FORCE}"
-            raise DataError(f"{path}: {versions}; update lobewatch")
-        check_unpacked_size(file, len(content), path)
-    except (OSError, LookupError, RuntimeError) as error:
-        file.close()
-        raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
-    except BaseException:
-        file.close()
-        raise
+    with contextlib.ExitStack() as closed_on_error:
+        try:
+            file = closed_on_error.enter_context(open_hdf5(io.BytesIO(content), "r"))
+            if file.attrs.get("format") != TAP_FORMAT_NAME:
+                fault = f"no tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
+                raise DataError(f"{path}: an HDF5 file, but {fault}")
+            version, newest = int(file.attrs.get("version", TAP_FORMAT_VERSION)), TAP_FORMAT_VERSION_WITHOUT_FORCE
+            if version > newest:
+                versions = f"a tap file of version {version}, this lobewatch reads up to {newest}"
+                raise DataError(f"{path}: {versions}; update lobewatch")
+            check_unpacked_size(file, len(content), path)
+        except (OSError, LookupError, RuntimeError) as error:
+            raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
+        closed_on_error.pop_all()
     return file
 
 
@@ -267,15 +260,13 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
 
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
-    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "operator")}
+    machine, tool, operator = (str(file.attrs[name]) for name in ("machine", "tool", "operator"))
     direction = parse_direction(str(file.attrs["direction"]))
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
     text = file["machine_toml"][()].decode()
     under = Conditions.from_mapping(convert_to_plain(file.attrs))  # none in the first files
-    return Circumstances(
-        created=created, direction=direction, machine_toml=text, device=device, conditions=under, **named
-    )
+    return Circumstances(machine, created, tool, direction, operator, text, device, under)
 
 
 def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> None:
@@ -305,25 +296,16 @@ def _read_frf(file: h5py.File) -> Frf | None:
         return None
     group = file["frf"]
     coherence = group["coherence"][()] if "coherence" in group else None
-    band = group.attrs.get("usable_band_hz")
-    return Frf(
-        group["frequency"][()],
-        group["receptance"][()],
-        coherence,
-        int(group.attrs["n_averages"]),
-        group.attrs["measured_as"],
-        None if band is None else (float(band[0]), float(band[1])),
-    )
+    frequency, receptance = group["frequency"][()], group["receptance"][()]
+    n_averages, measured_as = int(group.attrs["n_averages"]), group.attrs["measured_as"]
+    low, high = group.attrs.get("usable_band_hz", (None, None))
+    band = None if low is None else (float(low), float(high))
+    return Frf(frequency, receptance, coherence, n_averages, measured_as, band)
 
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
     content = np.frombuffer(source.content, np.uint8)
-    packed = {
-        "chunks": (min(content.size, SOURCE_CHUNK_SIZE),),
-        "compression": "gzip",
-        "compression_opts": 1,
-        "fletcher32": True,
-    }
+    packed = HDF5_COMPRESSION | {"chunks": (min(content.size, SOURCE_CHUNK_SIZE),), "shuffle": False}
     stored = file.create_dataset("source", data=content, **packed if content.size else {})
     stored.attrs.update(name=source.name, sha256=source.sha256, units="byte")
 
@@ -364,20 +346,12 @@ def _is_lobewatch_file(head: bytes, path: Path) -> bool:
     return head.startswith(HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
 
 
-def _read_file_circumstances(path: Path) -> Circumstances:
-    return read_tap_hits(path)[1]
-
-
-def _read_file_frf(path: Path) -> Frf:
-    return read_tap(path).required_frf
-
-
 TAP_FILE_FORMAT = Format(
     "tap-file",
     "tap file of lobewatch",
     (".h5",),
     _is_lobewatch_file,
     read_tap_recording,
-    _read_file_circumstances,
-    read_frf=_read_file_frf,
+    lambda path: read_tap_hits(path)[1],
+    lambda path: read_tap(path).required_frf,
 )

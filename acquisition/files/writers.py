@@ -95,23 +95,16 @@ def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode force (N) and acceleration (m/s^2), a row per hit, and the sample rate (Hz) as MATLAB v5."""
     if len({(hit.force.size, hit.sample_rate) for hit in hits}) > 1:
         raise DataError("the hits differ in length or sample rate; write them as .json")
-    rows = {
-        "force": np.stack([hit.force for hit in hits]),
-        "acceleration": np.stack([hit.acceleration for hit in hits]),
-    }
+    rows = {name: np.stack([getattr(hit, name) for hit in hits]) for name in ("force", "acceleration")}
     return _encode_mat({**rows, "sample_rate": hits[0].sample_rate}, labels)
 
 
 def _encode_mat(variables: dict[str, Any], labels: ExportLabels) -> bytes:
     import scipy.io  # it takes a while, and few files need it
 
-    texts = {
-        "written_by": "lobewatch",
-        "recorded": labels.created.isoformat() if labels.created else "",
-        "direction": labels.direction,
-        "tool": labels.tool,
-        "window": labels.window,
-    }
+    recorded = labels.created.isoformat() if labels.created else ""
+    texts = {"written_by": "lobewatch", "recorded": recorded, "direction": labels.direction}
+    texts |= {"tool": labels.tool, "window": labels.window}
     buffer = io.BytesIO()
     scipy.io.savemat(buffer, texts | variables, oned_as="column")
     return buffer.getvalue()
@@ -121,22 +114,16 @@ def encode_sep005_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode force (N) and acceleration (m/s^2) of each hit as SEP005 JSON, with a group per hit."""
     texts = {"start_timestamp": labels.created.isoformat()} if labels.created else {}
     texts |= {key: value for key, value in (("direction", labels.direction), ("tool", labels.tool)) if value}
-    channels = [
-        {
-            "name": name,
-            "quantity": quantity,
-            "unit_str": unit,
-            "fs": hit.sample_rate,
-            "group": f"hit {number}",
-            **texts,
-            "data": getattr(hit, name).tolist(),
-        }
-        for number, hit in enumerate(hits, 1)
-        for name, quantity, unit in (("force", "f", "N"), ("acceleration", "a", "m/s^2"))
-    ]
+    channels = []
+    for number, hit in enumerate(hits, 1):
+        shared = {"fs": hit.sample_rate, "group": f"hit {number}", **texts}
+        for name, quantity, unit in (("force", "f", "N"), ("acceleration", "a", "m/s^2")):
+            about = {"name": name, "quantity": quantity, "unit_str": unit}
+            channels.append({**about, **shared, "data": getattr(hit, name).tolist()})
     return json.dumps(channels, allow_nan=False).encode("utf-8")
 
 
+_AxisPair = tuple[tuple[int, str, str], tuple[int, str, str]]
 _UFF_NO_QUANTITY = (0, "NONE", "NONE")
 _UFF_FORCE = (13, "Force", "N")
 _UFF_TIME = (17, "Time", "s")
@@ -186,12 +173,7 @@ class _Abscissa:
 
 
 def _format_data_set_58(
-    kind: int,
-    axis: _Abscissa,
-    values: Floats | Complexes,
-    ordinates: tuple[tuple[int, str, str], tuple[int, str, str]],
-    labels: ExportLabels,
-    extra: str,
+    kind: int, axis: _Abscissa, values: Floats | Complexes, ordinates: _AxisPair, labels: ExportLabels, extra: str
 ) -> list[str]:
     node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
     exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
@@ -205,10 +187,8 @@ def _format_data_set_58(
     start, step = (axis.values[0], axis.step) if axis.is_even else (0.0, 0.0)
     spacing = int(axis.is_even)
     lines.append(f"{6 if is_complex else 4:10d}{n:10d}{spacing:10d}{start:13.5E}{step:13.5E}{0.0:13.5E}")
-    lines += [
-        f"{t:10d}{0:5d}{0:5d}{0:5d} {name:20s} {unit:20s}"
-        for t, name, unit in (axis.what, *ordinates, _UFF_NO_QUANTITY)
-    ]
+    for t, name, unit in (axis.what, *ordinates, _UFF_NO_QUANTITY):
+        lines.append(f"{t:10d}{0:5d}{0:5d}{0:5d} {name:20s} {unit:20s}")
     lines += _format_values(axis, values)
     return lines
 

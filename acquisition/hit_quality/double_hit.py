@@ -95,10 +95,8 @@ def _fit_bump_heights(force: Floats, foot: float) -> Floats:
     padded = np.pad(force, half, mode="reflect")
     sums = np.concatenate(([0.0], np.cumsum(padded)))
     weighed = np.convolve(padded[side : padded.size - side], bump, "valid")
-    left, right, whole = (
-        sums[stop:][: force.size] - sums[start:][: force.size]
-        for start, stop in ((0, side), (length - side, length), (0, length))
-    )
+    parts = ((0, side), (length - side, length), (0, length))
+    left, right, whole = (sums[stop:][: force.size] - sums[start:][: force.size] for start, stop in parts)
     height = (weighed - mean * whole) / (np.sum(bump**2) - length * mean**2)
     return np.stack([height, weighed / bump.sum() - np.maximum(left, right) / side])
 
@@ -138,9 +136,8 @@ def find_second_input(decay: Floats, sample_rate: float, noise: float) -> float 
     level = np.sqrt(np.convolve(error**2, np.full(span, 1 / span), "valid"))
     if scale == 0 or level.size <= rise:
         return None
-    by_chance = (
-        NOISE_LIMIT_MARGIN * scale * np.sqrt(scipy.special.chdtri(span, DECAY_FALSE_ALARM_RATE / level.size) / span)
-    )
+    chi_square = scipy.special.chdtri(span, DECAY_FALSE_ALARM_RATE / level.size)
+    by_chance = NOISE_LIMIT_MARGIN * scale * np.sqrt(chi_square / span)
     before = np.maximum.accumulate(level)[:-rise]
     above = np.flatnonzero(level[rise:] > np.maximum(by_chance, MIN_ERROR_RISE * before))
     return float(above[0] + rise + PREDICTION_ORDER) / sample_rate if above.size else None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -42,9 +44,7 @@ class HitVerdict:
         findings
             Finding for each flag, without the remedy.
         """
-        flags = HitFlags.OK
-        for flag in findings:
-            flags |= flag
+        flags = functools.reduce(operator.or_, findings, HitFlags.OK)
         return cls(flags, tuple(f"{findings[flag]}: {flag.cure[0].lower()}{flag.cure[1:]}" for flag in flags))
 
     @property

@@ -138,13 +138,8 @@ def is_like_hum(hit: Hit) -> bool:
 
 def _fit_tones(hit: Hit, mains: float, *parts: slice) -> Floats:
     """Fit harmonics of a frequency (Hz) to these parts together, and return them over the whole record."""
-    angle = (
-        2
-        * np.pi
-        * mains
-        * np.arange(1, MAINS_HARMONICS + 1)
-        * (np.arange(hit.acceleration.size) / hit.sample_rate)[:, None]
-    )
+    time = (np.arange(hit.acceleration.size) / hit.sample_rate)[:, None]
+    angle = 2 * np.pi * mains * np.arange(1, MAINS_HARMONICS + 1) * time
     waves = np.hstack([np.cos(angle), np.sin(angle)])
     known = np.concatenate([waves[part] for part in parts])
     columns = np.column_stack([known, np.ones(len(known))])

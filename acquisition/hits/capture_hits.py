@@ -327,13 +327,11 @@ def split_record(record: Hit) -> list[Hit]:
     if lengths[-1] < MIN_LAST_HIT_SHARE * n:
         begins = begins[:-1]
     n = min(n, int(np.min(record.acceleration.size - begins)))
-    return [_cut_hit(record, int(a), n, before) for a in begins]
-
-
-def _cut_hit(record: Hit, begin: int, size: int, before: int) -> Hit:
-    inside = slice(begin, begin + size)
-    force = record.force[inside] if record.has_force else record.force
-    return replace(record, force=force, acceleration=record.acceleration[inside], pre_trigger=before)
+    hits = list[Hit]()
+    for part in (slice(int(begin), int(begin) + n) for begin in begins):
+        force = record.force[part]  # empty where it was not measured
+        hits.append(replace(record, force=force, acceleration=record.acceleration[part], pre_trigger=before))
+    return hits
 
 
 def _find_hit_starts(record: Hit) -> NDArray[np.intp]:

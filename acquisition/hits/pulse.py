@@ -76,9 +76,8 @@ def count_pre_hit_samples(hit: Hit) -> int:
     if hit.pre_trigger:
         return hit.pre_trigger
     if hit not in _pre_hit_counts:
-        _pre_hit_counts[hit] = (
-            _count_before_force(hit.force) if hit.has_force else _count_before_response(hit.acceleration)
-        )
+        has_force = hit.has_force
+        _pre_hit_counts[hit] = _count_before_force(hit.force) if has_force else _count_before_response(hit.acceleration)
     return _pre_hit_counts[hit]
 
 

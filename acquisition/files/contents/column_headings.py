@@ -6,8 +6,9 @@ import re
 import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import get_args
 
-from acquisition.files.contents.contents import Role, Signal
+from acquisition.files.contents.contents import FrfRole, Role, Signal
 from acquisition.files.contents.description import ImportReport
 from acquisition.files.contents.units import VOLTAGE_UNITS, parse_unit
 
@@ -115,10 +116,9 @@ def infer_role(name: str, unit: str) -> Role:
     quantity = parsed.quantity if parsed else ""
     if quantity == "frequency" and by_name != "frequency" and parsed == parse_unit("rpm"):
         return "speed"
-    of_frf = by_name in ("real", "imag", "magnitude", "phase", "coherence", "frf")
     if quantity in ("time", "frequency", "force") and not (len(name) > 1 and by_name in ("time", "frequency")):
         return quantity
-    if quantity in ("displacement", "velocity", "acceleration") and not of_frf:
+    if quantity in ("displacement", "velocity", "acceleration") and by_name not in get_args(FrfRole):
         return "response"
     return by_name  # type: ignore[return-value]
 
@@ -133,10 +133,9 @@ def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: Im
     in_order = not any("=" in text for text in columns)
     if in_order and len(columns) < len(signals):
         names = format_signal_names(signals)
-        report.faults.append(
-            f"Description.columns names {len(columns)} of its {len(signals)} columns, which are {names}; name all in "
-            'their order, "-" for what is left out, or each as in "real=2"'
-        )
+        cure = 'name all in their order, "-" for what is left out, or each as in "real=2"'
+        fault = f"names {len(columns)} of its {len(signals)} columns, which are {names}; {cure}"
+        report.faults.append(f"Description.columns {fault}")
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = _select_signal(signals, name.strip(), number, report)

@@ -18,22 +18,9 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap_test import Circumstances
 
-Role = Literal[
-    "time",
-    "frequency",
-    "force",
-    "response",
-    "speed",
-    "tacho",
-    "frf",
-    "real",
-    "imag",
-    "magnitude",
-    "phase",
-    "coherence",
-    "ignored",
-    "",
-]
+FrfRole = Literal["frf", "real", "imag", "magnitude", "phase", "coherence"]
+"""Meaning of a signal that belongs to an FRF."""
+Role = Literal["time", "frequency", "force", "response", "speed", "tacho", FrfRole, "ignored", ""]
 """Meaning of a signal; empty where unknown."""
 
 
@@ -138,13 +125,9 @@ def _count_values(signal: Signal) -> int:
 
 def append_force_signals(response: Contents, force: Contents, force_file: Path) -> Contents:
     """Append the signals of a force file; a name that both have gets the name of its file."""
-    names = {signal.name for signal in response.signals}
-    added = [_rename_if_taken(signal, names, force_file.name) for signal in force.signals]
+    names, file = {signal.name for signal in response.signals}, force_file.name
+    added = (replace(one, name=f"{one.name} of {file}") if one.name in names else one for one in force.signals)
     return replace(response, signals=(*response.signals, *added))
-
-
-def _rename_if_taken(signal: Signal, names: set[str], file: str) -> Signal:
-    return replace(signal, name=f"{signal.name} of {file}") if signal.name in names else signal
 
 
 _NO_WINDOW = re.compile(r"\s*(none|no|off|rect\w*|uniform|boxcar|transient|force.*)?\s*", re.IGNORECASE)
@@ -193,9 +176,8 @@ def _split_array(name: str, value: NDArray[Any]) -> Iterator[Signal]:
         yield _make_array_signal(name, value)
     elif value.ndim > 1 and value.size > 1:
         columns = np.moveaxis(value, int(np.argmax(value.shape)), -1).reshape(-1, max(value.shape))
-        yield from (
-            _make_array_signal(f"{name}:{i}", column) for i, column in enumerate(columns[:MAX_ARRAY_COLUMNS], 1)
-        )
+        for i, column in enumerate(columns[:MAX_ARRAY_COLUMNS], 1):
+            yield _make_array_signal(f"{name}:{i}", column)
 
 
 def _make_array_signal(name: str, column: NDArray[Any]) -> Signal:

@@ -76,18 +76,9 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
         report.add_fact("window", window)
     for note in contents.notes:
         report.add_fact("note", note)
-    return Recording(
-        path,
-        title,
-        tuple(hits),
-        frf,
-        tuple(report.facts),
-        report.format_problems(),
-        contents.created,
-        contents.tool,
-        contents.direction,
-        window=parse_time_constant(window),
-    )
+    facts, problems = tuple(report.facts), report.format_problems()
+    labels = contents.created, contents.tool, contents.direction
+    return Recording(path, title, tuple(hits), frf, facts, problems, *labels, window=parse_time_constant(window))
 
 
 def _resolve_frf_or_hits(
@@ -111,9 +102,7 @@ def _resolve_frf_or_hits(
 
 
 def _is_over_time(signals: Sequence[Signal]) -> bool:
-    return any(
-        signal.role in ("time", "force", "response") or signal.rate or signal.per_full_scale for signal in signals
-    )
+    return any(one.role in ("time", "force", "response") or one.rate or one.per_full_scale for one in signals)
 
 
 def _reject_useless_fields(description: Description, names: Sequence[str], content: str, report: ImportReport) -> None:

@@ -217,10 +217,8 @@ def measure_step(time: Floats) -> tuple[float, str]:
     if distance[worst] <= MAX_TIME_DEVIATION:
         return step, ""
     place = f"sample {worst + 1} is {distance[worst]:.2g} steps off an even axis"
-    return step, (
-        f"its time steps are uneven: {place}, {MAX_TIME_DEVIATION:g} are taken (are samples missing, twice there, "
-        "or not in order?)"
-    )
+    doubt = "are samples missing, twice there, or not in order?"
+    return step, f"its time steps are uneven: {place}, {MAX_TIME_DEVIATION:g} are taken ({doubt})"
 
 
 def infer_printed_step(time: Floats) -> float | None:

@@ -161,10 +161,8 @@ def _resolve_unit(
     if given and (given_unit is None or given_unit.quantity not in wanted):
         report.reject(field_name, given, f"not known as a unit of {name}; give one like {examples}")
     elif in_file and (file_unit is None or file_unit.quantity not in wanted):
-        report.faults.append(
-            f"{name} is in {in_file!r}, which is not known here as its unit (known are such as {examples}); "
-            "where that is wrong say with Description.columns what it is"
-        )
+        fault = f"{name} is in {in_file!r}, which is not known here as its unit (known are such as {examples})"
+        report.faults.append(f"{fault}; where that is wrong say with Description.columns what it is")
     elif file_unit is not None and given_unit is not None and file_unit != given_unit:
         report.add_contradiction(field_name, given, in_file)
     elif file_unit is None and given_unit is None:

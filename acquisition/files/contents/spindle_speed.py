@@ -20,6 +20,7 @@ MIN_REGULAR_TURNS_SHARE = 0.8
 """Smallest share of turns that are as long as their neighbours."""
 NEIGHBOR_TURNS = 5
 """Number of turns on each side to compare with."""
+_TACHOMETER_QUESTION = "is the tachometer connected, and is this its column?"
 
 
 def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
@@ -60,15 +61,13 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
     begins = _find_rising_edges(signal)
     marks = begins[::pulses]
     if marks.size < 3:
-        raise ValueError(
-            f"{begins.size} pulses in {signal.size / sample_rate:.3g} s, less than two turns of {pulses}; is the "
-            "tachometer connected, and is this its column?"
-        )
+        found = f"{begins.size} pulses in {signal.size / sample_rate:.3g} s, less than two turns of {pulses}"
+        raise ValueError(f"{found}; {_TACHOMETER_QUESTION}")
     turn = np.diff(marks)
     usual = np.array([np.median(turn[max(i - NEIGHBOR_TURNS, 0) : i + NEIGHBOR_TURNS + 1]) for i in range(turn.size)])
     is_even = np.maximum(turn / usual, usual / turn) < MAX_TURN_RATIO
     if np.mean(is_even) < MIN_REGULAR_TURNS_SHARE:
-        raise ValueError(f"{begins.size} pulses at no even times; is the tachometer connected, and is this its column?")
+        raise ValueError(f"{begins.size} pulses at no even times; {_TACHOMETER_QUESTION}")
     speed = np.full(signal.size, np.nan)
     edges = np.ceil(marks).astype(int)
     for first, last, time in zip(edges[:-1][is_even], edges[1:][is_even], turn[is_even], strict=True):
@@ -105,9 +104,7 @@ def split_speed_column(
     if len(columns) > 1:
         names = " and ".join(signal.name for signal in columns)
         report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
-    rest = [
-        signal for signal in signals if signal.role not in SPEED_ROLES and not any(signal is other for other in columns)
-    ]
+    rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
     if description.pulses is not None and not columns:
         report.reject("pulses", description.pulses, "no column is a tachometer; name it with Description.tacho")
     return rest, columns[0] if columns else None

@@ -7,20 +7,11 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from acquisition.frf import FrfQuantity
+
 Dimension = tuple[int, int, int]
 """Exponents of length, time and force."""
-MeasuredQuantity = Literal[
-    "time",
-    "frequency",
-    "force",
-    "displacement",
-    "velocity",
-    "acceleration",
-    "receptance",
-    "mobility",
-    "accelerance",
-    "",
-]
+MeasuredQuantity = Literal["time", "frequency", "force", "displacement", "velocity", "acceleration", FrfQuantity, ""]
 """Quantity that a unit measures; empty for others."""
 
 STANDARD_GRAVITY = 9.80665

@@ -30,12 +30,10 @@ _WINDOW_FIT_TOLERANCE = 0.02
 
 def find_window(variables: Mapping[str, Any]) -> str:
     """Find the window as `Contents.window`: stated by a variable, or seen in the signals before and behind it."""
-    named = next(
-        (value for name, value in variables.items() if _WINDOW_NAME.fullmatch(name) and isinstance(value, str)), ""
-    )
+    named = (text for name, text in variables.items() if _WINDOW_NAME.fullmatch(name) and isinstance(text, str))
     responses = (name[1:] for name in variables if re.fullmatch(r"W([2-9]|\d\d)", name))
     windows = [_infer_window(variables.get(f"X{number}"), variables[f"W{number}"]) for number in responses]
-    return named or next(filter(None, windows), "")
+    return next(named, "") or next(filter(None, windows), "")
 
 
 def _infer_window(before: Any, behind: Any) -> str:
@@ -102,19 +100,10 @@ _TIME_NAME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
 
 def recognize_layout(variables: Mapping[str, Any]) -> Contents | None:
     """Return the contents of variables in a known layout, else None."""
-    for layout in (
-        _read_lobewatch,
-        _read_signal_calc,
-        read_siglab,
-        _read_test_lab,
-        _read_logger,
-        _read_vectors,
-        _read_time_vectors,
-    ):
-        contents = layout(variables)
-        if contents is not None:
-            return replace(contents, window=find_window(variables))
-    return None
+    programs = (_read_lobewatch, _read_signal_calc, read_siglab, _read_test_lab, _read_logger)
+    layouts = (layout(variables) for layout in (*programs, _read_vectors, _read_time_vectors))
+    contents = next(filter(None, layouts), None)
+    return None if contents is None else replace(contents, window=find_window(variables))
 
 
 def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
@@ -154,18 +143,13 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
     for name, channel in frfs:
         label = f"{name} {_get_channel_text(names, channel)}".strip()
-        unit = (
-            f"({_get_channel_text(units, channel)})/({_get_channel_text(units, '1')})"
-            if _get_channel_text(units, channel) and _get_channel_text(units, "1")
-            else ""
-        )
-        signals.append(Signal(label, v[name][:, 1], "frf", unit))
+        over, under = _get_channel_text(units, channel), _get_channel_text(units, "1")
+        signals.append(Signal(label, v[name][:, 1], "frf", f"({over})/({under})" if over and under else ""))
         coherence = v.get(f"C1_{channel}")
         if coherence is not None and _is_pairs(coherence):
             signals.append(Signal(f"C1_{channel}", np.real(coherence[:, 1]), "coherence"))
-    averages = re.search(
-        r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", " ".join(_list_texts(v.get("DP_Info"))), re.IGNORECASE
-    )
+    processing = " ".join(_list_texts(v.get("DP_Info")))
+    averages = re.search(r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", processing, re.IGNORECASE)
     return Contents((*signals, *over_time), averages=int(averages[1]) if averages else None)
 
 
@@ -249,11 +233,8 @@ def _read_vectors(v: Mapping[str, Any]) -> Contents | None:
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
     for name, axis in arrays.items():
         if _FREQUENCY_NAME.fullmatch(name) and _is_rising(axis):
-            frfs = [
-                entry
-                for entry in _list_vectors_of_length(arrays, axis.size)
-                if np.iscomplexobj(entry[1]) and not _SPECTRUM_NAME.match(entry[0])
-            ]
+            parallel = _list_vectors_of_length(arrays, axis.size)
+            frfs = [(key, part) for key, part in parallel if np.iscomplexobj(part) and not _SPECTRUM_NAME.match(key)]
             if frfs:
                 return Contents(tuple(_make_vector_signals(arrays, name, frfs)))
     return None
@@ -270,9 +251,8 @@ def _make_vector_signals(
         if _COHERENCE_NAME.match(name) and not np.iscomplexobj(values):
             taken.add(name)
             yield Signal(name, values, "coherence")
-    yield from (
-        Signal(name, values, record=1) for name, values in arrays.items() if values.ndim == 1 and name not in taken
-    )
+    rest = ((name, values) for name, values in arrays.items() if values.ndim == 1 and name not in taken)
+    yield from (Signal(name, values, record=1) for name, values in rest)
 
 
 def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
@@ -288,11 +268,8 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
         return None
     n = arrays[axis].size if axis else max((max(value.shape) for value in arrays.values()), default=0)
     signals = [Signal(axis, arrays[axis], "time")] if axis else []
-    signals += [
-        Signal(name, values, infer_role(name, ""), rate=rate)
-        for name, values in _list_vectors_of_length(arrays, n)
-        if name != axis
-    ]
+    parallel = ((name, values) for name, values in _list_vectors_of_length(arrays, n) if name != axis)
+    signals += [Signal(name, values, infer_role(name, ""), rate=rate) for name, values in parallel]
     others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
     unassigned = list(list_array_signals(others))
     has_frf = any(signal.role == "frf" for signal in unassigned)

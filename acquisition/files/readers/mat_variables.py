@@ -36,9 +36,8 @@ ARRAY_EXTENSION_CODE = 1
 def read_mat_variables(path: Path) -> dict[str, Any]:
     """Read all variables by name; raise DataError where the file is damaged or unpacks out of proportion."""
     try:
-        content = run_in_subprocess(
-            __name__, str(path), patience=READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
-        )
+        patience = READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
+        content = run_in_subprocess(__name__, str(path), patience=patience)
     except subprocess.SubprocessError as error:
         raise DataError(f"{path}: damaged: its reader crashes or hangs on it; export it anew") from error
     answer: dict[str, Any] | str = msgspec.msgpack.decode(content, ext_hook=_decode_array)

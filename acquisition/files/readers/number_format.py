@@ -86,9 +86,7 @@ def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
     comma, point = _agree_on_use(commas), _agree_on_use(points)
     if point == "doubtful" and not {"decimal", "doubtful"} & {*commas}:
         point = "decimal"
-    return [
-        NumberFormat(*uses) for uses in zip(_resolve_uses(commas, comma), _resolve_uses(points, point), strict=True)
-    ]
+    return list(map(NumberFormat, _resolve_uses(commas, comma), _resolve_uses(points, point)))
 
 
 def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:

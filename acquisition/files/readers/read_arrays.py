@@ -73,15 +73,10 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
-        return _make_array_contents(_split_array_fields(loaded))
+        fields = loaded.dtype.names
+        return _make_array_contents({"array": loaded} if fields is None else {name: loaded[name] for name in fields})
     with loaded:
         return _make_array_contents({name: loaded[name][()] for name in loaded.files})
-
-
-def _split_array_fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Return an array by a name, or its fields where it has some."""
-    names = array.dtype.names
-    return {"array": array} if names is None else {name: array[name] for name in names}
 
 
 def _check_zip_size(file: BinaryIO, path: Path) -> None:
@@ -130,9 +125,8 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
     signals, groups = list[Signal](), dict[str, int]()
     for number, channel in enumerate(channels, 1):
         where = f"{place}: channel {number}"
-        missing = [key for key in _SEP005_KEYS if key not in channel] + (
-            [] if {"fs", "time"} & channel.keys() else ["fs"]
-        )
+        missing = [key for key in _SEP005_KEYS if key not in channel]
+        missing += [] if {"fs", "time"} & channel.keys() else ["fs"]
         if missing:
             raise DataError(f"{where} has no {', '.join(missing)}; SEP005 asks for them")
         record = groups.setdefault(str(channel.get("group", "")), len(groups))
@@ -148,13 +142,9 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}
-    return Contents(
-        tuple(signals),
-        created=_parse_timestamp(first.get("start_timestamp")),
-        direction=str(first.get("direction", "")),
-        tool=str(first.get("tool", "")),
-        machines=list_distinct_names(groups),
-    )
+    direction, tool = (str(first.get(key, "")) for key in ("direction", "tool"))
+    created, machines = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
+    return Contents(tuple(signals), created=created, direction=direction, tool=tool, machines=machines)
 
 
 def _parse_timestamp(text: object) -> datetime | None:

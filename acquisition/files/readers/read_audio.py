@@ -27,13 +27,11 @@ def read_audio(path: Path) -> Contents:
     with path.open("rb") as file:
         is_wav = _is_wav(file.read(12))
     rate, columns = _read_wav(path) if is_wav else _read_flac_or_mp3(path)
-    signals = (
-        Signal(f"channel {i}", column, rate=float(rate), per_full_scale=True) for i, column in enumerate(columns, 1)
-    )
+    signals = (Signal(f"channel {i}", column, rate=rate, per_full_scale=True) for i, column in enumerate(columns, 1))
     return Contents(tuple(signals))
 
 
-def _read_wav(path: Path) -> tuple[int, Floats]:
+def _read_wav(path: Path) -> tuple[float, Floats]:
     """Read sample rate and channels of a WAV file."""
     import scipy.io.wavfile  # it takes a while, and few files need it
 
@@ -49,22 +47,21 @@ def _read_wav(path: Path) -> tuple[int, Floats]:
     if values.dtype.kind == "u":
         columns = columns.astype(np.float64) - 128
     scale = {"i": 2.0 ** (8 * values.dtype.itemsize - 1), "u": 128.0}.get(values.dtype.kind, 1.0)
-    return rate, columns / scale
+    return float(rate), columns / scale
 
 
-def _read_flac_or_mp3(path: Path) -> tuple[int, Floats]:
+def _read_flac_or_mp3(path: Path) -> tuple[float, Floats]:
     """Read sample rate and channels of a FLAC or MP3 file."""
     try:
         import soundfile
     except ImportError as error:
-        raise DataError(
-            f'{path}: FLAC and MP3 are read by soundfile; install it: pip install "lobewatch[sound]", or export WAV'
-        ) from error
+        cure = 'install it: pip install "lobewatch[sound]", or export WAV'
+        raise DataError(f"{path}: FLAC and MP3 are read by soundfile; {cure}") from error
     try:
         values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
     except Exception as error:
         raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
-    return rate, values.T
+    return float(rate), values.T
 
 
 def _is_wav(head: bytes) -> bool:

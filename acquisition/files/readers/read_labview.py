@@ -37,11 +37,9 @@ def read_lvm(path: Path) -> Contents:
     pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator stands in one of them
     head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
     starts = [*ends[1:], len(lines)]
-    signals = [
-        signal
-        for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False))
-        for signal in _read_lvm_segment(path, lines, places, head, number)
-    ]
+    signals = list[Signal]()
+    for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False)):
+        signals += _read_lvm_segment(path, lines, places, head, number)
     if not text.endswith("\n"):
         raise DataError(f"{path}: its last line has no end, so digits may be missing; the file is cut short")
     return Contents(tuple(signals), created=_parse_lvm_date(head))
@@ -125,10 +123,9 @@ def _make_tdms_signals(channels: list[Any], record: int) -> Iterator[Signal]:
         values = channel[:]
         if values.dtype.kind in "fiu" and values.size > 1:
             name, by_name = split_heading(channel.name)
-            unit = str(
-                channel.properties.get("unit_string", "") or channel.properties.get("NI_UnitDescription", "") or by_name
-            )
-            step = float(channel.properties.get("wf_increment", 0) or 0)
+            given = channel.properties
+            unit = str(given.get("unit_string", "") or given.get("NI_UnitDescription", "") or by_name)
+            step = float(given.get("wf_increment", 0) or 0)
             rate = 1 / step if step > 0 else None
             yield Signal(name, values.astype(np.float64), infer_role(name, unit), unit, rate=rate, record=record)
 
@@ -142,8 +139,4 @@ def _get_tdms_start(channel: Any) -> datetime | None:
     return datetime.fromtimestamp(float(seconds), UTC)
 
 
-def _is_tdms(head: bytes, _path: Path) -> bool:
-    return head.startswith(b"TDSm")
-
-
-TDMS_FORMAT = Format("tdms", "TDMS file", (".tdms",), _is_tdms, read_tdms)
+TDMS_FORMAT = Format("tdms", "TDMS file", (".tdms",), lambda head, _path: head.startswith(b"TDSm"), read_tdms)

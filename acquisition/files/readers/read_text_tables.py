@@ -184,12 +184,9 @@ def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[
     return Contents(signals, n_averages, created, direction, tool, window=keys.get("window", ""))
 
 
-def _is_text_table(head: bytes, _path: Path) -> bool:
-    return is_text(head)
-
-
+_TABLE_EXTENSIONS = (".csv", ".txt", ".frf", ".dat", ".asc")
 TEXT_TABLE_FORMAT = Format(
-    "table", "text table", (".csv", ".txt", ".frf", ".dat", ".asc"), _is_text_table, read_table, read_from=read_table
+    "table", "text table", _TABLE_EXTENSIONS, lambda head, _path: is_text(head), read_table, read_from=read_table
 )
 
 
@@ -217,11 +214,8 @@ def read_pulse(path: Path) -> Contents:
         axis, *parts = (column.values for column in columns)
         function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
         flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
-        name, unit, over = (
-            header.get("title", "function"),
-            header.get("amplitudeunit", ""),
-            header.get("x-axis unit", ""),
-        )
+        name, unit = header.get("title", "function"), header.get("amplitudeunit", "")
+        over = header.get("x-axis unit", "")
         signals.append(Signal("abscissa", axis, infer_role("", over), over, record=record, flaws=columns[0].flaws))
         signals.append(Signal(name, function, _infer_pulse_role(header, unit), unit, record=record, flaws=flaws))
     return Contents(tuple(signals), created=_parse_pulse_date(header))

@@ -23,6 +23,7 @@ _UNIT_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN
 _MOTION_TYPES = {8: ("displacement", ""), 11: ("velocity", "/s"), 12: ("acceleration", "/s^2")}
 """Quantity of an ordinate type, and the part of its unit behind the length."""
 _FORCE_TYPES = (9, 13)
+_ORDINATE_TYPES = _MOTION_TYPES | dict.fromkeys(_FORCE_TYPES, ("force", ""))
 _TIME_TYPE, _FRF_TYPE, _COHERENCE_TYPE = 1, 4, 6
 _DATE_FORMATS = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-%m-%dT%H:%M:%S%z")
 
@@ -50,16 +51,10 @@ def read_uff(path: Path) -> Contents:
         raise DataError(f"{path}: holds {content}; FRFs (type 4) and signals over time (type 1) are read")
     first = frfs[0] if frfs else sets.functions[0]
     averages = {function.averages for function in frfs if function.averages}
-    return Contents(
-        tuple(signals),
-        averages=averages.pop() if len(averages) == 1 else None,
-        created=_parse_date(first),
-        direction=_get_common_direction(sets),
-        tool=first.keys.get("tool", ""),
-        machines=sets.models,
-        window=next((function.window for function in (frfs or sets.functions) if function.window), ""),
-        notes=tuple(_list_notes(frfs)),
-    )
+    n_averages = averages.pop() if len(averages) == 1 else None
+    labels = _parse_date(first), _get_common_direction(sets), first.keys.get("tool", "")
+    window = next((function.window for function in (frfs or sets.functions) if function.window), "")
+    return Contents(tuple(signals), n_averages, *labels, sets.models, window, tuple(_list_notes(frfs)))
 
 
 def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
@@ -91,17 +86,14 @@ def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
 
 def _make_frf_signals(sets: UffDataSets, frfs: Sequence[UffFunction]) -> Iterator[Signal]:
     """Return one record per FRF with positive axis directions."""
+    coherences = [function for function in sets.functions if function.type == _COHERENCE_TYPE]
     for record, frf in enumerate(frfs):
         unit, quantity = _get_frf_unit(frf, sets.system)
         sign = -1.0 if frf.response_direction * frf.reference_direction < 0 else 1.0
         yield Signal("frequency", frf.abscissa, "frequency", frf.abscissa_axis.unit or "Hz", record=record)
         yield Signal(frf.name, sign * frf.values, "frf", unit, quantity, record=record)
-        for function in sets.functions:
-            if (
-                function.type == _COHERENCE_TYPE
-                and function.place == frf.place
-                and function.values.size == frf.values.size
-            ):
+        for function in coherences:
+            if function.place == frf.place and function.values.size == frf.values.size:
                 yield Signal(f"coherence of {frf.name}", function.values, "coherence", record=record)
                 break
 
@@ -124,9 +116,7 @@ def _make_time_signals(sets: UffDataSets) -> Iterator[Signal]:
         if (function.place, function.ordinate.type) in places:
             record, places = record + 1, set()
         places.add((function.place, function.ordinate.type))
-        quantity, per_time = _MOTION_TYPES.get(
-            function.ordinate.type, ("force" if function.ordinate.type in _FORCE_TYPES else "", "")
-        )
+        quantity, per_time = _ORDINATE_TYPES.get(function.ordinate.type, ("", ""))
         unit = function.ordinate.unit
         if not unit and sets.system and quantity:
             unit = sets.system[1] if quantity == "force" else f"{sets.system[0]}{per_time}"
@@ -139,9 +129,8 @@ def _make_time_signals(sets: UffDataSets) -> Iterator[Signal]:
 
 def _get_common_direction(sets: UffDataSets) -> str:
     """Return the direction at the tool tip where all responses have the same."""
-    responses = {
-        abs(function.response_direction) for function in sets.functions if function.ordinate.type in _MOTION_TYPES
-    }
+    measured = (function for function in sets.functions if function.ordinate.type in _MOTION_TYPES)
+    responses = {abs(function.response_direction) for function in measured}
     return {1: "x", 2: "y", 3: "z"}.get(responses.pop(), "") if len(responses) == 1 else ""
 
 

@@ -172,19 +172,15 @@ def find_heading_above(lines: Sequence[str], form: RowLayout, width: int) -> Hea
     in_turn = _split_words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
     if in_turn and all(in_turn[::2]) and is_unit(in_turn[1]):
         return _pair_alternating(in_turn)
-    return _pair_names_and_units(max(names, key=_count_known_roles), units, is_ratio=_RATIO_LABEL in lines)
-
-
-def _count_known_roles(words: Sequence[str]) -> int:
-    return sum(bool(infer_role(*split_heading(word))) for word in words)
+    best = max(names, key=lambda words: sum(bool(infer_role(*split_heading(word))) for word in words))
+    return _pair_names_and_units(best, units, is_ratio=_RATIO_LABEL in lines)
 
 
 def find_heading_behind(row: str, form: RowLayout) -> Heading:
     """Find the names and units behind the numbers of a row, a name and a unit per column or only names; else empty."""
     width = len(form.columns)
-    words = re.split(
-        r"\s+" if form.separator in (BLANK_SEPARATOR, "\t") else form.separator, row.strip(), maxsplit=width
-    )
+    separator = r"\s+" if form.separator in (BLANK_SEPARATOR, "\t") else form.separator
+    words = re.split(separator, row.strip(), maxsplit=width)
     if len(words) <= width or not all(map(is_number, words[:width])) or is_number((words[width].split() or [""])[0]):
         return []
     names = [word for word in re.split(r"\s*\t\s*|\s*;\s*|\s+", words[width].strip()) if word]
@@ -207,8 +203,10 @@ def _split_words(line: str, form: RowLayout, width: int) -> list[str]:
     """Split a line into a word per column with any separator; empty where there are more or fewer words."""
     joined = _SPACE_BEFORE_BRACKET.sub("", line)
     for separator in (form.separator, "\t", ";", ",", "[ \t]{2,}", BLANK_SEPARATOR):
-        text = line if separator in ",;\t" else joined
-        words = [word.strip() for word in _split(text.strip(" \r\n"), separator)]
+        if separator in ",;\t":
+            words = split_fields(line.strip(" \r\n"), separator)
+        else:
+            words = re.split(separator, joined.strip())
         if len(words) == width:
             return [words[i] for i in form.columns]
         while len(words) > len(form.columns) and not words[-1]:
@@ -216,12 +214,6 @@ def _split_words(line: str, form: RowLayout, width: int) -> list[str]:
         if len(words) == len(form.columns):
             return words
     return []
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if separator in ",;\t":
-        return split_fields(line, separator)
-    return re.split(separator, line.strip())
 
 
 def _are_units(words: Sequence[str]) -> bool:
@@ -232,9 +224,8 @@ def _are_units(words: Sequence[str]) -> bool:
     if all(not word or word == "-" or is_unit(word) for word in bare):
         return True
     first = parse_unit(bare[0])
-    return (
-        first is not None and first.quantity in ("time", "frequency") and not any(infer_role(word, "") for word in bare)
-    )
+    is_axis = first is not None and first.quantity in ("time", "frequency")
+    return is_axis and not any(infer_role(word, "") for word in bare)
 
 
 def _pair_names_and_units(names: Sequence[str], units: Sequence[str], *, is_ratio: bool) -> Heading:

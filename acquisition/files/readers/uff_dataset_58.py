@@ -64,9 +64,8 @@ class UffFunction:
     @property
     def averages(self) -> int | None:
         """Number of averaged hits; None where unknown."""
-        number = self.keys.get("averages", "") or "".join(
-            re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", " ".join(self.lines))[:1]
-        )
+        text = " ".join(self.lines)
+        number = self.keys.get("averages", "") or "".join(re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", text)[:1])
         return int(number) if number.strip().isdigit() else None
 
     @property
@@ -109,30 +108,15 @@ def _parse_row_seven(line: str) -> tuple[int, int, int, float, float]:
     return kind, n, spacing, float(words[3]), float(words[4])
 
 
-def _make_function(
-    lines: list[str],
-    abscissa: Floats,
-    step: float,
-    values: Floats | Complexes,
-) -> UffFunction:
+def _make_function(lines: list[str], abscissa: Floats, step: float, values: Floats | Complexes) -> UffFunction:
     six = lines[6].ljust(80)
     response, reference = (_parse_point(six[31:55]), _parse_point(six[56:80]))
-    where = " ".join(
-        filter(None, [_format_point(response), "over" if _format_point(reference) else "", _format_point(reference)])
-    )
-    label = lines[9].ljust(80)[26:46].strip()
-    function = UffFunction(
-        tuple(lines[1:6]),
-        int(six[:5]),
-        where or label or "function",
-        response[2],
-        reference[2],
-        (*response, *reference),
-        abscissa,
-        step,
-        values,
-        *(_parse_axis(line) for line in lines[8:11]),
-    )
+    below = _format_point(reference)
+    where = " ".join(filter(None, [_format_point(response), "over" if below else "", below]))
+    name = where or lines[9].ljust(80)[26:46].strip() or "function"
+    points = response[2], reference[2], (*response, *reference)
+    axes = map(_parse_axis, lines[8:11])
+    function = UffFunction(tuple(lines[1:6]), int(six[:5]), name, *points, abscissa, step, values, *axes)
     exact = function.keys.get("step")
     if exact and step and abs(float(exact) / step - 1) < 1e-4:
         start = float(function.keys.get("start", abscissa[0]))
